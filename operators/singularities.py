@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..rosy_addon.errors import REPORTED_ERRORS, counted
+from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.singularity_points import (
     add_singularity_points,
@@ -57,7 +58,7 @@ class ROSY_OT_singularities(bpy.types.Operator):
         count = sum(map(len, singularities_by_object.values()))
         total = "; ".join(
             f"'{obj.name}': sum of the indices "
-            f"{overlay.format_index(int(singularities.index.sum()), singularities.degree)}"
+            f"{format_index(int(singularities.index.sum()), singularities.degree)}"
             for obj, singularities in singularities_by_object.items()
         )
         self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")

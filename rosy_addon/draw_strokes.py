@@ -14,7 +14,6 @@ from .errors import RosyError
 from .file_io import check_writable, write_bytes
 from .line_drawing.pipeline import StrokeDrawing, draw_instances_task, geometry_task
 from .line_drawing.polyline_files import check_drawing_suffix, polyline_file_task
-from .line_drawing.stroke_set import Strokes
 from .line_drawing.style import StrokeStyle
 from .line_drawing.svg import Pen, svg_task
 from .progress import Progress, Task, run_to_completion, subtask
@@ -137,7 +136,7 @@ def draw_strokes_task(
     BAKE_CACHE.evict_over_limit()
     label = "storing the strokes"
     if kind == "FILE":
-        task = _file_task(suffix, drawing.strokes, view, pen)
+        task = _file_task(suffix, drawing, view, pen)
         write_bytes(path, (yield from subtask(task, 0.95, 1.0, label)))
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
     task = geometry_task(drawing, view, pen, followed)
@@ -164,12 +163,12 @@ def draw_strokes(
     return run_to_completion(draw_strokes_task(scene, depsgraph, **options))
 
 
-def _file_task(suffix: str, strokes: Strokes, view: Camera, pen: Pen) -> Task[bytes]:
+def _file_task(suffix: str, drawing: StrokeDrawing, view: Camera, pen: Pen) -> Task[bytes]:
     """Return the contents of a file of strokes."""
     if suffix == ".svg":
-        return (yield from svg_task(strokes, view, pen)).encode()
+        return (yield from svg_task(drawing.strokes, view, pen, drawing.marks)).encode()
     up = UP_AXIS_BY_SUFFIX.get(suffix, "z")
-    return (yield from polyline_file_task(suffix, strokes, view, pen, UP_AXIS_MATRIX[up].T))
+    return (yield from polyline_file_task(suffix, drawing.strokes, view, pen, UP_AXIS_MATRIX[up].T))
 
 
 def drawing_path(path: Path | str) -> Path:

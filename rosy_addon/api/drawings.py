@@ -52,6 +52,7 @@ class Drawing:
 
     def __init__(self, strokes: StrokeDrawing, camera: Camera, pen: Pen, up: str = "z") -> None:
         self._strokes = strokes.strokes
+        self._marks = strokes.marks
         self._camera = camera
         self._pen = pen
         self._up = up
@@ -65,7 +66,7 @@ class Drawing:
     @cached_property
     def svg(self) -> str:
         """The drawing as an SVG document, with a layer for each family of lines."""
-        return svg_text(self._strokes, self._camera, self._pen)
+        return svg_text(self._strokes, self._camera, self._pen, self._marks)
 
     def _repr_svg_(self) -> str:
         return self.svg

@@ -6,6 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..annotation.singularity_settings import (
+    singularity_dots_choice,
+    singularity_labels_switch,
+    singularity_size_number,
+)
 from ..errors import RosyError
 from ..settings import (
     Choice,
@@ -46,6 +51,10 @@ def _uses_ink_color(look: Any) -> bool:
 
 def _uses_ink_ramp(look: Any) -> bool:
     return _uses_ink_color(look) and look.ink_ramp
+
+
+#: Where the settings of singularities are shown, and the stage that they affect.
+_SINGULARITIES: dict[str, Any] = {"panel": "singularities", "stage": Stage.SHADING}
 
 
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
@@ -467,6 +476,9 @@ class Look:
         is_pixel_length=True,
         **_ink(),
     )
+    singularity_dots: str = singularity_dots_choice(**_SINGULARITIES)
+    singularity_size: float = singularity_size_number(**_SINGULARITIES)
+    singularity_labels: bool = singularity_labels_switch(**_SINGULARITIES)
     supersampling: int = number(
         1,
         1,

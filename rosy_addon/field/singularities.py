@@ -89,6 +89,13 @@ def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndar
     return vertex, index[vertex]
 
 
+def format_index(index: int, degree: int) -> str:
+    """Return an index, given in units of 1 / N, as a fraction: +1/4, -1, +3/2."""
+    divisor = int(np.gcd(index, degree))
+    numerator, denominator = index // divisor, degree // divisor
+    return f"{numerator:+d}" if denominator == 1 else f"{numerator:+d}/{denominator}"
+
+
 def description_task(
     fields: Sequence[tuple[Surface, RosyField]], *, count_singularities: bool
 ) -> Task[str]:

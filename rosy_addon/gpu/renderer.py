@@ -20,6 +20,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
+from ..rendering.singularities import with_singularities_task
 from ..rendering.view_input import Background, ViewInput
 from . import lookup_tables, passes
 from .background import draw_background
@@ -76,7 +77,7 @@ class GpuRenderer:
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
-        return Picture(rgba, ())
+        return (yield from with_singularities_task(Picture(rgba, ()), view))
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
         """As `ViewportRenderer.prepare_task`."""

@@ -8,6 +8,8 @@ from functools import reduce
 
 import numpy as np
 
+from ..annotation.singularity_marks import SingularityMarks, singularity_marks_task
+from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..errors import RosyError
 from ..field.frames import dot
@@ -76,11 +78,14 @@ class StrokeDrawing:
         The mesh instance of each stroke: an index into the instances that were given.
     hidden : bool
         Whether parts that the camera does not see were kept.
+    marks : SingularityMarks or None
+        The singularities, if the style shows them.
     """
 
     strokes: Strokes
     instance_index: np.ndarray
     hidden: bool = False
+    marks: SingularityMarks | None = None
 
 
 def draw_instances(
@@ -186,10 +191,13 @@ def draw_instances_task(
         strokes = yield from subtask(task, 0.95, 1.0)
     if not len(strokes):
         raise _no_visible_stroke(camera)
+    marks = None
+    if shows_singularities(style):
+        marks = yield from subtask(singularity_marks_task(instances, camera, style), 1.0, 1.0)
     # Families of different instances are still separate. Each belongs to one instance.
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
     return StrokeDrawing(
-        _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden
+        _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden, marks
     )
 
 

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..annotation.singularity_settings import (
+    singularity_dots_choice,
+    singularity_labels_switch,
+    singularity_size_number,
+)
 from ..settings import check_settings, choice, number, switch
 
 
@@ -112,6 +117,9 @@ class StrokeStyle:
     )
     outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
     hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")
+    singularity_dots: str = singularity_dots_choice(panel="singularities")
+    singularity_size: float = singularity_size_number(panel="singularities")
+    singularity_labels: bool = singularity_labels_switch(panel="singularities")
     cross_creases: bool = switch(False, "Continue strokes across sharp creases", panel="ends")
 
     def __post_init__(self) -> None:

@@ -10,6 +10,14 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from ..annotation.index_labels import HALO, HALO_COLOR, LABEL_COLOR, STROKE_WIDTH, placed_labels
+from ..annotation.singularity_marks import (
+    COLOR_BY_SIGN,
+    HIDDEN_OPACITY,
+    OUTLINE,
+    OUTLINE_COLOR,
+    SingularityMarks,
+)
 from ..errors import RosyError
 from ..file_io import write_bytes
 from ..progress import Progress, Task, run_to_completion, subtask
@@ -124,12 +132,22 @@ def write_svg(
     write_bytes(path, svg_text(strokes, camera, pen).encode())
 
 
-def svg_text(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> str:
+def svg_text(
+    strokes: Strokes,
+    camera: Camera,
+    pen: Pen | None = None,
+    marks: SingularityMarks | None = None,
+) -> str:
     """Run `svg_task` to its end."""
-    return run_to_completion(svg_task(strokes, camera, pen))
+    return run_to_completion(svg_task(strokes, camera, pen, marks))
 
 
-def svg_task(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> Task[str]:
+def svg_task(
+    strokes: Strokes,
+    camera: Camera,
+    pen: Pen | None = None,
+    marks: SingularityMarks | None = None,
+) -> Task[str]:
     """Return strokes as an SVG document, projected by a camera.
 
     Hidden parts are not removed here; see `clip_to_visible`.
@@ -140,6 +158,8 @@ def svg_task(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> Task[s
         All points in front of the camera.
     camera : Camera
     pen : Pen, optional
+    marks : SingularityMarks, optional
+        Singularities in this camera.
 
     Yields
     ------
@@ -148,8 +168,8 @@ def svg_task(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> Task[s
     Returns
     -------
     str
-        SVG 1.1. Each family is a group that is a layer in Inkscape, and so is the paper. A stroke
-        is one path, or several if its opacity changes.
+        SVG 1.1. Each family is a group that is a layer in Inkscape, and so are the paper and the
+        singularities. A stroke is one path, or several if its opacity changes.
     """
     pen = pen or Pen()
     yield Progress(0.0, "writing strokes")
@@ -195,8 +215,45 @@ def svg_task(strokes: Strokes, camera: Camera, pen: Pen | None = None) -> Task[s
         start, stop = (done / len(strokes.names) for done in (family, family + 1))
         lines += yield from subtask(task, start, stop)
         lines.append("</g>")
+    if marks is not None and len(marks):
+        lines += _singularity_layer(marks, camera.height)
     lines.append("</svg>")
     return "\n".join(lines) + "\n"
+
+
+def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
+    """Return the lines of a group of dots and labels, in a picture of a height in pixels."""
+    marks = marks.in_drawing_order()
+    outline = OUTLINE * marks.size
+    lines = [
+        '<g id="singularities" inkscape:groupmode="layer" inkscape:label="singularities" '
+        f'stroke="{OUTLINE_COLOR}" stroke-width="{outline:.3g}" stroke-linecap="round" '
+        'stroke-linejoin="round">'
+    ]
+    for (x, y), radius, index, is_visible in zip(
+        marks.position.tolist(),
+        marks.radius.tolist(),
+        marks.index.tolist(),
+        marks.is_visible.tolist(),
+        strict=True,
+    ):
+        opacity = "" if is_visible else f' opacity="{HIDDEN_OPACITY}"'
+        lines.append(
+            f'<circle cx="{x:.2f}" cy="{height - y:.2f}" r="{radius + outline / 2:.2f}" '
+            f'fill="{COLOR_BY_SIGN[1 if index > 0 else -1]}"{opacity}/>'
+        )
+    width = STROKE_WIDTH * marks.size
+    for label in placed_labels(marks):
+        segments = label.segments() * (1, -1) + (0, height)
+        path = " ".join(f"M{_format_points(segment)}" for segment in segments)
+        for color, line_width in (
+            (HALO_COLOR, width + 2 * HALO * marks.size),
+            (LABEL_COLOR, width),
+        ):
+            lines.append(
+                f'<path fill="none" stroke="{color}" stroke-width="{line_width:.3g}" d="{path}"/>'
+            )
+    return [*lines, "</g>"]
 
 
 def _plotter_paths_task(pixels: np.ndarray, strokes: Strokes) -> Task[list[str]]:

@@ -182,7 +182,7 @@ def project_samples_task(
     columns = [np.concatenate(values) for values in zip(*columns, strict=True)]
     order = np.argsort(columns[0], kind="stable")
     sample, home, shown, instance_id, triangle = (values[order] for values in columns)
-    clip, triangles, first_triangle = _all_triangles(instances, camera)
+    clip, triangles, first_triangle = all_triangles(instances, camera)
     global_triangle = triangle + first_triangle[instance_id]
     weights, front_facing = yield from subtask(
         barycentrics_task(clip, triangles, sample, global_triangle, camera.width, camera.height),
@@ -331,7 +331,7 @@ def _visible_samples_task(
     other_instance, other_triangle : (E,) int32 ndarray
         Instances of its other triangles, and the triangles counted within them.
     """
-    clip, triangles, first_triangle = _all_triangles(instances, camera)
+    clip, triangles, first_triangle = all_triangles(instances, camera)
     has_field = np.concatenate(
         [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
     )
@@ -359,7 +359,7 @@ def _split_triangles_task(
 ) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Return the instances of (n,) triangles, and the triangles counted within them, as int32.
 
-    `first_triangle` is that of `_all_triangles`.
+    `first_triangle` is that of `all_triangles`.
     """
     if len(first_triangle) == 1:
         return np.zeros(len(triangle), dtype=np.int32), triangle
@@ -389,12 +389,12 @@ def rasterize_instances_task(
     first_triangle : (B,) int32 ndarray
         Index of the first triangle of each of the B instances in this count.
     """
-    clip, triangles, first_triangle = _all_triangles(instances, camera)
+    clip, triangles, first_triangle = all_triangles(instances, camera)
     fragments = yield from rasterize_task(clip, triangles, camera.width, camera.height, rows)
     return fragments, first_triangle
 
 
-def _all_triangles(
+def all_triangles(
     instances: Sequence[MeshInstance], camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the triangles of all instances, in their order.

@@ -14,6 +14,7 @@ from ..projection.gbuffer import GBuffer
 from ..projection.project import cached_project_task, check_instances, project_task
 from .band_workers import BandWorkers
 from .picture_memory import check_picture_memory
+from .singularities import with_singularities_task
 from .view_input import ViewInput
 
 #: Share of the progress bar that projecting takes.
@@ -51,6 +52,11 @@ class CpuRenderer:
 
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`."""
+        picture = yield from subtask(self._picture_task(view), 0.0, 0.99)
+        return (yield from subtask(with_singularities_task(picture, view, self._cache), 0.99, 1.0))
+
+    def _picture_task(self, view: ViewInput) -> Task[Picture]:
+        """Draw the picture without singularities."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
         rows = self._checked_bands(view)
         if len(rows) > 1:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -73,13 +73,7 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
         label = f"object '{obj.name}'"
         surface = mesh_surface(obj.data, label)
         field = read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
-    # The vectors of the field are tangent to the rest shape.
-    rest_surface = (
-        surface
-        if surface.rest_vertices is None
-        else replace(surface, vertices=surface.rest_vertices, rest_vertices=None)
-    )
-    vertex, index = find_singularities(rest_surface, field)
+    vertex, index = find_singularities(surface.in_rest_shape(), field)
     points = surface.vertices[vertex].astype(np.float32)
     normals = vertex_normals(surface)[vertex].astype(np.float32)
     return Singularities(points, normals, index, field.degree)

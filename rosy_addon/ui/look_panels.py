@@ -20,6 +20,7 @@ LOOK_PANELS = {
     "light": "Light",
     "tone": "Tone",
     "ink": "Ink",
+    "singularities": "Singularities",
     "quality": "Quality",
 }
 

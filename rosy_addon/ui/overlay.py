@@ -6,42 +6,26 @@ is stored and after an undo: the dots move with the object, but do not follow ot
 
 from __future__ import annotations
 
-import math
 from collections.abc import Container
 from typing import Any
 
-import blf
 import bpy
-import gpu
 import numpy as np
-from bpy_extras.view3d_utils import location_3d_to_region_2d
-from gpu_extras.batch import batch_for_shader
-from mathutils import Vector
 
-from ..compositor.label_placement import place_labels
 from ..errors import RosyError
 from ..scene.singularity_points import (
     Singularities,
     read_editable_singularities,
     read_singularities,
 )
+from ..viewport.singularity_dots import SingularityDots, draw_dots, draw_labels
 from ..viewport.view3d import redraw
 
-#: Linear colors by the sign of the index: orange for positive, blue for negative.
-COLOR_BY_SIGN = {1: (1.0, 0.32, 0.05, 1.0), -1: (0.05, 0.35, 1.0, 1.0)}
-OUTLINE_COLOR = (0.02, 0.02, 0.02, 1.0)
-
-#: Diameter of a dot in pixels, without its outline of 2 pixels.
+#: Diameter of the dot of an index of 1 / N, without its outline, in pixels of a screen of normal resolution.
 DOT_DIAMETER = 9.0
-
-#: Number of sides of the polygon that approximates a disc.
-DISC_SEGMENTS = 20
 
 #: Offset of dots from the surface, as a fraction of the size of the object. It avoids z-fighting.
 SURFACE_OFFSET = 0.004
-
-#: Maximum number of labels of an object. More would hide the dots.
-MAX_LABELS = 250
 
 
 class _Overlay:
@@ -144,13 +128,6 @@ def has_handlers() -> bool:
     return bool(_OVERLAY.handlers)
 
 
-def format_index(index: int, degree: int) -> str:
-    """Return an index, given in units of 1 / N, as a fraction: +1/4, -1, +3/2."""
-    divisor = int(np.gcd(index, degree))
-    numerator, denominator = index // divisor, degree // divisor
-    return f"{numerator:+d}" if denominator == 1 else f"{numerator:+d}/{denominator}"
-
-
 def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
     """Return the visible objects and their singularities, without objects that were removed or renamed."""
     view_layer = bpy.context.view_layer
@@ -165,96 +142,24 @@ def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
     ]
 
 
+def _all_dots() -> list[SingularityDots]:
+    """Return the dots of the objects that are visible."""
+    return [
+        SingularityDots(offset_points(obj, shown), shown.index, shown.degree)
+        for obj, shown in _visible_singularities()
+    ]
+
+
 def _draw_dots() -> None:
     context = bpy.context
-    if not context.space_data.overlay.show_overlays:
-        return
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    gpu.state.depth_test_set("LESS_EQUAL")
-    scale = context.preferences.system.ui_scale
-    for obj, singularities in _visible_singularities():
-        positions = offset_points(obj, singularities)
-        for sign, fill_color in COLOR_BY_SIGN.items():
-            points = positions[np.sign(singularities.index) == sign]
-            if not len(points):  # Blender makes no batch without vertices
-                continue
-            # The outline first, slightly behind the dot.
-            for radius, depth_offset, color in (
-                (DOT_DIAMETER / 2 + 2, DOT_DIAMETER / 2, OUTLINE_COLOR),
-                (DOT_DIAMETER / 2, DOT_DIAMETER, fill_color),
-            ):
-                vertices = _disc_triangles(context, points, radius * scale, depth_offset)
-                shader.uniform_float("color", color)
-                batch_for_shader(shader, "TRIS", {"pos": vertices}).draw(shader)
-    gpu.state.depth_test_set("NONE")
-
-
-def _disc_triangles(
-    context: bpy.types.Context, points: np.ndarray, radius: float, depth_offset: float
-) -> np.ndarray:
-    """Return the (n, 3) corners of the triangles of a disc at each point, facing the camera.
-
-    The radius is in pixels, and so is the offset toward the camera.
-    """
-    view, window = context.region_data, context.region
-    view_to_world = np.array(view.view_matrix.inverted())
-    right, up, back = view_to_world[:3, 0], view_to_world[:3, 1], view_to_world[:3, 2]
-    depth = np.ones(len(points))
-    if view.is_perspective:
-        depth = (view_to_world[:3, 3] - points) @ back
-    pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None, None]
-    angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
-    circle = np.cos(angles)[:, None] * right + np.sin(angles)[:, None] * up
-    triangles = np.stack([np.zeros((DISC_SEGMENTS, 3)), circle[:-1], circle[1:]], axis=1).reshape(
-        -1, 3
-    )
-    vertices = points[:, None] + pixel * (radius * triangles + depth_offset * back)
-    return vertices.reshape(-1, 3).astype(np.float32)
+    if context.space_data.overlay.show_overlays:
+        draw_dots(context, _all_dots(), DOT_DIAMETER * context.preferences.system.ui_scale)
 
 
 def _draw_labels() -> None:
     context = bpy.context
-    if not context.space_data.overlay.show_overlays or not context.space_data.overlay.show_text:
-        return
-    scale = context.preferences.system.ui_scale
-    font_id = 0
-    blf.size(font_id, 12 * scale)
-    blf.color(font_id, 1.0, 1.0, 1.0, 1.0)
-    blf.enable(font_id, blf.SHADOW)
-    blf.shadow(font_id, 5, 0.0, 0.0, 0.0, 1.0)
-    dots, texts = [], []
-    for obj, singularities in _visible_singularities():
-        if len(singularities) > MAX_LABELS:
-            continue
-        for point, index in zip(
-            offset_points(obj, singularities), singularities.index.tolist(), strict=True
-        ):
-            position = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
-            if position is not None and not is_occluded(context, point):
-                dots.append(position)
-                texts.append(format_index(index, singularities.degree))
-    if texts:
-        radius = (DOT_DIAMETER / 2 + 2) * scale
-        sizes = [blf.dimensions(font_id, text) for text in texts]
-        for text, corner in zip(texts, place_labels(dots, sizes, radius).tolist(), strict=True):
-            if math.isfinite(corner[0]):
-                blf.position(font_id, *corner, 0)
-                blf.draw(font_id, text)
-    blf.disable(font_id, blf.SHADOW)
-
-
-def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
-    """Return whether something is between a point in world space and the camera."""
-    point = Vector(point)
-    view_to_world = context.region_data.view_matrix.inverted()
-    view_direction = (
-        view_to_world.translation - point
-        if context.region_data.is_perspective
-        else view_to_world.col[2].xyz
-    )
-    return context.scene.ray_cast(context.view_layer.depsgraph, point, view_direction.normalized())[
-        0
-    ]
+    if context.space_data.overlay.show_overlays and context.space_data.overlay.show_text:
+        draw_labels(context, _all_dots(), DOT_DIAMETER * context.preferences.system.ui_scale)
 
 
 def offset_points(obj: bpy.types.Object, singularities: Singularities) -> np.ndarray:

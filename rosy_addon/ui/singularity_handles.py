@@ -19,6 +19,7 @@ from ..errors import RosyError
 from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
+from ..viewport.singularity_dots import is_occluded
 from ..viewport.view3d import redraw
 from . import overlay
 
@@ -152,7 +153,7 @@ def _handle_under(
     for position in np.argsort(distance):
         if not distance[position] <= reach:
             break
-        if not overlay.is_occluded(context, points[position]):
+        if not is_occluded(context, points[position]):
             return int(shown.vertex[position])
     return None
 

@@ -21,6 +21,7 @@ STROKE_ICONS = {
 STROKE_PANELS = {
     "Density": panel_settings(StrokeStyle, "density"),
     "Ends": panel_settings(StrokeStyle, "ends"),
+    "Singularities": panel_settings(StrokeStyle, "singularities"),
     "Inks": ("inks", "ink_colour", "outline_colour"),
 }
 
@@ -48,6 +49,8 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
         column.prop(settings, "outline")
         column.prop(settings, "hidden")
         for title, names in STROKE_PANELS.items():
+            if title == "Singularities" and settings.kind != "FILE":
+                continue
             header, body = layout.panel(f"rosy_strokes_{title.lower()}", default_closed=True)
             header.label(text=title)
             if body is not None:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from typing import Any
 
 import bpy
 
+from ..annotation.singularity_settings import shows_singularities
+from ..cache import Cache
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
 from ..rendering.view_input import ViewInput
@@ -22,6 +25,7 @@ from .layers import LayerState, LayerStates
 from .messages import draw_messages
 from .progressive import ProgressiveRenderer
 from .references import ReferenceImages
+from .singularity_dots import SingularityDots, draw_dots, draw_labels, singularity_dots
 from .view3d import (
     clip_planes,
     is_visible,
@@ -90,6 +94,9 @@ class ViewportSession:
         #: The lines of text in each view.
         self._lines: dict[ViewPointers, list[str]] = {}
         self.layers = LayerStates(lambda: self._schedule(0.0, "_resolve_topologies"))
+        self._singularities = Cache()
+        #: The dots that have labels in each view, and their size.
+        self._labeled: dict[ViewPointers, tuple[list[SingularityDots], float]] = {}
         self._references = ReferenceImages(lambda: self._schedule(0.0, "_load_reference_images"))
         self._draw_handlers = [
             bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
@@ -120,9 +127,9 @@ class ViewportSession:
     def remove(self, space_pointer: int) -> None:
         """Make a view no longer live, given its pointer."""
         self.spaces.discard(space_pointer)
-        for texts in (self._problems, self._lines):
-            for pointers in [pointers for pointers in texts if pointers[0] == space_pointer]:
-                del texts[pointers]
+        for of_views in (self._problems, self._lines, self._labeled):
+            for pointers in [pointers for pointers in of_views if pointers[0] == space_pointer]:
+                del of_views[pointers]
         self.progressive.remove_space(space_pointer)
         redraw()
 
@@ -202,6 +209,7 @@ class ViewportSession:
             return
         pointers = space.as_pointer(), region.as_pointer()
         self._problems.pop(pointers, None)
+        self._labeled.pop(pointers, None)
         try:
             if not shows_surfaces(space):
                 raise RosyError("fields are not drawn in wireframe shading: choose another shading")
@@ -251,6 +259,29 @@ class ViewportSession:
             editing = context.mode.startswith("EDIT")
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
             self.progressive.renderer.composite(view.texture, view.items, view_input, opacity)
+            self._draw_singularities(context, space, region, view_input)
+
+    def _draw_singularities(
+        self,
+        context: bpy.types.Context,
+        space: bpy.types.SpaceView3D,
+        region: bpy.types.Region,
+        view_input: ViewInput,
+    ) -> None:
+        """Draw dots at the singularities of a view, if the look shows them."""
+        look = read_look(context.scene.rosy)
+        if not shows_singularities(look):
+            return
+        dots = [
+            singularity_dots(instance, self._singularities, view_input.clip_planes)
+            for instance in view_input.instances
+            if instance.field is not None
+        ]
+        self._singularities.evict_over_limit()
+        shows_hidden = look.singularity_dots == "all"
+        draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden)
+        if look.singularity_labels:
+            self._labeled[space.as_pointer(), region.as_pointer()] = dots, look.singularity_size
 
     def _read_view(
         self,
@@ -266,7 +297,8 @@ class ViewportSession:
         RosyError
             If no field is visible and nothing else says why, or if the tone has no source.
         """
-        look = read_look(context.scene.rosy)
+        # Their dots are drawn over the picture.
+        look = replace(read_look(context.scene.rosy), singularity_dots="none")
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
         if layer.is_starting:
@@ -305,6 +337,8 @@ class ViewportSession:
         pointers = context.space_data.as_pointer(), context.region.as_pointer()
         if pointers[0] not in self.spaces:
             return
+        if pointers in self._labeled:
+            draw_labels(context, *self._labeled[pointers])
         lines = self._lines_of_view(pointers, self.layers.get(context.scene, context.view_layer))
         draw_messages(lines, context)
         if lines != self._lines.get(pointers, []):

@@ -31,6 +31,7 @@ OTHERS = (
     "textures-page",
     "fields-page",
     "editing-page",
+    "figures-page",
     "turntable",
     "listing",
     "simulations-page",

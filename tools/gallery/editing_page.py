@@ -20,12 +20,14 @@ from rosy_addon.field.singularity_moves import move_index
 from rosy_addon.field.surface import Surface
 from rosy_addon.presets.store import load_preset
 from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.visible_vertices import project_vertices_task
 
 from .fields_page import dotted_picture
 from .page import ROOT
 from .shapes import sphere, suzanne, torus
 from .sheet import Panel, display, save, sheet
-from .solid import compose_view, curve_through, points_on_surface, view, visible_vertices
+from .solid import compose_view, curve_through, points_on_surface, view
 
 IMAGES = ROOT / "docs" / "images"
 
@@ -112,8 +114,10 @@ def _moved_out_of_sight(
 ) -> RosyField:
     """Move each singularity that is seen to a near place that is not seen."""
     camera = view(surface, angles, (SIDE, SIDE), 2)
-    is_seen, _ = visible_vertices(surface, np.arange(len(surface.vertices)), camera)
     points = surface.vertices
+    instance = MeshInstance(surface, np.eye(4))
+    task = project_vertices_task([instance], camera, [np.arange(len(points))])
+    is_seen = run_to_completion(task).is_visible
     singular, _ = find_singularities(surface, field)
     depth = cKDTree(points[is_seen]).query(points)[0]
     hidden = np.flatnonzero(depth > HIDDEN_DEPTH * surface.extent)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from PIL import Image, ImageDraw
 
@@ -10,13 +12,12 @@ from rosy_addon.field.directional_field import field_from_directions, tensor_fie
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
 
 from .page import ROOT
 from .shapes import sphere, suzanne, torus
-from .sheet import Panel, display, dotted, save, sheet
-from .solid import compose_view, curve_through, points_on_surface, view, visible_vertices
+from .sheet import Panel, display, save, sheet
+from .solid import compose_view, curve_through, points_on_surface, render_view, view
 
 IMAGES = ROOT / "docs" / "images"
 
@@ -31,9 +32,6 @@ STROKES = (
     ((0.74, 0.34), (0.82, 0.42), (0.78, 0.54)),
 )
 INK = (214, 84, 20)
-
-#: Colors of singularities, by the sign of their index.
-DOTS = {1: (235, 90, 20), -1: (40, 100, 235)}
 
 
 def write() -> None:
@@ -189,14 +187,8 @@ def dotted_picture(
     surface: Surface, field: RosyField, look: Look, angles: tuple[float, float], side: int
 ) -> np.ndarray:
     """Draw a field with dots at the visible singularities."""
-    vertex, index = find_singularities(surface, field)
-    camera = view(surface, angles, (side, side), look.supersampling)
-    picture = display(compose_view(surface, field, look, camera).rgba)
-    visible, place = visible_vertices(surface, vertex, camera)
-    x, y = (place[visible] / look.supersampling).T
-    for column, row, sign in zip(x, y, np.sign(index[visible]), strict=True):
-        picture = dotted(picture, column, side - row, DOTS[int(sign)])
-    return picture
+    look = replace(look, singularity_dots="visible")
+    return display(render_view(surface, field, look, angles, side))
 
 
 def _box() -> Surface:

@@ -19,10 +19,12 @@ from rosy_addon.field.representation import (
 )
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.line_drawing.visibility import project_to_pixels
+from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
 
 
 def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField:
@@ -81,6 +83,15 @@ def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera)
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
+def render_view(
+    surface: Surface, field: RosyField, look: Look, angles: tuple[float, float], side: int
+) -> np.ndarray:
+    """Return the (side, side, 4) linear RGBA of a field as users draw it, with its singularities."""
+    instance = MeshInstance(surface, np.eye(4), field)
+    view_input = ViewInput((instance,), view(surface, angles, (side, side), 1), look)
+    return run_to_completion(CpuRenderer().render_task(view_input)).rgba
+
+
 def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:
     """Return (n, 2) points of a parabola through three points, in picture coordinates.
 
@@ -118,18 +129,6 @@ def visible_points(
     across, upward = (clip[:, :2] / clip[:, 3:] / 2 + 0.5).T
     width, height = camera.width / supersampling, camera.height / supersampling
     return [(x * width, (1 - y) * height) for x, y in zip(across, upward, strict=True)]
-
-
-def visible_vertices(
-    surface: Surface, vertex: np.ndarray, camera: Camera
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether the camera sees some vertices, and their (n, 2) places in its pixels."""
-    buffer = _visible_pixels(surface, camera)
-    nearest = np.full(camera.height * camera.width, np.inf)
-    nearest[buffer.pixel] = -buffer.position[:, 2]
-    place, depth = project_to_pixels(surface.vertices[vertex], camera)
-    column, row = place.astype(int).T
-    return depth < nearest[row * camera.width + column] + 0.03, place
 
 
 def _visible_pixels(surface: Surface, camera: Camera) -> GBuffer:

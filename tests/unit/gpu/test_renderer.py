@@ -40,6 +40,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_tone import SurfaceTone
+from rosy_addon.rendering.cpu import CpuRenderer
 from rosy_addon.rendering.view_input import ViewInput
 
 AXIS = (0.3, 0.2, 1.0)
@@ -1347,6 +1348,23 @@ def test_clip_planes(card):
     visible = gbuffer["field_values"][..., 3] > 0
     assert 0.2 < visible.sum() / (unclipped[..., 3] > 0).sum() < 1.0
     assert (clipped[..., 3] > 0).sum() == visible.sum()
+
+
+def test_singularities_are_drawn_over_the_picture(card):
+    """At the same pixels as numpy's."""
+    changed = []
+    for renderer in (card, CpuRenderer()):
+        marked, plain = (
+            run_to_completion(
+                renderer.render_task(
+                    ViewInput((ball(4),), view(), replace(LOOK, singularity_dots=shown))
+                )
+            ).rgba
+            for shown in ("all", "none")
+        )
+        changed.append((marked != plain).any(axis=2))
+    assert changed[0].sum() > 100
+    assert (changed[0] != changed[1]).sum() <= 2
 
 
 def test_the_same_input_gives_the_same_bytes(card):

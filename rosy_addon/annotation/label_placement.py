@@ -8,7 +8,7 @@ import numpy as np
 SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
-def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: float) -> np.ndarray:
+def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float) -> np.ndarray:
     """Choose a place beside its dot for each label, the first labels first.
 
     Parameters
@@ -17,7 +17,7 @@ def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: float) -> np.ndarr
         Centers of the dots in pixels, y up.
     sizes : (K, 2) float ndarray
         Widths and heights of the labels in pixels.
-    radius : float
+    radius : (K,) ndarray or float
         Of the dots, in pixels.
 
     Returns
@@ -27,8 +27,9 @@ def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: float) -> np.ndarr
     """
     dots, sizes = np.asarray(dots, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
     corners = np.full(dots.shape, np.nan)
-    low, high = dots - radius, dots + radius
-    for label, (dot, size) in enumerate(zip(dots, sizes, strict=True)):
+    radii = np.broadcast_to(radius, len(dots))
+    low, high = dots - radii[:, None], dots + radii[:, None]
+    for label, (dot, size, radius) in enumerate(zip(dots, sizes, radii.tolist(), strict=True)):
         for side in SIDES:
             corner = dot + np.where(np.array(side) > 0, radius, -radius - size)
             is_covered = (corner < high) & (corner + size > low)

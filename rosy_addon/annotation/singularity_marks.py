@@ -1,0 +1,165 @@
+"""The singularities of fields in a picture, and the style of their dots.
+
+The area of a dot is proportional to its index. Its color shows the sign: orange and blue differ for all
+kinds of color vision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..cache import Cache
+from ..field.singularities import singularities_task
+from ..progress import Task, subtask
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.visible_vertices import project_vertices_task
+
+#: Display colors by the sign of the index, and of the outline of dots.
+COLOR_BY_SIGN, OUTLINE_COLOR = {1: "#eb5a14", -1: "#2864eb"}, "#141414"
+
+#: Width of the outline of a dot, in diameters of a dot of index 1 / N.
+OUTLINE = 0.2
+
+#: Opacity of the dots of hidden singularities.
+HIDDEN_OPACITY = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class SingularityMarks:
+    """K singularities in a picture.
+
+    Attributes
+    ----------
+    position : (K, 2) float64 ndarray
+        Pixels from the lower left.
+    index : (K,) int ndarray
+        In units of 1 / N.
+    degree : (K,) int ndarray
+        N.
+    depth : (K,) float64 ndarray
+        Nearer ones are drawn over those farther away.
+    is_visible : (K,) bool ndarray
+        Hidden ones are drawn faded, below all others and without labels.
+    size : float
+        Diameter of a dot of index 1 / N, pixels.
+    has_labels : bool
+        Whether indices are written beside dots.
+    """
+
+    position: np.ndarray
+    index: np.ndarray
+    degree: np.ndarray
+    depth: np.ndarray
+    is_visible: np.ndarray
+    size: float = 9.0
+    has_labels: bool = False
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def part(self, chosen: np.ndarray) -> SingularityMarks:
+        """Return those that a mask or indices choose."""
+        return replace(
+            self,
+            position=self.position[chosen],
+            index=self.index[chosen],
+            degree=self.degree[chosen],
+            depth=self.depth[chosen],
+            is_visible=self.is_visible[chosen],
+        )
+
+    def in_drawing_order(self) -> SingularityMarks:
+        """Return them in the order in which they are drawn."""
+        return self.part(np.lexsort((-self.depth, self.is_visible)))
+
+    @property
+    def radius(self) -> np.ndarray:
+        """(K,) radii without outlines, pixels."""
+        return dot_diameters(self.index, self.size) / 2
+
+
+def dot_diameters(index: np.ndarray, size: float) -> np.ndarray:
+    """Return the diameters of dots without their outlines, in the unit of `size`.
+
+    Parameters
+    ----------
+    index : (K,) int ndarray
+        In units of 1 / N.
+    size : float
+        Diameter of the dot of an index of 1 / N.
+    """
+    return size * np.sqrt(np.abs(index))
+
+
+def singularity_marks_task(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    settings: Any,
+    clip_planes: np.ndarray | None = None,
+    cache: Cache | None = None,
+) -> Task[SingularityMarks]:
+    """Find the singularities of fields in a view.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        Those without a field only hide others.
+    camera : Camera
+    settings : Look or StrokeStyle
+        Says which singularities are drawn, and how. No setting but those of `singularity_settings` is read.
+    clip_planes : (6, 4) float64 ndarray, optional
+        World space. The negative side of each plane is cut away.
+    cache : Cache, optional
+        Stores the singularities of fields.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    SingularityMarks
+    """
+    cache = Cache() if cache is None else cache
+    vertices, indices, degrees = [], [], []
+    for number, instance in enumerate(instances):
+        vertex = index = np.empty(0, dtype=np.int32)
+        if instance.field is not None:
+            task = cached_singularities_task(instance, cache)
+            part = 0.5 / len(instances)
+            vertex, index = yield from subtask(task, number * part, (number + 1) * part)
+            degrees.append(np.full(len(vertex), instance.field.degree))
+        vertices.append(vertex)
+        indices.append(index)
+    task = project_vertices_task(instances, camera, vertices, clip_planes)
+    projected = yield from subtask(task, 0.5, 1.0)
+    kept = projected.is_in_view if settings.singularity_dots == "all" else projected.is_visible
+    marks = SingularityMarks(
+        projected.position,
+        np.concatenate(indices),
+        np.concatenate(degrees),
+        projected.depth,
+        projected.is_visible,
+        settings.singularity_size,
+        settings.singularity_labels,
+    )
+    return marks.part(kept)
+
+
+def cached_singularities_task(
+    instance: MeshInstance, cache: Cache
+) -> Task[tuple[np.ndarray, np.ndarray]]:
+    """Find the singularities of an instance with a field, or return those in the cache.
+
+    They are the same for all deformations of a mesh. See `field.singularities.singularities_task`.
+    """
+    surface, field = instance.surface, instance.field
+    return cache.get_or_create_task(
+        ("singularities", surface.rest_shape_key, field),
+        lambda: singularities_task(surface.in_rest_shape(), field),
+    )

@@ -1,0 +1,171 @@
+"""Dots and labels of singularities: their places, sizes and colors, in pictures and in drawings."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from shapes import globe, icosphere, torus
+
+from rosy_addon.annotation.draw_marks import draw_marks_task
+from rosy_addon.annotation.index_labels import LETTERS, placed_labels, text_segments, text_width
+from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN, OUTLINE, SingularityMarks
+from rosy_addon.color import from_hex, to_linear
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.singularities import find_singularities, format_index
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.svg import svg_text
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.band_workers import BandWorkers
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
+
+CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 240, 200, fov=0.7)
+
+
+def marks(position, index, degree=4, depth=1.0, is_visible=True, **settings) -> SingularityMarks:
+    count = len(position)
+    return SingularityMarks(
+        np.array(position, dtype=np.float64),
+        np.array(index),
+        np.full(count, degree),
+        np.broadcast_to(depth, count).astype(float),
+        np.broadcast_to(np.array(is_visible, dtype=bool), count),
+        **settings,
+    )
+
+
+def drawn(rgba, singularities):
+    return run_to_completion(draw_marks_task(rgba, singularities))
+
+
+def gray(height=60, width=80):
+    return np.full((height, width, 4), (0.2, 0.2, 0.2, 1), dtype=np.float32)
+
+
+def view_of(surface, degree, **settings):
+    instance = MeshInstance(
+        surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), degree)
+    )
+    look = Look(length=8).with_settings(settings)
+    return ViewInput((instance,), CAMERA, look)
+
+
+def rendered(view, **options):
+    return run_to_completion(CpuRenderer(**options).render_task(view)).rgba
+
+
+@pytest.mark.parametrize("index", [1, -2, 4])
+def test_the_area_of_a_dot_is_proportional_to_its_index(index):
+    picture = np.zeros((60, 80, 4), dtype=np.float32)
+    picture = drawn(picture, marks([(30.3, 20.8)], [index], size=10.0))
+    radius = 5 * abs(index) ** 0.5 + OUTLINE * 10
+    assert picture[..., 3].sum() == pytest.approx(np.pi * radius**2, rel=0.01)
+    fill = to_linear(from_hex(COLOR_BY_SIGN[np.sign(index)]))
+    np.testing.assert_allclose(picture[20, 30, :3], fill, atol=1e-6)
+    x, y = (picture[..., 3].sum(axis=axis) @ (np.arange(n) + 0.5) for axis, n in ((0, 80), (1, 60)))
+    np.testing.assert_allclose((x, y) / picture[..., 3].sum(), (30.3, 20.8), atol=0.02)
+
+
+def test_nearer_dots_are_above_and_hidden_ones_faint():
+    positions = [(20, 20), (24, 20), (24, 16)]
+    picture = drawn(gray(), marks(positions, [1, -1, 1], depth=[1, 2, 0.5], is_visible=[1, 1, 0]))
+    colors = {sign: to_linear(from_hex(code)) for sign, code in COLOR_BY_SIGN.items()}
+    np.testing.assert_allclose(picture[19, 21, :3], colors[1], atol=1e-6)
+    np.testing.assert_allclose(picture[20, 27, :3], colors[-1], atol=1e-6)
+    faint = drawn(gray(), marks([(40, 30)], [1], is_visible=False, has_labels=True))
+    np.testing.assert_allclose(faint[30, 40, :3], 0.7 * 0.2 + 0.3 * colors[1], atol=1e-6)
+    assert (faint != gray()).any(axis=2).sum() < 200  # no label
+
+
+def test_dots_beside_the_frame_and_none_at_all():
+    np.testing.assert_array_equal(drawn(gray(), marks(np.zeros((0, 2)), [])), gray())
+    np.testing.assert_array_equal(drawn(gray(), marks([(-40, 10), (9e9, 3)], [1, 1])), gray())
+    assert (drawn(gray(), marks([(-2, 30)], [1]))[30, 0, :3] != 0.2).any()
+
+
+def test_labels_say_the_index_and_cover_no_dot():
+    dots = marks([(20, 20), (30, 45), (64, 22)], [1, -2, 6], has_labels=True)
+    labels = placed_labels(dots)
+    assert [label.text for label in labels] == ["+1/4", "-1/2", "+3/2"]
+    picture, plain = drawn(gray(), dots), drawn(gray(), marks(dots.position, dots.index))
+    is_dot = np.zeros((60, 80), dtype=bool)
+    y, x = np.mgrid[:60, :80] + 0.5
+    for (dot_x, dot_y), radius in zip(dots.position, dots.radius, strict=True):
+        is_dot |= np.hypot(x - dot_x, y - dot_y) < radius
+    np.testing.assert_array_equal(picture[is_dot], plain[is_dot])
+    assert (picture != plain).any(axis=2).sum() > 150
+    assert not placed_labels(marks(np.zeros((251, 2)), [1] * 251, has_labels=True))
+
+
+def test_every_index_can_be_written():
+    for degree in range(1, 13):
+        for index in range(-30, 31):
+            text = format_index(index, degree)
+            segments = text_segments(text)
+            assert np.isfinite(segments).all() and segments[..., 0].max() < text_width(text) + 1e-9
+    shapes = {text_segments(letter).tobytes() for letter in LETTERS}
+    assert len(shapes) == len(LETTERS) == 13
+
+
+@pytest.mark.parametrize("degree", [2, 4, 6])
+def test_visible_singularities_of_a_mesh_have_dots_at_their_vertices(degree):
+    """And nothing else is changed; those behind the surface have none."""
+    surface = icosphere(3)
+    view, plain = view_of(surface, degree, singularity_dots="visible"), view_of(surface, degree)
+    picture, without = rendered(view), rendered(plain)
+    vertex, index = find_singularities(surface, view.instances[0].field)
+    towards_eye = (surface.vertices[vertex] * (CAMERA.eye - surface.vertices[vertex])).sum(axis=1)
+    clip = (
+        np.c_[surface.vertices[vertex], np.ones(len(vertex))] @ (CAMERA.projection @ CAMERA.view).T
+    )
+    place = (clip[:, :2] / clip[:, 3:] + 1) / 2 * (CAMERA.width, CAMERA.height)
+    y, x = np.mgrid[: CAMERA.height, : CAMERA.width] + 0.5
+    near = np.zeros(x.shape, dtype=bool)
+    for (dot_x, dot_y), sign, dot in zip(place, np.sign(index), towards_eye, strict=True):
+        color = picture[int(dot_y), int(dot_x), :3]
+        if dot > 0.4:
+            np.testing.assert_allclose(color, to_linear(from_hex(COLOR_BY_SIGN[sign])), atol=1e-6)
+        if dot > -0.4:
+            near |= np.hypot(x - dot_x, y - dot_y) < 12
+    assert near.any()
+    np.testing.assert_array_equal(picture[~near], without[~near])
+
+
+def test_processes_and_supersampling_draw_the_same_dots():
+    surface = globe(48, 96)
+    views = [view_of(surface, 4, singularity_dots="all", supersampling=s) for s in (1, 2)]
+    with BandWorkers(2) as workers:
+        np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=workers))
+    dots = [
+        np.abs(rendered(view) - rendered(view_of(surface, 4, supersampling=samples))).max(axis=2)
+        > 0
+        for samples, view in zip((1, 2), views, strict=True)
+    ]
+    np.testing.assert_array_equal(*dots)
+
+
+def test_drawings_have_the_same_dots_as_pictures():
+    instance = view_of(torus(48, 24), 4).instances[0]
+    sphere = MeshInstance(icosphere(3), np.eye(4), None)
+    field = generate(sphere.surface, GeneratorSettings("smoothest"), 4)
+    instances = [instance, MeshInstance(sphere.surface, np.eye(4), field)]
+    style = StrokeStyle(spacing=12.0, singularity_dots="all", singularity_labels=True)
+    drawing = draw_instances(instances, CAMERA, style)
+    text = svg_text(drawing.strokes, CAMERA, None, drawing.marks)
+    circles = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="([\d.]+)" fill="(#\w+)"', text)
+    expected = drawing.marks.in_drawing_order()
+    assert len(circles) == len(expected) >= 8
+    np.testing.assert_allclose([float(c[0]) for c in circles], expected.position[:, 0], atol=0.01)
+    np.testing.assert_allclose(
+        [float(c[1]) for c in circles], CAMERA.height - expected.position[:, 1], atol=0.01
+    )
+    assert text.count("opacity=") == (~expected.is_visible).sum() > 0
+    assert text.count('<path fill="none" stroke="#ffffff"') == expected.is_visible.sum()
+    plain = draw_instances(instances, CAMERA, StrokeStyle(spacing=12.0))
+    assert plain.marks is None and "circle" not in svg_text(plain.strokes, CAMERA)

@@ -1,0 +1,122 @@
+"""Which vertices a camera sees, against convex solids and rays against every triangle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cube, icosphere, plane, torus
+
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection import visible_vertices
+from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.visible_vertices import project_vertices_task
+
+EYE = np.array([3.0, -4.0, 2.0])
+CAMERAS = [
+    perspective_camera(look_at(EYE, (0, 0, 0)), 300, 200, fov=0.7, clip=(0.05, 30.0)),
+    orthographic_camera(look_at(EYE, (0, 0, 0)), 300, 200, scale=4.0, clip=(0.05, 30.0)),
+]
+
+
+def project(instances, camera, **options):
+    """All vertices of all instances."""
+    vertices = [np.arange(len(instance.surface.vertices)) for instance in instances]
+    return run_to_completion(project_vertices_task(instances, camera, vertices, **options))
+
+
+def moved(surface, offset=(0, 0, 0), scale=1.0) -> MeshInstance:
+    matrix = np.diag([scale, scale, scale, 1.0])
+    matrix[:3, 3] = offset
+    return MeshInstance(surface, matrix)
+
+
+def rays_reach_the_eye(instances, camera, planes=None):
+    """(V,) bool: no triangle of another vertex is between a vertex and the near plane (Möller-Trumbore)."""
+    world = np.concatenate([instance.world_points() for instance in instances])
+    first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances)])
+    triangles = np.concatenate(
+        [
+            entry.surface.triangle_vertex + start
+            for entry, start in zip(instances, first, strict=False)
+        ]
+    )
+    a, b, c = np.moveaxis(world[triangles], 1, 0)
+    free = np.ones(len(world), dtype=bool)
+    for vertex, point in enumerate(world):
+        toward = camera.eye - point if camera.is_perspective else camera.view[2, :3]
+        p = np.cross(toward, c - a)
+        det = ((b - a) * p).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = ((point - a) * p).sum(axis=1) / det
+            q = np.cross(point - a, b - a)
+            v = (q @ toward) / det
+            t = ((c - a) * q).sum(axis=1) / det
+        hit = point + t[:, None] * toward
+        depth = -(hit @ camera.view[2, :3] + camera.view[2, 3])
+        hits = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 1e-6) & (depth >= 0.05)
+        hits &= ~(triangles == vertex).any(axis=1)
+        if planes is not None:
+            hits &= (hit @ planes[:, :3].T + planes[:, 3] >= 0).all(axis=1)
+        free[vertex] = not hits.any()
+    return free
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
+def test_a_vertex_of_a_convex_solid_is_visible_if_one_of_its_faces_is(camera):
+    surface = icosphere(3)
+    projected = project([moved(surface)], camera)
+    center = surface.vertices[surface.corner_vertex].reshape(-1, 3, 3).mean(axis=1)
+    is_front = (surface.face_normal * camera.view_directions(center)).sum(axis=1) > 0
+    expected = np.zeros(len(surface.vertices), dtype=bool)
+    expected[surface.corner_vertex[is_front[surface.corner_face]]] = True
+    np.testing.assert_array_equal(projected.is_visible, expected)
+    assert projected.is_in_view.all()
+
+
+@pytest.mark.parametrize("camera", CAMERAS, ids=["perspective", "orthographic"])
+@pytest.mark.parametrize("pairs", [1 << 20, 50])
+def test_vertices_are_visible_if_rays_reach_the_eye(camera, pairs, monkeypatch):
+    """Of solids that hide each other, and one that reaches behind the eye."""
+    monkeypatch.setattr(visible_vertices, "PAIRS_PER_STEP", pairs)
+    monkeypatch.setattr(visible_vertices, "TRIANGLES_PER_STEP", 300)
+    instances = [
+        moved(torus(32, 16)),
+        moved(icosphere(2), (0.9, -0.9, 0.3), 0.3),
+        moved(plane(6, 6), (0.2, 0.1, -0.6), 6.0),
+        moved(cube(), (1.2, -2.6, 1.1), 0.3),
+    ]
+    projected = project(instances, camera)
+    free = rays_reach_the_eye(instances, camera)
+    in_frame = (projected.position >= 0).all(axis=1)
+    in_frame &= (projected.position <= (camera.width, camera.height)).all(axis=1)
+    expected = projected.is_in_view & in_frame & free
+    assert 200 < expected.sum() < 0.8 * len(expected)
+    np.testing.assert_array_equal(projected.is_visible, expected)
+
+
+def test_what_is_cut_away_neither_shows_nor_hides():
+    """As with a clipped region of a 3D view."""
+    camera = CAMERAS[0]
+    instances = [moved(torus(32, 16)), moved(icosphere(2), (0.9, -0.9, 0.3), 0.3)]
+    planes = np.array([(0.0, 1, 0, 0.6), *[(0.0, 0, 0, 1.0)] * 5])
+    projected = project(instances, camera, clip_planes=planes)
+    world = np.concatenate([instance.world_points() for instance in instances])
+    expected = rays_reach_the_eye(instances, camera, planes) & (world[:, 1] >= -0.6)
+    assert 0 < (~expected).sum() < len(expected)
+    np.testing.assert_array_equal(projected.is_visible, expected & projected.is_in_view)
+
+
+def test_vertices_behind_the_camera_have_no_place():
+    surface = build_surface(np.array([(0.0, 0, 0), (1, 0, 0), (9, -12, 6)]), [0, 1, 2], [0, 3])
+    projected = project([moved(surface)], CAMERAS[0])
+    assert projected.is_visible.tolist() == [True, True, False]
+    assert np.isnan(projected.position[2]).all() and projected.depth[2] < 0
+    np.testing.assert_allclose(projected.position[0], (150, 100))
+
+
+def test_coincident_surfaces_do_not_hide_each_other():
+    """Two sides of a seam that are not welded, or a copy of an object at the same place."""
+    projected = project([moved(plane(4, 4)), moved(plane(4, 4))], CAMERAS[0])
+    assert projected.is_visible.all()

@@ -19,7 +19,17 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from conftest import add_camera, contents
-from window_steps import MANY, SHOTS, in_view, preferences, rosy, run_steps, view, wait_until
+from window_steps import (
+    MANY,
+    SHOTS,
+    in_view,
+    preferences,
+    redraw_view,
+    rosy,
+    run_steps,
+    view,
+    wait_until,
+)
 
 # Helpers of the steps
 
@@ -710,7 +720,7 @@ def singularities_dragged_with_the_tool():
         tool = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT")
         tool.operator_properties("rosy.drag_singularity").reach = 0.3
     overlay = rosy("rosy_addon.ui.overlay")
-    yield 0.3  # until the view is drawn
+    yield from redraw_view()
     yield from move_mouse((0.0, -1.0, 0.0))
     yield from wait_until(lambda: overlay.shown("Sphere") is not None)
     before = shown_singularities()
@@ -754,7 +764,7 @@ def field_combed_with_the_tool():
             name = "rosy.comb_tool" if mode == "OBJECT" else "rosy.comb_sculpt_tool"
             bpy.ops.wm.tool_set_by_id(name=name)
             bpy.ops.ed.undo_push(message="Before the stroke")
-        yield 0.3  # until the view is drawn
+        yield from redraw_view()
         before = field_bytes()
         yield from drag((-0.4, -0.9, 0.2), (0.4, -0.8, 0.3))
         yield from wait_until(lambda: "rosy_guides" in bpy.context.object.data.attributes)

@@ -105,6 +105,18 @@ def wait_until(condition, seconds=TIMEOUT_SECONDS):
         yield
 
 
+def redraw_view():
+    """Yield until the 3D view has been drawn once more, so that its matrices are those of its settings."""
+    drawn = []
+    space = bpy.types.SpaceView3D
+    handler = space.draw_handler_add(lambda: drawn.append(True), (), "WINDOW", "POST_PIXEL")
+    try:
+        view()[1].tag_redraw()
+        yield from wait_until(lambda: drawn)
+    finally:
+        space.draw_handler_remove(handler, "WINDOW")
+
+
 def capture(name, region):
     """Return the (h, w, 3) float32 display values of a region on the screen, rows from the bottom.
 

@@ -68,7 +68,7 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
     height, padding = LABEL_HEIGHT * size, (STROKE_WIDTH / 2 + HALO) * size
     sizes = [(text_width(text) * height + 2 * padding, height + 2 * padding) for text in texts]
     radii = marks.radius[visible] + OUTLINE * size
-    corners = place_labels(marks.position[visible], np.array(sizes), radii)
+    corners = place_labels(marks.position[visible], np.array(sizes), radii, marks.frame)
     return [
         Label(text, left + padding, bottom + padding, height)
         for text, (left, bottom) in zip(texts, corners.tolist(), strict=True)

@@ -8,7 +8,9 @@ import numpy as np
 SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
-def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float) -> np.ndarray:
+def place_labels(
+    dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float, frame: tuple[int, int]
+) -> np.ndarray:
     """Choose a place beside its dot for each label, the first labels first.
 
     Parameters
@@ -19,6 +21,8 @@ def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float
         Widths and heights of the labels in pixels.
     radius : (K,) ndarray or float
         Of the dots, in pixels.
+    frame : (int, int)
+        Width and height of the picture in pixels. No label reaches beyond it.
 
     Returns
     -------
@@ -32,8 +36,9 @@ def place_labels(dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float
     for label, (dot, size, radius) in enumerate(zip(dots, sizes, radii.tolist(), strict=True)):
         for side in SIDES:
             corner = dot + np.where(np.array(side) > 0, radius, -radius - size)
+            is_inside = (corner >= 0).all() and (corner + size <= frame).all()
             is_covered = (corner < high) & (corner + size > low)
-            if not is_covered.all(axis=1).any():
+            if is_inside and not is_covered.all(axis=1).any():
                 corners[label] = corner
                 low, high = np.vstack([low, corner]), np.vstack([high, corner + size])
                 break

@@ -45,6 +45,8 @@ class SingularityMarks:
         Nearer ones are drawn over those farther away.
     is_visible : (K,) bool ndarray
         Hidden ones are drawn faded, below all others and without labels.
+    frame : (int, int)
+        Width and height of the picture, pixels.
     size : float
         Diameter of a dot of index 1 / N, pixels.
     has_labels : bool
@@ -56,6 +58,7 @@ class SingularityMarks:
     degree: np.ndarray
     depth: np.ndarray
     is_visible: np.ndarray
+    frame: tuple[int, int]
     size: float = 9.0
     has_labels: bool = False
 
@@ -145,6 +148,7 @@ def singularity_marks_task(
         np.concatenate(degrees),
         projected.depth,
         projected.is_visible,
+        (camera.width, camera.height),
         settings.singularity_size,
         settings.singularity_labels,
     )

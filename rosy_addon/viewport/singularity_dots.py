@@ -184,7 +184,8 @@ def draw_labels(
                 texts.append(format_index(index, dots.degree))
     if texts:
         sizes = [blf.dimensions(font_id, text) for text in texts]
-        corners = place_labels(places, sizes, np.array(radii)).tolist()
+        frame = context.region.width, context.region.height
+        corners = place_labels(places, sizes, np.array(radii), frame).tolist()
         for text, corner in zip(texts, corners, strict=True):
             if math.isfinite(corner[0]):
                 blf.position(font_id, *corner, 0)

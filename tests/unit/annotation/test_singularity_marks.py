@@ -36,6 +36,7 @@ def marks(position, index, degree=4, depth=1.0, is_visible=True, **settings) -> 
         np.full(count, degree),
         np.broadcast_to(depth, count).astype(float),
         np.broadcast_to(np.array(is_visible, dtype=bool), count),
+        (160, 100),
         **settings,
     )
 
@@ -90,16 +91,20 @@ def test_dots_beside_the_frame_and_none_at_all():
 
 
 def test_labels_say_the_index_and_cover_no_dot():
-    dots = marks([(20, 20), (30, 45), (64, 22)], [1, -2, 6], has_labels=True)
+    dots = marks([(40, 40), (70, 75), (120, 40)], [1, -2, 6], has_labels=True)
     labels = placed_labels(dots)
     assert [label.text for label in labels] == ["+1/4", "-1/2", "+3/2"]
-    picture, plain = drawn(gray(), dots), drawn(gray(), marks(dots.position, dots.index))
-    is_dot = np.zeros((60, 80), dtype=bool)
-    y, x = np.mgrid[:60, :80] + 0.5
+    picture, plain = (
+        drawn(gray(100, 160), shown) for shown in (dots, marks(dots.position, dots.index))
+    )
+    is_dot = np.zeros((100, 160), dtype=bool)
+    y, x = np.mgrid[:100, :160] + 0.5
     for (dot_x, dot_y), radius in zip(dots.position, dots.radius, strict=True):
         is_dot |= np.hypot(x - dot_x, y - dot_y) < radius
     np.testing.assert_array_equal(picture[is_dot], plain[is_dot])
     assert (picture != plain).any(axis=2).sum() > 150
+    beside = placed_labels(marks([(157, 50), (80, 97)], [1, 1], has_labels=True))
+    assert len(beside) == 2 and beside[0].left < 130 and beside[1].bottom < 90
     assert not placed_labels(marks(np.zeros((251, 2)), [1] * 251, has_labels=True))
 
 

@@ -128,12 +128,15 @@ class ROSY_OT_drag_singularity(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        mouse = event.mouse_region_x, event.mouse_region_y
         if event.type in {"MOUSEMOVE", "INBETWEEN_MOUSEMOVE"}:
-            self._drag.move(context, (event.mouse_region_x, event.mouse_region_y))
+            self._drag.move(context, mouse)
         elif event.type in {"ESC", "RIGHTMOUSE"}:
             self.cancel(context)
             return {"CANCELLED"}
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            # A busy Blender may have dropped the last moves.
+            self._drag.move(context, mouse)
             source, target = self._drag.source, self._drag.target
             self.cancel(context)
             if target is None or target == source:

@@ -13,6 +13,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer, PixelCoverage
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .band import Band
+from .color_values import map_positions_task
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
 from .even_lines import EvenLines, even_line_images_task, has_even_lines
@@ -30,7 +31,7 @@ from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_task
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
-from .look import Look, colors_magnitude, is_hatched
+from .look import Look, colors_magnitude, colors_values, is_hatched
 from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain_task
 from .picture import DegreeLayer, Picture
@@ -86,7 +87,8 @@ def compose_task(
     Raises
     ------
     RosyError
-        If the source of the tone does not exist; see `target_tone.check_tone`.
+        If the source of the tone or of the colors does not exist; see `target_tone.check_tone` and
+        `color_values.check_color_values`.
 
     See Also
     --------
@@ -107,6 +109,9 @@ def compose_task(
     stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache, band)
     tone_task = target_tone_task(gbuffer, look, lights, reference, cache)
     tone_rgb = yield from subtask(tone_task, 0.0, 0.0)
+    map_position = None
+    if colors_values(look) and not draws_thresholds:
+        map_position = yield from subtask(map_positions_task(gbuffer, look), 0.0, 0.0)
     layers = []
     visible_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
     degrees = sorted({gbuffer.instance_degrees[instance_id] for instance_id in visible_ids})
@@ -143,6 +148,8 @@ def compose_task(
             )
             tone = tone[drawn]
         field = field.part(drawn)
+        if map_position is not None:
+            field = replace(field, map_position=map_position[field.gbuffer_index])
         layer = yield from subtask(layer_task(field, pixel_look, images), stop, stop)
         for block in pixel_blocks(len(field.pixel)):
             yield Progress(stop, "drawing the ink")
@@ -318,18 +325,25 @@ def layer_task(field: PixelField, look: Look, images: LicImages) -> Task[DegreeL
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look) -> np.ndarray:
-    """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude or by family.
+    """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
 
-    (P, K) `tone` is that of `DegreeLayer`.
+    (P, K) `tone` is that of `DegreeLayer`. Pixels without a number are gray.
     """
-    hue = None
+    hue, position = None, None
     if colors_magnitude(look):
         hue = map_colors(relative_magnitude(field, look), look.colour_map)
+    elif field.map_position is not None:
+        position = field.map_position
+        hue = map_colors(np.nan_to_num(position), look.colour_map)
     elif look.hue == "families":
         hue = family_hues(field, images, look)
     if hue is None:
         return to_linear(tone)
-    return to_linear(hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
+    color = to_linear(hue * (1 + COLOR_CONTRAST * (tone - NOISE_MEAN)))
+    if position is not None:
+        missing = np.isnan(position)
+        color[missing] = to_linear(tone[missing])
+    return color
 
 
 def _resolve_pixels_task(

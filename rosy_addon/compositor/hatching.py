@@ -137,13 +137,16 @@ def _render_one_ink(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
     inks = inks_of(look)
-    by_magnitude = colors_magnitude(look)
+    by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
         ink = to_linear(map_colors(relative_magnitude(field, look), look.colour_map))
     else:
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
+    if position is not None:
+        mapped = to_linear(map_colors(np.nan_to_num(position), look.colour_map))
+        ink = np.where(np.isnan(position)[:, None], ink, mapped)
     transmittance = inks.complement_if_light(_line_tones(tone, modulation))
-    if not by_magnitude:
+    if not by_magnitude and position is None:
         transmittance = 1 - inks.required_coverage(inks.target_transmittance(transmittance), ink)
     bare_paper = np.ones_like(tone)
     shares = line_shares(field, look, transmittance, modulation.even_lines)

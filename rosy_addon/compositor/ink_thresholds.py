@@ -102,8 +102,9 @@ def sharp_look(look: Look) -> Look:
 
 
 def unlit_look(look: Look) -> Look:
-    """Return a look without what thresholds do not depend on: sources of the tone and lights."""
-    return replace(look, tone="light", light="headlight", shadows=False, overshoot=0.0)
+    """Return a look without what thresholds do not depend on: light, and sources of tone and color."""
+    hue = "families" if look.hue == "families" else "one"
+    return replace(look, tone="light", light="headlight", shadows=False, overshoot=0.0, hue=hue)
 
 
 def line_thresholds(
@@ -462,7 +463,7 @@ def _even_sample(
 def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
     """Return the number of lines that cross at most, and their inks: one each, or one for all."""
     layers = min(look.layers, line_count, MAX_LAYERS)
-    return layers, inks_of(look, layers if look.hue != "one" else 1)
+    return layers, inks_of(look, layers if look.hue == "families" else 1)
 
 
 def ink_of_thresholds(

@@ -137,7 +137,7 @@ class Inks:
 
 def has_ink_per_line(look: Look) -> bool:
     """Whether each line, or each family of lines, has its own ink."""
-    return is_hatched(look) and look.hue != "one" and not colors_magnitude(look)
+    return is_hatched(look) and look.hue == "families" and not colors_magnitude(look)
 
 
 def ink_count(look: Look, line_count: int, family_count: int) -> int:

@@ -31,6 +31,16 @@ def colors_magnitude(look: Any) -> bool:
     return look.magnitude in ("colour", "both")
 
 
+def colors_values(look: Any) -> bool:
+    """Return whether numbers on the surface drive the color of the lines."""
+    return look.hue == "values" and not colors_magnitude(look)
+
+
+def uses_color_map(look: Any) -> bool:
+    """Return whether lines have the colors of the color map."""
+    return colors_magnitude(look) or colors_values(look)
+
+
 def is_hatched(look: Any) -> bool:
     """Return whether lines are drawn with ink on paper."""
     return look.ink == "hatch"
@@ -212,16 +222,39 @@ class Look:
     )
     hue: str = choice(
         "one",
-        "Whether families of directions differ in hue",
+        "What the hue of the lines shows",
         {
             "one": "Same hue for all",
             "families": "One hue for each line that the field distinguishes: major and minor of "
             "tensors, or dir0, dir1 and so on, if each is the same line on the whole mesh. In "
             "hatching, lines of other fields get inks by their distance to the guiding angle",
+            "values": "Numbers on the surface, such as the angle between two fields, through the "
+            "color map",
         },
         option_labels={"one": "Single"},
         panel="colour",
         stage=Stage.SHADING,
+    )
+    values_low: float = number(
+        0.0,
+        -1e30,
+        1e30,
+        "Number at the bottom of the color map. Above the number at the top, the map is inverted. Both 0: "
+        "the range of the numbers",
+        label="Bottom Value",
+        panel="colour",
+        stage=Stage.SHADING,
+        applies=colors_values,
+    )
+    values_high: float = number(
+        0.0,
+        -1e30,
+        1e30,
+        "Number at the top of the color map. Both 0: the range of the numbers",
+        label="Top Value",
+        panel="colour",
+        stage=Stage.SHADING,
+        applies=colors_values,
     )
     seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
     gain: float = number(
@@ -282,7 +315,7 @@ class Look:
     )
     colour_map: str = choice(
         "viridis",
-        "Perceptually uniform color map of the magnitude",
+        "Perceptually uniform color map of the magnitude, or of numbers on the surface",
         {
             "viridis": "Dark blue through green to yellow",
             "magma": "Black through red to pale yellow",
@@ -290,7 +323,7 @@ class Look:
         },
         panel="colour",
         stage=Stage.SHADING,
-        applies=colors_magnitude,
+        applies=uses_color_map,
     )
     shading: float = number(
         0.7,

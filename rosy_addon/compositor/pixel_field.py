@@ -85,6 +85,9 @@ class PixelField:
         all were taken.
     seam_steps : SeamSteps or None
         Steps to pixels that are not neighbors in the picture.
+    map_position : (P,) float32 ndarray or None
+        Where the numbers of the surfaces are in the color map, 0 to 1; NaN where there is none. None
+        if they are not colored.
     """
 
     degree: int
@@ -97,6 +100,7 @@ class PixelField:
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
     gbuffer_index: slice | np.ndarray = dataclass_field(default_factory=lambda: slice(None))
     seam_steps: SeamSteps | None = None
+    map_position: np.ndarray | None = None
 
     @cached_property
     def harmonics(self) -> list[tuple[int, np.ndarray]]:
@@ -142,6 +146,7 @@ class PixelField:
             channels={channel: values[extent] for channel, values in self.channels.items()},
             gbuffer_index=index,
             seam_steps=None,
+            map_position=None if self.map_position is None else self.map_position[extent],
         )
 
     def member_direction(self, member: np.ndarray) -> np.ndarray:

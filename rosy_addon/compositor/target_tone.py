@@ -15,7 +15,7 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.mip_map import MipMap
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.tone_sampling import surface_tones
+from ..projection.surface_sampling import surface_tones
 from .look import Look
 from .shading import Light, diffuse, light_visibility_task
 

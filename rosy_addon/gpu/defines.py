@@ -44,7 +44,7 @@ from ..projection.crease_pixels import LINE_TOLERANCE, MIN_RELATIVE_DEPTH
 from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLERANCE
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.shadow_maps import PCF_WIDTH
-from ..projection.tone_sampling import MIN_FACING_COSINE
+from ..projection.surface_sampling import MIN_FACING_COSINE
 from .line_records import MAX_TREE_DEPTH
 from .mesh_buffers import NORMAL_TEXEL, POSITION_TEXEL, ROW_BITS, VALUE_TEXEL
 

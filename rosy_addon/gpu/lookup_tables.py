@@ -33,7 +33,7 @@ def palette(resources: GpuResources) -> Any:
 
 
 def color_map(resources: GpuResources, look: Look) -> Any:
-    """Return the color map of the magnitude."""
+    """Return the color map of a look."""
     name = look.colour_map
     return _color_table(resources, "colours", name, lambda: color_stops(name))
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..compositor.color_values import ValueRange, value_range
 from ..errors import RosyError
 from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
@@ -30,8 +31,8 @@ RECORDS_PER_STEP = 1 << 17
 #: Maximum triangles of a mesh: shaders handle their ids in single precision.
 MAX_TRIANGLES = 1 << 24
 
-#: Texels of a record: 3 positions, 3 normals, 2 of the representation, 2 for each channel, 2 for the
-#: tone if there is one. The last texel is the z of the rest positions.
+#: Texels of a record: 3 positions, 3 normals, 2 of the representation, 2 for each channel, 1 for the
+#: numbers of the color map if there are any, 2 for the tone if there is one. The last texel is the z of the rest positions.
 POSITION_TEXEL, NORMAL_TEXEL, VALUE_TEXEL = 0, 3, 6
 
 
@@ -53,6 +54,10 @@ class MeshBuffers:
         Corners of the bounding box, relative to `center`.
     has_tone : bool
         Whether the records contain a tone of the surface.
+    value_range : (float, float) or None
+        Range of the numbers of the surface for the color map; see `color_values.value_range`.
+    values_texel : int
+        The texel of a record that contains these numbers; -1 if there are none.
     """
 
     corners: np.ndarray
@@ -61,6 +66,8 @@ class MeshBuffers:
     texels_per_record: int
     bounds: np.ndarray
     has_tone: bool = False
+    value_range: ValueRange = None
+    values_texel: int = -1
 
     @property
     def triangle_count(self) -> int:
@@ -70,7 +77,8 @@ class MeshBuffers:
     @property
     def channel_count(self) -> int:
         """Number of channels of the field."""
-        return max(self.texels_per_record - record_texels(0, self.has_tone), 0) // 2
+        others = record_texels(0, self.has_tone, self.values_texel >= 0)
+        return max(self.texels_per_record - others, 0) // 2
 
 
 def split_matrix(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -123,8 +131,9 @@ def mesh_buffers_task(
     display: str,
     channels: Sequence[FieldChannel] = (),
     tone: SurfaceTone | None = None,
+    color_values: np.ndarray | None = None,
 ) -> Task[MeshBuffers]:
-    """Return a surface and its field in the layout of the shaders.
+    """Return a surface with its field, tone and numbers in the layout of the shaders.
 
     Parameters
     ----------
@@ -137,6 +146,8 @@ def mesh_buffers_task(
     channels : sequence of FieldChannel
         What each layer of the image of field channels contains, for all fields of this degree.
     tone : SurfaceTone, optional
+    color_values : (C,) float32 ndarray, optional
+        As of `MeshInstance`.
 
     Yields
     ------
@@ -147,6 +158,7 @@ def mesh_buffers_task(
     RosyError
         If the surface has more than `MAX_TRIANGLES`.
     """
+    values = None if field is None else color_values
     if field is not None and len(surface.triangles) > MAX_TRIANGLES:
         raise RosyError(
             f"{surface.name}: has {len(surface.triangles)} triangles, but the graphics card draws at "
@@ -169,15 +181,24 @@ def mesh_buffers_task(
         task = corner_field_task(surface, matrix, field, display)
         corner_field = yield from subtask(task, 0.2, 0.7)
         tone_values = None if tone is None else tone.values[surface.triangles]
-        texels = record_texels(len(channels), tone is not None)
+        texels = record_texels(len(channels), tone is not None, values is not None)
         rows, records = _empty_records(count, texels)
         task = _write_records_task(
             records, corners, rest_positions(surface), surface, corner_field, field.degree, channels,
-            tone_values,
+            tone_values, None if values is None else values[surface.triangles],
         )  # fmt: skip
         yield from subtask(task, 0.7, 1.0, "preparing the mesh")
     has_tone = field is not None and tone is not None
-    return MeshBuffers(corners.reshape(-1, 4), center, rows, texels, bounds - center, has_tone)
+    return MeshBuffers(
+        corners.reshape(-1, 4),
+        center,
+        rows,
+        texels,
+        bounds - center,
+        has_tone,
+        None if values is None else value_range(values),
+        -1 if values is None else record_texels(len(channels)) - 1,
+    )
 
 
 def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
@@ -196,13 +217,15 @@ def _write_records_task(
     degree: int,
     channels: Sequence[FieldChannel],
     tone: np.ndarray | None,
+    numbers: np.ndarray | None,
 ) -> Task[None]:
     """Fill the (T, texels, 4) float32 records, in steps of some triangles.
 
     Texels 0 to 2 are the positions of the corners, 3 to 5 their normals, 6 and 7 the values of
     `CornerField.representation` with the order of its rotation. Each channel has two texels, with
-    the order of its rotation and its layer. A tone with (T, 3, 1 or 2) values has two texels. The
-    rest positions, (V, 3), are in the fourth components of positions (x) and normals (y), and in the
+    the order of its rotation and its layer. The (T, 3) numbers of the color map have one texel, whose
+    last component is 1 if all three are finite. A tone with (T, 3, 1 or 2) values has two texels. The rest
+    positions, (V, 3), are in the fourth components of positions (x) and normals (y), and in the
     last texel (z).
     """
     channel_values = [corner_field.channels.get(channel) for channel in channels]
@@ -225,15 +248,22 @@ def _write_records_task(
             part_values = (default,) * 3 if values is None else values[:, extent]
             texel = VALUE_TEXEL + 2 + 2 * layer
             _write_values(part, texel, part_values, rotation_order(channel, degree), layer)
+        if numbers is not None:
+            texel, known = (
+                record_texels(len(channels)) - 1,
+                np.isfinite(numbers[extent]).all(axis=1),
+            )
+            part[known, texel, :3] = numbers[extent][known]
+            part[:, texel, 3] = known
         if tone is not None:
             for corner in range(3):
                 texel, column = records.shape[1] - 3 + corner // 2, corner % 2 * 2
                 part[:, texel, column : column + tone.shape[2]] = tone[extent, corner]
 
 
-def record_texels(channel_count: int, has_tone: bool = False) -> int:
+def record_texels(channel_count: int, has_tone: bool = False, has_values: bool = False) -> int:
     """Return the number of texels of a record."""
-    return VALUE_TEXEL + 2 * (1 + channel_count) + 2 * has_tone + 1
+    return VALUE_TEXEL + 2 * (1 + channel_count) + has_values + 2 * has_tone + 1
 
 
 def _write_values(

@@ -439,9 +439,16 @@ TONE = ComputePass(
         ("to_reference_x", "vec4"),
         ("to_reference_y", "vec4"),
         ("to_reference_w", "vec4"),
+        ("values_texel", "int"),
+        ("values_bottom", "float"),
+        ("values_scale", "float"),
     ),
     includes=("triangle_record",),
+    constants=(("HAS_VALUES", 0),),
 )
+
+#: `TONE` with the places of numbers in the color map, in the last component.
+TONE_AND_VALUES = replace(TONE, constants=(("HAS_VALUES", 1),))
 
 LIC = ComputePass(
     "lic",
@@ -480,6 +487,7 @@ LIC = ComputePass(
         ("hue_sharpness", "float"),
         ("magnitude_mode", "int"),
         ("magnitude_range", "float"),
+        ("colors_values", "int"),
         ("paper_color", "vec4"),
         ("ink_count", "int"),
         ("ink_mid_tone", "float"),
@@ -507,7 +515,7 @@ LIC = ComputePass(
     ),
     includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
     switches=(
-        *("taper", "magnitude_mode", "noise_channels", "family_count"),
+        *("taper", "magnitude_mode", "colors_values", "noise_channels", "family_count"),
         *("is_hatched", "is_light_ink", "even_lines", "ink_count"),
     ),
 )

@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
+from ..compositor.look import colors_values
 from ..compositor.look_units import look_in_pixels
 from ..compositor.picture import Picture
 from ..compositor.target_tone import check_tone
@@ -71,6 +73,7 @@ class GpuRenderer:
         """
         look, camera, instances = view.look, view.camera, view.instances
         check_tone(look, [instance.tone for instance in instances], view.reference)
+        check_color_values(look, instances)
         check_instances(instances, view.sample_camera, look.display)
         items = self.upload(instances, look.display)
         texture = yield from self.render_texture_task(items, view)
@@ -129,6 +132,9 @@ class GpuRenderer:
         yield from noise_task(frame)
         yield from even_lines_task(frame)
         yield Progress(0.15, "finding tones")
+        if colors_values(look):
+            compile_task = self.device.compile_task([passes.TONE_AND_VALUES])
+            yield from subtask(compile_task, 0.15, 0.2)
         render_target_tones(frame)
         kinds = frame.kinds
         for index, kind in enumerate(kinds):

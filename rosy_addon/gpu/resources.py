@@ -85,7 +85,7 @@ class GpuMesh:
     records_texture : texture or None
         The triangle records; None without a field.
     keep_alive : tuple
-        Surface, field and tone: the key of the mesh contains their ids.
+        Surface, field, tone and numbers: the key of the mesh contains their ids.
     tone_atlas : MipAtlas or None
     outline_textures : OutlineTextures or None
         Those of the last crease angle.
@@ -366,6 +366,7 @@ class GpuResources:
             id(instance.surface),
             id(instance.field),
             id(instance.tone),
+            id(instance.color_values),
             linear.tobytes(),
             display,
             channels,
@@ -389,7 +390,8 @@ class GpuResources:
         channels: Sequence[FieldChannel],
     ) -> Task[GpuMesh]:
         surface, field, tone = instance.surface, instance.field, instance.tone
-        task = mesh_buffers_task(surface, linear, field, display, channels, tone)
+        values = instance.color_values
+        task = mesh_buffers_task(surface, linear, field, display, channels, tone, values)
         buffers = yield from subtask(task, 0.0, 1.0, f"preparing the mesh of {surface.name}")
         records_texture = None
         if buffers.triangle_records is not None:
@@ -403,7 +405,8 @@ class GpuResources:
         if buffers.has_tone and tone.image is not None:
             tone_atlas = self._upload_atlas(tone.mip_map)
         batch = self.device.batch(buffers.corners)
-        return GpuMesh(buffers, batch, records_texture, (surface, field, tone), tone_atlas)
+        sources = surface, field, tone, values
+        return GpuMesh(buffers, batch, records_texture, sources, tone_atlas)
 
     def _upload_atlas(self, mip_map: MipMap) -> MipAtlas:
         max_side = min(MAX_TONE_IMAGE_SIDE, self.device.max_texture_size // 2)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..compositor.color_values import value_scale
+from ..compositor.look import colors_values
 from ..projection.shadow_maps import light_cameras
 from . import passes
 from .defines import HEADLIGHT, SUN_LIGHT, TONE_SOURCES
@@ -19,15 +21,25 @@ from .uniforms import (
     tone_uniforms,
 )
 
+#: Largest scale of numbers in shaders, where products with it must be finite.
+MAX_VALUES_SCALE = 1e30
+
 
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel, as ``frame.textures["tones"]``.
 
-    The method is that of `target_tone.target_tone`. The light alone is in the texture ``lighting``.
+    The method is that of `target_tone.target_tone`. The light alone is in the texture ``lighting``. If
+    numbers are colored, their places in the color map are in the last component, or -1.
     """
     look, reference = frame.look, frame.reference
     tones = frame.resources.image("tones", *frame.size)
-    shared_uniforms = tone_uniforms(look, frame.camera, reference)
+    low, scale = value_scale(look, [item.mesh.buffers.value_range for item in frame.items])
+    shared_uniforms = {
+        **tone_uniforms(look, frame.camera, reference),
+        "values_bottom": low,
+        "values_scale": min(scale, MAX_VALUES_SCALE),
+    }
+    shader = passes.TONE_AND_VALUES if colors_values(look) else passes.TONE
     reference_atlas = None if reference is None else frame.resources.reference_atlas(reference)
     lighting = frame.textures["lighting"] = _lighting(frame)
     for instance_id, item, box in frame.fields_in_view():
@@ -42,9 +54,10 @@ def render_target_tones(frame: Frame) -> None:
             "tone_source": TONE_SOURCES[look.tone] if has_own_tone else 0,
             "image_size": (1, 1) if atlas is None else atlas.size,
             "image_level": level,
+            "values_texel": item.mesh.buffers.values_texel,
         }
         frame.textures["tone_image"] = lighting if atlas is None else atlas.texture
-        frame.run_on_instance(passes.TONE, instance_id, box, {"tones": tones}, uniforms)
+        frame.run_on_instance(shader, instance_id, box, {"tones": tones}, uniforms)
     frame.textures["tones"] = tones
 
 

@@ -29,7 +29,7 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, is_hatched
+from ..compositor.look import Look, colors_values, is_hatched
 from ..compositor.look_units import (
     cell_size_args,
     instance_line_spacing,
@@ -113,6 +113,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(pixel_look),
         "magnitude_mode": MAGNITUDE_MODES[look.magnitude],
         "magnitude_range": look.magnitude_range,
+        "colors_values": int(colors_values(look)),
         "paper_color": (*inks.paper, 1.0),
         "ink_count": len(inks.dark),
         "ink_mid_tone": inks.mid_tone,

@@ -17,7 +17,7 @@ from .surface_tone import SurfaceTone
 
 @dataclass(frozen=True, eq=False)
 class MeshInstance:
-    """An instance of a mesh in the scene: a surface, its transform, field and tone.
+    """An instance of a mesh in the scene: a surface, its transform, field, tone and numbers.
 
     Attributes
     ----------
@@ -29,12 +29,15 @@ class MeshInstance:
         On the faces of `surface`. An instance without a field is not drawn, but occludes others.
     tone : SurfaceTone or None
         The tone of the surface, if it is given: painted, computed or from an image.
+    color_values : (C,) float32 ndarray or None
+        Numbers at the C corners of the surface for the color map; NaN where there is none.
     """
 
     surface: Surface
     matrix: np.ndarray
     field: RosyField | None = None
     tone: SurfaceTone | None = None
+    color_values: np.ndarray | None = None
 
     def world_points(self) -> np.ndarray:
         """Return the (V, 3) float64 vertices in world space."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from ..cache import Cache
+from ..compositor.color_values import check_color_values
 from ..compositor.compose import compose_task
 from ..compositor.picture import Picture
 from ..compositor.target_tone import check_tone
@@ -58,6 +59,8 @@ class CpuRenderer:
     def _picture_task(self, view: ViewInput) -> Task[Picture]:
         """Draw the picture without singularities."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
+        if not view.draws_thresholds:
+            check_color_values(view.look, view.instances)
         rows = self._checked_bands(view)
         if len(rows) > 1:
             rgba = yield from self._workers.draw_task(view, rows, self._cache)

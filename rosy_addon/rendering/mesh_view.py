@@ -17,7 +17,11 @@ from .view_input import ViewInput
 
 
 def mesh_instance(
-    surface: Surface, field: RosyField | None, up: str, tone: SurfaceTone | None = None
+    surface: Surface,
+    field: RosyField | None,
+    up: str,
+    tone: SurfaceTone | None = None,
+    color_values: np.ndarray | None = None,
 ) -> MeshInstance:
     """Return a mesh in world space, upright.
 
@@ -28,8 +32,9 @@ def mesh_instance(
     up : {"y", "z"}
         The mesh's upward axis.
     tone : SurfaceTone, optional
+    color_values : (C,) float32 ndarray, optional
     """
-    return MeshInstance(surface, UP_AXIS_MATRIX[up], field, tone)
+    return MeshInstance(surface, UP_AXIS_MATRIX[up], field, tone, color_values)
 
 
 def mesh_view(

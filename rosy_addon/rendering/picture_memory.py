@@ -31,7 +31,7 @@ from ..compositor.hatching import (
     has_overshoot,
     has_paper_grain,
 )
-from ..compositor.look import Look, colors_magnitude, is_hatched
+from ..compositor.look import Look, colors_values, is_hatched, uses_color_map
 from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..field.directional_field import ratio_harmonics
 from ..field.symmetry import FieldSymmetry
@@ -74,8 +74,11 @@ STEP_BYTES = 24
 #: Bytes of the statistics of streaks, which are simulated once for a look.
 STATISTICS_BYTES = 100_000_000
 
-#: Bytes of a visible sample while its color is computed: gray; colored; by magnitude; hatched.
+#: Bytes of a visible sample while its color is computed: gray; colored; by a color map; hatched.
 GRAY_BYTES, COLOR_BYTES, MAGNITUDE_BYTES, HATCHING_BYTES = 33, 120, 105, 50
+
+#: Bytes of a visible sample for its place in the color map of numbers.
+VALUE_BYTES = 4
 
 #: Bytes of a sample that shows another triangle than the center of its pixel: while such samples are
 #: found, and kept.
@@ -221,7 +224,7 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
     gbuffer = (GBUFFER_BYTES + CHANNEL_BYTES * channels) * visible + KEPT_TRIANGLE_BYTES * triangles
     gbuffer += KEPT_OTHER_SAMPLE_BYTES * other_samples
     shadow_maps = SHADOW_MAP_BYTES if look.shadows and look.light != "headlight" else 0
-    base = gbuffer + FIELD_BYTES * visible
+    base = gbuffer + (FIELD_BYTES + VALUE_BYTES * colors_values(look)) * visible
     images = base + image_bytes * visible
     colored = images + (4 * noise_channels + 16) * visible
     lic = base
@@ -337,7 +340,7 @@ def _sheets_bytes(
 def _color_bytes(look: Look, lines: int, noise_channels: int) -> float:
     """Return the bytes of a visible sample while its color is computed, beyond its LIC images."""
     if not is_hatched(look):
-        if colors_magnitude(look):
+        if uses_color_map(look):
             return MAGNITUDE_BYTES
         colored = noise_channels > 1 or look.hue == "families"
         return COLOR_BYTES if colored else GRAY_BYTES

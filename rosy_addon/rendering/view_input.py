@@ -38,7 +38,7 @@ class ViewInput:
     Attributes
     ----------
     instances : tuple of MeshInstance
-        Meshes with their fields and tones, in world space. Those without a field only occlude.
+        Meshes with their fields, tones and numbers, in world space. Those without a field only occlude.
     camera : Camera
         Of the size of the finished picture.
     look : Look

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..cache import Cache
+from ..compositor.color_values import (
+    check_color_values,
+    map_positions,
+    value_range,
+    value_scale,
+)
 from ..compositor.compose import colorize, layer_task
 from ..compositor.lic import lic_lengths_task
 from ..compositor.lic_images import with_magnitude_range
-from ..compositor.look import Look, colors_magnitude, is_hatched
+from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.look_units import look_on_surface
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
@@ -21,6 +27,7 @@ from ..memory import check_memory, raise_mmap_threshold
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
+from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts_task
 from .direction_maps import direction_map_task
 from .hatching import hatching_task
@@ -44,7 +51,7 @@ MIN_STEP = 0.25
 TEXTURE_SETTINGS = (
     *("ink", "display", "unit", "unit_size", "length", "taper", "step", "grain", "density"),
     *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
-    *("magnitude", "magnitude_range", "colour_map"),
+    *("magnitude", "magnitude_range", "values_low", "values_high", "colour_map"),
     *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 
@@ -145,7 +152,7 @@ def draw_texture_task(
     Parameters
     ----------
     instance : MeshInstance
-        With a field.
+        With a field. Its numbers are colors, but not in hatching.
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
@@ -177,10 +184,12 @@ def draw_texture_task(
     ------
     RosyError
         If there is no field, the size or the margin is out of range, the UV map
-        cannot be drawn, or there is not enough memory.
+        cannot be drawn, the look colors numbers and there are none, or there is not enough memory.
     """
     name = instance.surface.name
     check_texture_size(size, margin)
+    if texture_colors_values(look, content):
+        check_color_values(look, [instance])
     raise_mmap_threshold()
     mesh = yield from subtask(
         tangent_mesh_task(
@@ -220,6 +229,11 @@ def draw_texture_task(
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
     rgba[..., :3] = image
     return Texture(frame, rgba, texels.overlap, is_data, mesh.family_count)
+
+
+def texture_colors_values(look: Look, content: str = "look") -> bool:
+    """Return whether a texture has the colors of numbers on the surface. Hatching has those of its ink."""
+    return content == "look" and colors_values(look) and not is_hatched(look)
 
 
 def check_texture_size(size: int, margin: int) -> None:
@@ -277,6 +291,11 @@ def _colors_task(on: TexelSurface, field: PixelField, look: Look) -> Task[np.nda
     layer = yield from subtask(layer_task(field, look, images), 0.95, 0.95)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
+    if colors_values(look):
+        texels = on.texels
+        values = values_in_triangles(on.instance, texels.triangle, texels.barycentric)
+        low, scale = value_scale(look, [value_range(on.instance.color_values)])
+        field = replace(field, map_position=map_positions(values, low, scale))
     color = np.empty((len(field.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(color)):
         yield Progress(0.95 + 0.05 * block.start / len(color), "drawing the colors")

@@ -2,7 +2,7 @@
 // mean of the images of all lines gets the contrast of one of them. Then color, ink and light are
 // applied.
 
-vec3 color_of_magnitude(float value)
+vec3 mapped_color(float value)
 {
   int last_texel = textureSize(color_map, 0).x - 1;
   float position = clamp(value, 0.0, 1.0) * float(last_texel);
@@ -65,14 +65,18 @@ void main()
     family_angle = angle_of(family_value);
     known_families = family_value == vec2(0.0) ? 1 : family_count;
   }
-  vec3 light = texelFetch(tones, pixel, 0).xyz;
+  vec4 light_and_position = texelFetch(tones, pixel, 0);
+  vec3 light = light_and_position.xyz;
   float pixel_tone = tone_at(pixel);
   bool is_colored_by_magnitude = (magnitude_mode & MAGNITUDE_COLOR) != 0;
+  // Without a number, the position in the color map is negative.
+  bool is_mapped = is_colored_by_magnitude || (colors_values != 0 && light_and_position.w >= 0.0);
+  float map_position = is_colored_by_magnitude ? relative_magnitude : light_and_position.w;
   float line_angle = angle_of(z) / float(degree), first_onset = 10.0, paper = 1.0;
   vec3 one_ink = vec3(0.0), ink_light = vec3(1.0);
   if (is_hatched != 0) {
-    if (is_colored_by_magnitude) {
-      one_ink = to_linear(color_of_magnitude(relative_magnitude));
+    if (is_mapped) {
+      one_ink = to_linear(mapped_color(map_position));
     }
     else if (ink_count == 1) {
       one_ink = ink_of_tone(0.0, pixel_tone);
@@ -110,7 +114,7 @@ void main()
         float mean_tone = tone_sum.x / tone_sum.y;
         transmittance = is_light_ink != 0 ? 1.0 - mean_tone : mean_tone;
         target = min_transmittance + transmittance * (1.0 - min_transmittance);
-        if (ink_count == 1 && !is_colored_by_magnitude) {
+        if (ink_count == 1 && !is_colored_by_magnitude && colors_values == 0) {
           transmittance = 1.0 - ink_coverage(target, one_ink);
         }
         onset_sum = 0.0;
@@ -195,8 +199,8 @@ void main()
   lic_sum *= gain * sqrt(float(line_count) / (1.0 + shared_variance));
   vec3 tone = noise_channels == 1 ? lic_sum.xxx : lic_sum;
   vec3 ink = tone + NOISE_MEAN;
-  if (is_colored_by_magnitude) {
-    ink = color_of_magnitude(relative_magnitude) * (1.0 + COLOR_CONTRAST * tone);
+  if (is_mapped) {
+    ink = mapped_color(map_position) * (1.0 + COLOR_CONTRAST * tone);
   }
   else if (family_count > 1) {
     ink = hue_sum / hue_weight * (1.0 + COLOR_CONTRAST * tone);

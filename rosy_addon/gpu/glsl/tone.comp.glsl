@@ -33,6 +33,32 @@ vec3 apply_curve(vec3 tone)
   return curve_power == 1.0 ? stretched : pow(stretched, vec3(curve_power));
 }
 
+// Barycentric coordinates of the point of a triangle that a pixel sees.
+vec3 weights_at(Corners corners, vec2 ray)
+{
+  vec3 edges = edge_functions(corners, ray);
+  float total = edges.x + edges.y + edges.z;
+  vec3 weights = total == 0.0 ? vec3(1.0 / 3.0) : max(edges / total, 0.0);
+  return weights / (weights.x + weights.y + weights.z);
+}
+
+#if HAS_VALUES
+// Where the number of the surface is in the color map, from 0 to 1; -1 if there is none.
+float map_position(int triangle, vec2 ray)
+{
+  if (values_texel < 0) {
+    return -1.0;
+  }
+  vec4 numbers = record_texel(triangle, values_texel);
+  if (numbers.w == 0.0) {
+    return -1.0;
+  }
+  vec3 weights = weights_at(corners_to_camera(corner_positions(triangle)), ray);
+  float number = numbers.x + weights.y * (numbers.y - numbers.x) + weights.z * (numbers.z - numbers.x);
+  return clamp((number - values_bottom) * values_scale, 0.0, 1.0);
+}
+#endif
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
@@ -44,9 +70,14 @@ void main()
   if (!is_of_instance(triangle)) {
     return;
   }
+  float position_in_map = 1.0;
+#if HAS_VALUES
+  position_in_map =
+      map_position(triangle, pixel_ray(pixel, vec2(frame), clip_to_camera, lens_shift));
+#endif
   vec3 light = 1.0 - shading + shading * texelFetch(lighting, pixel, 0).xyz;
   if (tone_source == TONE_LIGHT) {
-    imageStore(tones, pixel, vec4(curve_light != 0 ? apply_curve(light) : light, 1.0));
+    imageStore(tones, pixel, vec4(curve_light != 0 ? apply_curve(light) : light, position_in_map));
     return;
   }
   vec4 normal = texelFetch(normals, pixel, 0);
@@ -63,10 +94,7 @@ void main()
     vec4 uv01 = record_texel(triangle, texels_per_record - 3);
     vec4 uv2 = record_texel(triangle, texels_per_record - 2);
     Corners corners = corners_to_camera(corner_positions(triangle));
-    vec3 edges = edge_functions(corners, ray);
-    float total = edges.x + edges.y + edges.z;
-    vec3 weights = total == 0.0 ? vec3(1.0 / 3.0) : max(edges / total, 0.0);
-    weights /= weights.x + weights.y + weights.z;
+    vec3 weights = weights_at(corners, ray);
     vec2 uv = weights.x * uv01.xy + weights.y * uv01.zw + weights.z * uv2.xy;
     tone = uv.x;
     if (tone_source == TONE_IMAGE) {
@@ -84,5 +112,5 @@ void main()
     }
   }
   vec3 result = apply_curve(vec3(tone));
-  imageStore(tones, pixel, vec4(tone_lit != 0 ? result * light : result, 1.0));
+  imageStore(tones, pixel, vec4(tone_lit != 0 ? result * light : result, position_in_map));
 }

@@ -22,8 +22,8 @@ from rosy_addon.projection.camera import look_at, orthographic_camera, perspecti
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.shadow_maps import light_cameras, shadow_visibility
+from rosy_addon.projection.surface_sampling import surface_tones
 from rosy_addon.projection.surface_tone import SurfaceTone
-from rosy_addon.projection.tone_sampling import surface_tones
 
 #: These tests draw many pictures and measure them.
 pytestmark = pytest.mark.slow

@@ -880,6 +880,51 @@ def test_tones_with_free_directions(card):
     assert_parity(card, [instance], view(), look)
 
 
+# --- colors of numbers ---------------------------------------------------------------------------
+
+COLORED = {
+    "soft": {},
+    "hatched": {"ink": "hatch", "grain": 3.0, "outline": 2.0},
+    "light ink": {"ink": "hatch", "ink_colour": "#f0f0e0", "paper_colour": "#101018", "layers": 1},
+    "a range, inverted": {"values_low": 0.8, "values_high": 0.2, "colour_map": "magma"},
+    "colored noise": {"noise": "colour"},
+    "with tones": {"tone": "attribute", "tone_gamma": 1.5},
+}
+
+
+def numbered(surface=BALL, matrix=None, tone=None, field=None):
+    """Return a ball with numbers of waves, and without some of them on one side."""
+    x = surface.vertices[surface.corner_vertex, 0]
+    values = np.where(x > 0.3, np.nan, waves(surface).values[:, 0])
+    instance = toned(tone, surface, matrix)
+    field = instance.field if field is None else field
+    return replace(instance, field=field, color_values=values.astype(np.float32))
+
+
+@pytest.mark.parametrize("name", COLORED)
+def test_colors_of_numbers(card, name):
+    look = replace(LOOK, hue="values", **COLORED[name])
+    tone = waves() if look.tone == "attribute" else None
+    assert_parity(card, [numbered(tone=tone)], view(), look)
+
+
+def test_numbers_beside_meshes_without_them(card):
+    """The numbers that are out of view count for the range."""
+    half = 0.5 * np.eye(3)
+    instances = [numbered(matrix=placed(half, (-0.6, 0, 0))), ball(4, placed(half, (0.6, 0, 0)))]
+    hidden = numbered(matrix=placed(half, (0, 0, 90)))
+    instances.append(replace(hidden, color_values=3 * hidden.color_values))
+    assert_parity(card, instances, view(), replace(LOOK, hue="values"))
+
+
+def test_numbers_with_free_directions(card):
+    """The records then contain channels as well."""
+    surface = icosphere(3)
+    instance = numbered(surface, tone=waves(surface), field=conjugate_field(surface))
+    look = replace(LOOK, tone="attribute", hue="values")
+    assert_parity(card, [instance], view(), look)
+
+
 @pytest.mark.parametrize(
     "lights",
     [[SUN, POINT], *long([SUN], [POINT], [replace(POINT, vector=np.array([0.1, 1.3, -4.0]))])],

@@ -1,6 +1,8 @@
-"""Sampling of surface tones at the pixels of a G-buffer."""
+"""Sampling of the tones and numbers of surfaces at the pixels of a G-buffer."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -26,9 +28,7 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
         Linear tones. NaN where the mesh instance has no tone.
     """
     tones = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
-    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
-        pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
-        instance = gbuffer.instances[instance_id]
+    for instance, pixels in _visible_instances(gbuffer):
         tone = instance.tone
         if tone is None:
             continue
@@ -40,6 +40,56 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
             level = 0.5 * np.log2(_texel_footprint(gbuffer, instance, pixels, corners) + 1e-12)
             tones[pixels] = tone.mip_map.sample(*sampled, level, repeat=True)
     return tones
+
+
+def surface_values(gbuffer: GBuffer) -> np.ndarray:
+    """Interpolate the numbers of surfaces (`MeshInstance.color_values`) at the pixels of a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With `instances`.
+
+    Returns
+    -------
+    (P,) float32 ndarray
+        NaN where there is no number.
+    """
+    values = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
+    for instance, pixels in _visible_instances(gbuffer):
+        if instance.color_values is not None:
+            values[pixels] = values_in_triangles(
+                instance, gbuffer.triangle[pixels], gbuffer.barycentric[pixels]
+            )
+    return values
+
+
+def values_in_triangles(
+    instance: MeshInstance, triangle: np.ndarray, barycentric: np.ndarray
+) -> np.ndarray:
+    """Interpolate the numbers of a surface at points of its triangles.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+        With `color_values`.
+    triangle : (n,) ndarray of int
+    barycentric : (n, 3) float32 ndarray
+
+    Returns
+    -------
+    (n,) float32 ndarray
+        NaN where a corner has no number. Exact where all corners have the same.
+    """
+    corners = instance.surface.triangles.take(triangle, axis=0)
+    first, second, third = instance.color_values.take(corners).T
+    return first + barycentric[:, 1] * (second - first) + barycentric[:, 2] * (third - first)
+
+
+def _visible_instances(gbuffer: GBuffer) -> Iterator[tuple[MeshInstance, np.ndarray]]:
+    """Yield each instance that is visible, and the indices of its pixels."""
+    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
+        yield gbuffer.instances[instance_id], np.flatnonzero(gbuffer.instance_id == instance_id)
 
 
 def _texel_footprint(

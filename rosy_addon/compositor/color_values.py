@@ -1,0 +1,102 @@
+"""The colors of numbers on surfaces: their range, and where they are in the color map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..errors import RosyError
+from ..progress import Progress, Task
+from ..projection.gbuffer import GBuffer, MeshInstance
+from ..projection.pixel_blocks import pixel_blocks
+from ..projection.surface_sampling import surface_values
+from .look import Look, colors_values
+
+#: Smallest difference between the numbers at the bottom and at the top of the color map. With it, the
+#: map is a step: larger numbers have the color at the top.
+MIN_VALUE_RANGE = 1e-30
+
+#: The lowest and the highest of some numbers; None if there are none.
+ValueRange = tuple[float, float] | None
+
+
+def check_color_values(look: Look, instances: Iterable[MeshInstance]) -> None:
+    """Check that there are numbers on a surface if a look colors them.
+
+    Raises
+    ------
+    RosyError
+        If no mesh instance with a field has any.
+    """
+    if colors_values(look) and all(
+        instance.color_values is None for instance in instances if instance.field is not None
+    ):
+        raise RosyError("hue 'values' needs numbers on the surface, but no object has any")
+
+
+def value_range(values: np.ndarray) -> ValueRange:
+    """Return the range of the finite ones of some numbers."""
+    finite = np.isfinite(values)
+    if not finite.any():
+        return None
+    low, high = values.min(where=finite, initial=np.inf), values.max(where=finite, initial=-np.inf)
+    return float(low), float(high)
+
+
+def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
+    """Return (low, scale) of a look: a number v is at (v - low) * scale in the color map.
+
+    Parameters
+    ----------
+    look : Look
+        If its `values_low` and `values_high` are both 0, they are those of the numbers.
+    ranges : iterable of (float, float) or None
+        From `value_range`, of the mesh instances that have a field and numbers.
+    """
+    low, high = look.values_low, look.values_high
+    if low == high == 0:
+        known = [entry for entry in ranges if entry is not None] or [(0.0, 0.0)]
+        low, high = min(entry[0] for entry in known), max(entry[1] for entry in known)
+    difference = high - low
+    if abs(difference) < MIN_VALUE_RANGE:
+        difference = MIN_VALUE_RANGE
+    return low, 1 / difference
+
+
+def map_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
+    """(P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
+    return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
+
+
+def map_positions_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
+    """Find where the numbers of the surfaces are in the color map.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+        With `instances`. The numbers of all of them, visible or not, are the range of the color map.
+    look : Look
+
+    Returns
+    -------
+    (P,) float32 ndarray
+        0 to 1 at the pixels of the G-buffer; NaN where there is no number.
+
+    Raises
+    ------
+    RosyError
+        See `check_color_values`.
+    """
+    check_color_values(look, gbuffer.instances)
+    ranges = [
+        value_range(instance.color_values)
+        for instance in gbuffer.instances
+        if instance.field is not None and instance.color_values is not None
+    ]
+    low, scale = value_scale(look, ranges)
+    positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
+    for block in pixel_blocks(len(positions)):
+        yield Progress(block.start / len(positions), "finding colors")
+        positions[block] = map_positions(surface_values(gbuffer.part(block)), low, scale)
+    return positions

@@ -1,0 +1,167 @@
+"""Numbers on surfaces as colors: where they are in the color map, and their pictures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import icosphere, plane
+
+from rosy_addon.color import color_stops, map_colors, to_linear
+from rosy_addon.compositor.band_division import divide_rows
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
+from rosy_addon.errors import RosyError
+from rosy_addon.field.generate import axis_field
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import look_at, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+from rosy_addon.projection.surface_sampling import surface_values
+from rosy_addon.rendering.band_workers import BandWorkers
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
+
+#: Pixels along each side. The pictures show a square from -1.2 to 1.2.
+SIZE, SIDE = 96, 2.4
+PIXEL_CENTERS = ((np.arange(SIZE) + 0.5) / SIZE - 0.5) * SIDE
+BALL, GRID = icosphere(4), plane(4, 4)
+
+#: Streaks without contrast, and no shading: the pixels have the colors of the map.
+FLAT = Look(hue="values", gain=0.0, shading=0.0, length=3)
+#: The ink alone, which covers everything.
+INK = replace(FLAT, ink="hatch", tone_black=2.0, tone_white=3.0, clear_paper=True)
+
+
+def camera(width=SIZE, height=SIZE):
+    view = look_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    return orthographic_camera(view, width, height, scale=SIDE)
+
+
+def numbered(surface, values, **place):
+    matrix = np.eye(4)
+    matrix[:3, 3] = place.get("shift", (0, 0, 0))
+    field = axis_field(surface, 2, (1.0, 0.3, 0.2))
+    return MeshInstance(surface, matrix, field, color_values=np.asarray(values, dtype=np.float32))
+
+
+def of_vertices(surface, values, **place):
+    return numbered(surface, np.asarray(values)[surface.corner_vertex], **place)
+
+
+def drawn(instances, look):
+    """The linear colors of a picture, and the x of its pixels."""
+    rgba = run_to_completion(
+        CpuRenderer().render_task(ViewInput(tuple(instances), camera(), look))
+    ).rgba
+    row, column = np.nonzero(rgba[..., 3])
+    return rgba[row, column, :3], PIXEL_CENTERS[column]
+
+
+def mapped(position, name="viridis"):
+    return to_linear(map_colors(np.asarray(position), name))
+
+
+@pytest.mark.parametrize("look", [FLAT, INK], ids=["soft", "hatched"])
+@pytest.mark.parametrize("name", ["viridis", "magma"])
+def test_colors_are_those_of_interpolated_numbers(look, name):
+    """x is linear on the triangles of a ball, so at each pixel the number is its x."""
+    colors, x = drawn([of_vertices(BALL, BALL.vertices[:, 0])], replace(look, colour_map=name))
+    low, high = BALL.vertices[:, 0].min(), BALL.vertices[:, 0].max()
+    np.testing.assert_allclose(colors, mapped((x - low) / (high - low), name), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "position"),
+    [
+        (-2.0, 2.0, lambda x: (x + 2) / 4),
+        (0.5, -0.5, lambda x: 0.5 - x),
+        (0.0, 1.0, lambda x: x),
+        (-1.0, 0.0, lambda x: x + 1),
+        (0.3, 0.3, lambda x: x > 0.3),
+    ],
+    ids=["wider", "inverted", "from 0", "to 0", "a step"],
+)
+def test_the_range_of_the_look(low, high, position):
+    """Numbers beyond it have the colors at its ends."""
+    look = replace(FLAT, values_low=low, values_high=high)
+    colors, x = drawn([of_vertices(BALL, BALL.vertices[:, 0])], look)
+    away = np.abs(x - 0.3) > 1e-3
+    expected = mapped(np.clip(position(x), 0, 1))
+    np.testing.assert_allclose(colors[away], expected[away], atol=2e-3)
+
+
+def test_numbers_of_faces_are_constant_on_them():
+    """Exactly: no rounding shows, even of large numbers that differ little."""
+    numbers = 1e6 + np.arange(GRID.face_count)
+    gbuffer = project([numbered(GRID, numbers[GRID.corner_face])], camera())
+    np.testing.assert_array_equal(surface_values(gbuffer), numbers[gbuffer.face])
+
+
+def test_the_range_is_that_of_all_instances_with_a_field():
+    """Those that are out of view count, those without a field do not."""
+    seen = of_vertices(BALL, BALL.vertices[:, 0])
+    unseen = of_vertices(BALL, 3 * BALL.vertices[:, 0] + 1, shift=(0, 0, 90))
+    occluder = replace(numbered(BALL, seen.color_values * 50, shift=(0, 0, 90)), field=None)
+    colors, x = drawn([seen, unseen, occluder], FLAT)
+    low, high = unseen.color_values.min(), unseen.color_values.max()
+    np.testing.assert_allclose(colors, mapped((x - low) / (high - low)), atol=2e-3)
+
+
+def test_one_number_has_the_color_at_the_bottom():
+    colors, _ = drawn([numbered(BALL, np.full(len(BALL.corner_vertex), 7.0))], FLAT)
+    np.testing.assert_array_equal(colors, np.broadcast_to(mapped([0.0]), colors.shape))
+
+
+@pytest.mark.parametrize("look", [replace(FLAT, gain=2.5), replace(INK, ink_colour="#204060")])
+def test_pixels_without_a_number(look):
+    """They are as with one hue, and do not count for the range."""
+    values = BALL.vertices[:, 0].copy()
+    values[BALL.vertices[:, 1] > 0.2] = np.nan
+    instance = of_vertices(BALL, values)
+    gbuffer = project([instance], camera())
+    missing = np.isnan(surface_values(gbuffer))
+    assert 0.2 < missing.mean() < 0.6
+    rgb = {
+        hue: compose(gbuffer, replace(look, hue=hue)).rgba.reshape(-1, 4)[gbuffer.pixel, :3]
+        for hue in ("values", "one")
+    }
+    np.testing.assert_array_equal(rgb["values"][missing], rgb["one"][missing])
+    assert (np.ptp(rgb["values"][~missing], axis=1) > 0.05).mean() > 0.5
+
+
+def test_streaks_darken_and_lighten_the_color():
+    """The hue is that of the map: the ratios of display values do not change."""
+    values = np.full(len(BALL.corner_vertex), 0.5)
+    look = replace(FLAT, gain=1.0, length=12, values_low=0.0, values_high=1.0, colour_map="grey")
+    colors, _ = drawn([numbered(BALL, values)], look)
+    gray = to_linear(color_stops("grey").mean(axis=0))[0]
+    assert colors.std() > 0.02 and abs(np.median(colors) - gray) < 0.06
+
+
+def test_the_magnitude_has_precedence():
+    instance = of_vertices(BALL, BALL.vertices[:, 0])
+    with_magnitude = replace(FLAT, magnitude="colour")
+    colors, _ = drawn([instance], with_magnitude)
+    expected, _ = drawn([replace(instance, color_values=None)], replace(with_magnitude, hue="one"))
+    np.testing.assert_array_equal(colors, expected)
+
+
+def test_without_numbers_there_is_one_line():
+    with pytest.raises(RosyError, match="hue 'values' needs numbers"):
+        drawn([replace(numbered(BALL, BALL.corner_vertex), color_values=None)], FLAT)
+
+
+def test_processes_draw_the_same_bytes():
+    """The range of a band is that of the picture."""
+    instance = of_vertices(BALL, BALL.vertices[:, 1])
+    # Fields with many lines need many strips.
+    instance = replace(instance, field=axis_field(BALL, 11, (0, 0, 1)))
+    look = replace(FLAT, gain=1.0, length=10)
+    view = ViewInput((instance,), camera(320, 1216), look)
+    alone = run_to_completion(CpuRenderer().render_task(view)).rgba
+    with BandWorkers(2) as workers:
+        assert len(divide_rows(look, view.camera, view.instances, 2)) == 2
+        together = run_to_completion(CpuRenderer(workers=workers).render_task(view)).rgba
+    assert together.tobytes() == alone.tobytes()

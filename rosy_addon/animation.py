@@ -325,6 +325,8 @@ def _input_hash(view: ViewInput, renderer: Renderer, settings: OutputSettings) -
             parts += [field.degree, field.vectors, field.direction_ratios, field.family_count]
         if instance.tone is not None:
             parts += [instance.tone.values, instance.tone.image]
+        if instance.color_values is not None:
+            parts += ["numbers", instance.color_values]
     return content_hash(*parts)
 
 

@@ -15,13 +15,14 @@ from .errors import RosyError
 from .image_io.png import png_task
 from .progress import Progress, Task, run_to_completion, subtask
 from .scene.blender_images import ImageData
+from .scene.color_inputs import color_attribute_of
 from .scene.lights import read_lights
 from .scene.look_properties import read_look
 from .scene.picture_state import bakes_light, read_texture_state
 from .scene.pictures import OutputSettings, check_targets, read_output_settings
 from .scene.read_view import scene_depsgraph
 from .scene.textures import Hatching, apply_texture, read_texture_input_task, uv_map_name
-from .surface_texture.draw import draw_texture_task
+from .surface_texture.draw import draw_texture_task, texture_colors_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +91,12 @@ def bake_texture_task(
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     size, margin = scene.rosy.texture_size, scene.rosy.texture_margin
     is_udim = scene.rosy.texture_udim
+    colors = texture_colors_values(look, content)
+    color_attribute = color_attribute_of(scene, look) if colors else None
     drawn = []
     for index, obj in enumerate(objects):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
-        reading = read_texture_input_task(scene, depsgraph, obj, BAKE_CACHE)
+        reading = read_texture_input_task(scene, depsgraph, obj, BAKE_CACHE, color_attribute)
         texture_input = yield from subtask(reading, start, start)
         state = read_texture_state(scene, depsgraph, obj)
         task = draw_texture_task(

@@ -7,10 +7,14 @@ import numpy as np
 
 from ..color import REC709_LUMINANCE
 from ..errors import RosyError
-from ..field.surface import mean_per_face
+from ..field.surface import Surface, mean_per_face
 from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
 from .meshes import mesh_label, mesh_surface
+
+#: Types of attributes that are numbers, with dtypes for them, and those that are colors.
+NUMBER_TYPES = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
+COLOR_TYPES = ("FLOAT_COLOR", "BYTE_COLOR")
 
 
 def read_face_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
@@ -88,6 +92,35 @@ def read_face_scalars(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
     return mean_per_face(values, surface.face_start)
 
 
+def filled_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
+    """Return an attribute; None if it is missing or unreadable."""
+    attribute = mesh.attributes.get(name)
+    # In edit mode, attributes are empty.
+    return attribute if attribute is not None and len(attribute.data) else None
+
+
+def corner_scalars(attribute: bpy.types.Attribute, surface: Surface, source: str) -> np.ndarray:
+    """Return the values of a scalar attribute at the corners of its mesh, (C,) float64.
+
+    Parameters
+    ----------
+    attribute : bpy.types.Attribute
+    surface : Surface
+        The surface of the mesh.
+    source : str
+        Name of the attribute in messages.
+
+    Raises
+    ------
+    RosyError
+        As of `scalar_values`.
+    """
+    values = scalar_values(attribute, source)
+    if attribute.domain == "POINT":
+        return values[surface.corner_vertex]
+    return values[surface.corner_face] if attribute.domain == "FACE" else values
+
+
 def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
     """Return the values of a scalar attribute. Colors are converted to linear luminance.
 
@@ -112,13 +145,12 @@ def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:
         raise RosyError(
             f"{source}: expected values on FACE, POINT or CORNER, found {describe_type(attribute)}"
         )
-    if data_type in ("FLOAT_COLOR", "BYTE_COLOR"):
+    if data_type in COLOR_TYPES:
         values = np.empty(4 * count, dtype=np.float32)
         attribute.data.foreach_get("color", values)
         return values.reshape(-1, 4)[:, :3] @ REC709_LUMINANCE
-    dtypes = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
-    if data_type not in dtypes:
+    if data_type not in NUMBER_TYPES:
         raise RosyError(f"{source}: expected a number or a color, found {describe_type(attribute)}")
-    values = np.empty(count, dtype=dtypes[data_type])
+    values = np.empty(count, dtype=NUMBER_TYPES[data_type])
     attribute.data.foreach_get("value", values)
     return values.astype(np.float64)

@@ -21,8 +21,9 @@ from ..field.rosy_field import MAX_DEGREE
 from ..file_io import read_bytes
 from ..projection.camera import Camera
 from ..settings import settings_of
-from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS
+from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
+from .color_inputs import color_attribute_of, color_values_digest
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
 from .lights import rendered_lights
 from .look_properties import read_look
@@ -158,11 +159,13 @@ class _Sources:
     Attributes
     ----------
     tone_request : ToneRequest or None
+    color_attribute : str or None
     uses_lights : bool
     ignores_bad_vectors : bool
     """
 
     tone_request: ToneRequest | None
+    color_attribute: str | None
     uses_lights: bool
     ignores_bad_vectors: bool
 
@@ -267,6 +270,7 @@ class SceneState:
         key = (
             *(obj.session_uid, obj.rosy.texture_uv_map, obj.data.uv_layers.active_index),
             *(settings.texture_size, settings.texture_margin, read_look(settings)),
+            settings.color_attribute,
             *(getattr(settings, name) for name in TEXTURE_OUTPUT),
         )
         if key not in self._texture_states:
@@ -335,6 +339,8 @@ def read_texture_state(
     with evaluated_mesh(obj.evaluated_get(depsgraph)) as evaluated:
         if evaluated is not None:
             shape += polygon_arrays(evaluated)
+            if texture_colors_values(look, settings.texture_content.lower()):
+                shape.append(color_values_digest(evaluated, settings.color_attribute))
             try:
                 uv_parts.append(
                     read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name, "the texture")
@@ -368,7 +374,12 @@ def _read_sources(scene: bpy.types.Scene) -> _Sources:
     """Return what the settings of a scene ask of its objects."""
     look = read_look(scene.rosy)
     uses_lights = look.light == "scene" and look.shading > 0
-    return _Sources(make_tone_request(scene, look), uses_lights, scene.rosy.undefined)
+    return _Sources(
+        make_tone_request(scene, look),
+        color_attribute_of(scene, look),
+        uses_lights,
+        scene.rosy.undefined,
+    )
 
 
 def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple:
@@ -422,6 +433,7 @@ def _field_mesh_state(
             return None
         tone_digest = tone_source_digest(mesh, owner, sources.tone_request)
         parts = [shape_digest(mesh), *_field_parts(mesh, original), tone_digest]
+        parts.append(color_values_digest(mesh, sources.color_attribute))
         bounds, face_count = _bounds(mesh), len(mesh.polygons)
     if user_modifiers(owner) or original.shape_keys:
         # The rest shape and its normals, from which the field is transported.

@@ -16,6 +16,7 @@ from ..progress import Task
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
+from .color_inputs import color_attribute_of
 from .lights import read_lights
 from .scene_reader import SceneData, read_scene_task
 from .tone_inputs import load_reference, make_tone_request
@@ -58,7 +59,7 @@ def read_views_task(
     cameras : sequence of bpy.types.Object or Camera
         See `resolve_camera`.
     look : Look
-        Lights, tones and the reference render are read only if it uses them.
+        Lights, tones, numbers and the reference render are read only if it uses them.
     objects : sequence of bpy.types.Object, optional
         Objects whose fields are drawn; by default all that have one. Other objects only occlude.
     size : (int, int), optional
@@ -92,7 +93,12 @@ def read_views_task(
         )
     tone_request = make_tone_request(scene, look)
     scene_data = yield from read_scene_task(
-        depsgraph, objects, nonfinite_policy(scene), cache, tone_request
+        depsgraph,
+        objects,
+        nonfinite_policy(scene),
+        cache,
+        tone_request,
+        color_attribute=color_attribute_of(scene, look),
     )
     reference = None
     if look.tone == "picture":
@@ -128,7 +134,11 @@ def read_turntable_task(
     """
     tone_request = make_tone_request(scene, look)
     scene_data = yield from read_scene_task(
-        depsgraph, [obj], nonfinite_policy(scene), tone_request=tone_request
+        depsgraph,
+        [obj],
+        nonfinite_policy(scene),
+        tone_request=tone_request,
+        color_attribute=color_attribute_of(scene, look),
     )
     lights = read_lights(depsgraph, np.eye(4)) if look.light == "scene" else []
     return scene_data.instances[0], lights

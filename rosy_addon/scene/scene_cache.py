@@ -24,6 +24,7 @@ from ..field.surface import Surface
 from ..progress import Progress, Task
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from .color_inputs import read_color_values
 from .evaluated_field import FieldLayout, evaluated_field_reader, read_evaluated_field
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import (
@@ -77,11 +78,12 @@ _TopologyKey = tuple[str, bytes]
 
 @dataclass(frozen=True, eq=False)
 class _MeshState:
-    """Surface, field and tone of an evaluated mesh when it was last read."""
+    """Surface, field, tone and numbers of an evaluated mesh when it was last read."""
 
     surface: Surface
     field: RosyField | None
     tone: SurfaceTone | None = None
+    color_values: np.ndarray | None = None
 
 
 class SceneCache:
@@ -124,6 +126,7 @@ class SceneCache:
         self._instances: dict[tuple, tuple[MeshInstance, int]] = {}
         self._last_version = 0
         self._tone_request: ToneRequest | None = None
+        self._color_attribute: str | None = None
 
     def invalidate(self, names: set[str] | None = None, *, topology_changed: bool = True) -> None:
         """Mark objects as changed, so that they are read again.
@@ -154,6 +157,7 @@ class SceneCache:
         *,
         include_occluders: bool = False,
         tone_request: ToneRequest | None = None,
+        color_attribute: str | None = None,
         deadline: float = math.inf,
     ) -> list[InstanceState]:
         """Return all instances of RoSy objects in their current state.
@@ -170,6 +174,8 @@ class SceneCache:
             Read all other meshes too, since they may occlude the RoSy objects.
         tone_request : ToneRequest, optional
             The source of the surface tones.
+        color_attribute : str, optional
+            Name of the attribute whose numbers are read for the color map.
         deadline : float
             Seconds, monotonic. If it is finite, large meshes are prepared in steps. What was not
             begun by then, except one step, is left for the next call; see `is_complete`.
@@ -177,9 +183,9 @@ class SceneCache:
         if self.is_complete:
             self.errors.clear()
         self._deadline, self.is_complete, self._has_read_any = deadline, True, False
-        if tone_request != self._tone_request:
+        if (tone_request, color_attribute) != (self._tone_request, self._color_attribute):
             self._mesh_states.clear()
-            self._tone_request = tone_request
+            self._tone_request, self._color_attribute = tone_request, color_attribute
         self._unresolved.clear()
         states: list[InstanceState] = []
         instances: dict[tuple, tuple[MeshInstance, int]] = {}
@@ -205,6 +211,7 @@ class SceneCache:
                 id(mesh_state.surface),
                 id(mesh_state.field),
                 id(mesh_state.tone),
+                id(mesh_state.color_values),
                 matrix.tobytes(),
             )
             if instance_key not in instances:
@@ -238,7 +245,7 @@ class SceneCache:
             return self._instances[instance_key]
         self._last_version += 1
         return MeshInstance(
-            mesh_state.surface, matrix, mesh_state.field, mesh_state.tone
+            mesh_state.surface, matrix, mesh_state.field, mesh_state.tone, mesh_state.color_values
         ), self._last_version
 
     @property
@@ -382,7 +389,7 @@ class SceneCache:
     def _read_evaluated(
         self, obj: bpy.types.Object, owner: bpy.types.Object, nonfinite: str
     ) -> _MeshState | None:
-        """Read an evaluated mesh with field and tone; None if it has no faces or is unresolved."""
+        """Read an evaluated mesh with its field; None if it has no faces or is unresolved."""
         label = f"object '{owner.name}'"
         original = owner.data
         with evaluated_mesh(obj) as mesh:
@@ -390,9 +397,10 @@ class SceneCache:
                 return None
             surface = mesh_surface(mesh, label, cache=self.cache)
             tone = read_tone(mesh, owner, surface, self._tone_request, self.cache)
+            values = read_color_values(mesh, surface, self._color_attribute, label, self.cache)
             if original.is_editmode:
                 field_in_edit_mode = self._edit_mode_field(mesh, owner, surface, nonfinite, label)
-                return _MeshState(surface, field_in_edit_mode, tone)
+                return _MeshState(surface, field_in_edit_mode, tone, values)
             original_surface = mesh_surface(original, label, cache=self.cache)
             keeps_field = all(modifier.type != "NODES" for modifier in user_modifiers(owner))
             if keeps_field and _has_same_topology(surface, original_surface):
@@ -407,7 +415,7 @@ class SceneCache:
                 rest_surface = (
                     _with_rest(surface, original_surface.vertices) if deformed else surface
                 )
-                return _MeshState(rest_surface, field, tone)
+                return _MeshState(rest_surface, field, tone, values)
             key = owner.name, _topology_hash(mesh, original)
         entry = self._topologies.get(key)
         if entry is None:
@@ -419,7 +427,7 @@ class SceneCache:
             return None
         if isinstance(entry, str):
             raise RosyError(entry)
-        return _MeshState(_with_rest(surface, entry.rest), entry.field, tone)
+        return _MeshState(_with_rest(surface, entry.rest), entry.field, tone, values)
 
     def _edit_mode_field(
         self,

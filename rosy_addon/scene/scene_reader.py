@@ -17,6 +17,7 @@ from ..field.surface import Surface
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from .color_inputs import check_colored, read_color_values
 from .compat import has_rosy_properties, is_editable
 from .evaluated_field import (
     FACE_NORMAL_ATTRIBUTE,
@@ -103,9 +104,13 @@ def read_scene(
     nonfinite: str = "error",
     cache: Cache | None = None,
     tone_request: ToneRequest | None = None,
+    color_attribute: str | None = None,
 ) -> SceneData:
     """Run `read_scene_task` to its end."""
-    return run_to_completion(read_scene_task(depsgraph, objects, nonfinite, cache, tone_request))
+    task = read_scene_task(
+        depsgraph, objects, nonfinite, cache, tone_request, color_attribute=color_attribute
+    )
+    return run_to_completion(task)
 
 
 def read_scene_task(
@@ -115,6 +120,7 @@ def read_scene_task(
     cache: Cache | None = None,
     tone_request: ToneRequest | None = None,
     uv_maps: Mapping[bpy.types.Object, str] | None = None,
+    color_attribute: str | None = None,
 ) -> Task[SceneData]:
     """Read every mesh that is visible in renders, as arrays.
 
@@ -138,6 +144,8 @@ def read_scene_task(
         The source of the surface tones.
     uv_maps : mapping of bpy.types.Object to str, optional
         Names of UV maps that are read, too. Empty: the active one.
+    color_attribute : str, optional
+        Name of the attribute whose numbers are read for the color map.
 
     Yields
     ------
@@ -150,7 +158,7 @@ def read_scene_task(
     Raises
     ------
     RosyError
-        If no object has a field that can be drawn, or no object has the requested tone. If one of
+        If no object has a field that can be drawn, or no object has the requested tone or numbers. If one of
         the given objects is hidden, or its field cannot be read or is lost in its modifiers.
     """
     view_layer = depsgraph.view_layer
@@ -174,7 +182,9 @@ def read_scene_task(
         # The scene may have changed since the last step. All instances are read in one step, the
         # last, so that the caller can read what belongs to them before it yields.
         depsgraph.update()
-        reader = _SceneReader(layouts, nonfinite, cache, tone_request, errors, uv_maps or {})
+        reader = _SceneReader(
+            layouts, nonfinite, cache, tone_request, errors, uv_maps or {}, color_attribute
+        )
         for instance in rendered_instances(depsgraph):
             reader.add(instance)
     reader.check_complete(objects)
@@ -182,6 +192,10 @@ def read_scene_task(
         raise next(iter(errors.values()))
     check_tones(
         tone_request, [(instance.tone, owner) for instance, owner in reader.field_instances]
+    )
+    check_colored(
+        color_attribute,
+        [(instance.color_values, owner) for instance, owner in reader.field_instances],
     )
     return SceneData(
         [instance for instance, _ in reader.field_instances] + reader.occluders,
@@ -247,8 +261,8 @@ def _prepare_field_task(
 #: Why the fields of objects cannot be drawn.
 Errors = dict[bpy.types.Object, RosyError]
 
-#: A surface, its field and its tone. Occluders have neither field nor tone.
-_MeshData = tuple[Surface, RosyField | None, SurfaceTone | None]
+#: A surface, its field, its tone and its numbers for the color map. Occluders have only the surface.
+_MeshData = tuple[Surface, RosyField | None, SurfaceTone | None, np.ndarray | None]
 
 
 class _SceneReader:
@@ -275,6 +289,7 @@ class _SceneReader:
         tone_request: ToneRequest | None,
         errors: Errors | None,
         uv_maps: Mapping[bpy.types.Object, str],
+        color_attribute: str | None,
     ) -> None:
         self.layouts = layouts
         self.uv_maps = uv_maps
@@ -283,6 +298,7 @@ class _SceneReader:
         self.nonfinite = nonfinite
         self.cache = cache
         self.tone_request = tone_request
+        self.color_attribute = color_attribute
         self.field_instances: list[tuple[MeshInstance, bpy.types.Object]] = []
         self.occluders: list[MeshInstance] = []
         self.mesh_data: dict[tuple, _MeshData | None] = {}
@@ -301,11 +317,12 @@ class _SceneReader:
                 self.mesh_data[mesh_key] = self._read_mesh(obj, None)
         if self.mesh_data[mesh_key] is None:
             return
-        surface, field, tone = self.mesh_data[mesh_key]
+        surface, field, tone, values = self.mesh_data[mesh_key]
         matrix = np.array(instance.matrix_world, dtype=np.float64)
-        instance_key = "instance", id(surface), id(field), id(tone), matrix.tobytes()
+        ids = id(surface), id(field), id(tone), id(values)
         mesh_instance = self.cache.get_or_create(
-            instance_key, lambda: MeshInstance(surface, matrix, field, tone)
+            ("instance", *ids, matrix.tobytes()),
+            lambda: MeshInstance(surface, matrix, field, tone, values),
         )
         if field is None:
             self.occluders.append(mesh_instance)
@@ -322,15 +339,17 @@ class _SceneReader:
                     mesh_surface(mesh, obj.name, occluder_only=True, cache=self.cache),
                     None,
                     None,
+                    None,
                 )
             label = f"object '{obj.name}'"
             surface = mesh_surface(mesh, label, read_rest=True, cache=self.cache)
             field = read_evaluated_field(mesh, layout, surface, self.nonfinite, label, self.cache)
             tone = read_tone(mesh, obj.original, surface, self.tone_request, self.cache)
+            values = read_color_values(mesh, surface, self.color_attribute, label, self.cache)
             uv_map = self.uv_maps.get(obj.original)
             if uv_map is not None:
                 self.uvs[obj.original] = read_uvs(mesh, uv_map, label, "the texture")
-            return surface, field, tone
+            return surface, field, tone, values
 
     def check_complete(self, objects: Sequence[bpy.types.Object]) -> None:
         """Record or raise an error for each object whose field was not read."""

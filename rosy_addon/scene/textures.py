@@ -73,17 +73,25 @@ def read_texture_input_task(
     depsgraph: bpy.types.Depsgraph,
     obj: bpy.types.Object,
     cache: Cache | None = None,
+    color_attribute: str | None = None,
 ) -> Task[TextureInput]:
     """Read an object with a field, and the UV map of its texture, as it is evaluated.
+
+    If `color_attribute` is given, the numbers of this attribute are read for the color map.
 
     Raises
     ------
     RosyError
-        If there is no field or no UV map, or a modifier loses one of them.
+        If there is no field, no UV map or no such attribute, or a modifier loses one of them.
     """
     name = uv_map_name(obj)
     scene_data = yield from read_scene_task(
-        depsgraph, [obj], nonfinite_policy(scene), cache, uv_maps={obj: name}
+        depsgraph,
+        [obj],
+        nonfinite_policy(scene),
+        cache,
+        uv_maps={obj: name},
+        color_attribute=color_attribute,
     )
     return TextureInput(scene_data.instances[0], scene_data.uvs[obj], TextureSource(obj, name))
 

@@ -20,7 +20,7 @@ from ..file_io import check_readable
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .compat import has_rosy_properties
-from .face_values import scalar_values
+from .face_values import corner_scalars, filled_attribute, scalar_values
 from .meshes import read_uvs
 
 
@@ -175,21 +175,15 @@ def _corner_scalars(
     if attribute is None:
         return None
     source = f"{label}, attribute '{attribute.name}'"
-    values = scalar_values(attribute, source)
+    values = corner_scalars(attribute, surface, source)
     if not np.isfinite(values).all():
         raise RosyError(f"{source}: has values that are not finite")
-    if attribute.domain == "POINT":
-        values = values[surface.corner_vertex]
-    elif attribute.domain == "FACE":
-        values = values[surface.corner_face]
     return values[:, None].astype(np.float32)
 
 
 def _tone_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
     """Return an attribute, by default the active color; None if it is missing or unreadable."""
-    attribute = mesh.attributes.get(name or mesh.color_attributes.active_color_name)
-    # In edit mode, attributes are empty.
-    return attribute if attribute is not None and len(attribute.data) else None
+    return filled_attribute(mesh, name or mesh.color_attributes.active_color_name)
 
 
 def image_luminance(image: bpy.types.Image) -> np.ndarray:

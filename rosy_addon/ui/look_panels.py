@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import bpy
 
-from ..compositor.look import Look, is_hatched
+from ..compositor.look import Look, colors_values, is_hatched
 from ..errors import as_sentence
 from ..settings import Setting, Switch, panel_settings, settings_of
 from . import preset_library
@@ -55,7 +56,11 @@ TONE_SOURCE_OF_SETTING = {
 }
 
 #: Properties that hold a name in a collection of the active mesh, with that collection.
-SEARCH_COLLECTIONS = {"tone_attribute": "attributes", "tone_uv_map": "uv_layers"}
+SEARCH_COLLECTIONS = {
+    "color_attribute": "attributes",
+    "tone_attribute": "attributes",
+    "tone_uv_map": "uv_layers",
+}
 
 
 class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
@@ -139,6 +144,8 @@ def _make_settings_panel(
             row = column.row()
             row.active = setting.applies(settings.look)
             _draw_setting(row, settings.look, setting)
+            if name == "hue":
+                _draw_color_source(column, context)
             if name == "tone":
                 _draw_tone_source(column, context)
         unused = _unused_output(settings)
@@ -182,22 +189,45 @@ def _draw_setting(row: bpy.types.UILayout, look: bpy.types.PropertyGroup, settin
     split.prop(look, setting.name, text="")
 
 
+def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the property of the scene for the numbers that are colored, if the hue shows numbers."""
+    settings = context.scene.rosy
+    if settings.look.hue != "values":
+        return
+    row = column.row()
+    row.active = colors_values(settings.look)
+    _draw_name(row, settings, "color_attribute", _active_mesh_object(context))
+
+
+def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:
+    """Return the active object if it is a mesh."""
+    obj = context.view_layer.objects.active
+    return obj if obj is not None and obj.type == "MESH" else None
+
+
+def _draw_name(
+    row: bpy.types.UILayout, owner: Any, name: str, mesh_object: bpy.types.Object | None
+) -> None:
+    """Draw a property that holds a name, with a search in `SEARCH_COLLECTIONS` of a mesh."""
+    if name in SEARCH_COLLECTIONS and mesh_object is not None:
+        row.prop_search(owner, name, mesh_object.data, SEARCH_COLLECTIONS[name])
+    else:
+        row.prop(owner, name)
+
+
 def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the properties of the scene and of the active object for the source of the tone."""
-    settings, obj = context.scene.rosy, context.view_layer.objects.active
-    mesh_object = obj if obj is not None and obj.type == "MESH" else None
+    settings, mesh_object = context.scene.rosy, _active_mesh_object(context)
     for name, source in TONE_SOURCE_OF_SETTING.items():
         owner = settings if hasattr(settings, name) else getattr(mesh_object, "rosy", None)
         if owner is None:
             continue
         row = column.row()
         row.active = settings.look.tone == source
-        if name in SEARCH_COLLECTIONS and mesh_object is not None:
-            row.prop_search(owner, name, mesh_object.data, SEARCH_COLLECTIONS[name])
-        elif name == "tone_image":
+        if name == "tone_image":
             row.template_ID(owner, name, open="image.open", text="Image")
         else:
-            row.prop(owner, name)
+            _draw_name(row, owner, name, mesh_object)
 
 
 CLASSES = (

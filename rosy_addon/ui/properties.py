@@ -364,6 +364,11 @@ class RosyScene(bpy.types.PropertyGroup):
         name="Skip Bad Vectors",
         description="Treat vectors that are not finite as undefined, instead of reporting an error",
     )
+    color_attribute: bpy.props.StringProperty(
+        name="Attribute",
+        description="Attribute on points, faces or corners of the meshes whose numbers are colors. "
+        "Objects without it are gray or have the color of the ink",
+    )
     tone_attribute: bpy.props.StringProperty(
         name="Attribute",
         description="Attribute on points, faces or corners of the meshes. Empty: the active color "

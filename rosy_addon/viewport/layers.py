@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ..compositor.look import Look
+from ..scene.color_inputs import color_attribute_of
 from ..scene.read_view import nonfinite_policy
 from ..scene.scene_cache import InstanceState, SceneCache
 from ..scene.tone_inputs import make_tone_request
@@ -33,7 +34,8 @@ class LayerState:
     stale : bool
         Whether they must be read again.
     request_key : hashable
-        The options with which they were read: whether with occluders, and with which tones.
+        The options with which they were read: whether with occluders, and with which tones and
+        numbers.
     is_starting : bool
         Whether they were not read completely yet. They are read in slices of time until then.
     """
@@ -82,13 +84,15 @@ class LayerStates:
             return self._layers[key]
         layer = self._layers[key]
         tone_request = make_tone_request(context.scene, look)
-        request_key = include_occluders, tone_request
+        color_attribute = color_attribute_of(context.scene, look)
+        request_key = include_occluders, tone_request, color_attribute
         if layer.stale or layer.request_key != request_key:
             layer.instances = layer.scene_cache.read(
                 depsgraph,
                 nonfinite_policy(context.scene),
                 include_occluders=include_occluders,
                 tone_request=tone_request,
+                color_attribute=color_attribute,
                 deadline=time.monotonic() + SLICE_SECONDS if layer.is_starting else math.inf,
             )
             layer.stale, layer.request_key = not layer.scene_cache.is_complete, request_key

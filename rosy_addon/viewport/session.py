@@ -16,6 +16,7 @@ from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_tex
 from ..gpu.select import select_viewport_renderer
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
+from ..scene.color_inputs import check_colored, color_attribute_of
 from ..scene.lights import read_lights
 from ..scene.look_properties import read_look
 from ..scene.scene_cache import InstanceState
@@ -295,7 +296,8 @@ class ViewportSession:
         Raises
         ------
         RosyError
-            If no field is visible and nothing else says why, or if the tone has no source.
+            If no field is visible and nothing else says why, or if the tone or the colors have no
+            source.
         """
         # Their dots are drawn over the picture.
         look = replace(read_look(context.scene.rosy), singularity_dots="none")
@@ -319,6 +321,10 @@ class ViewportSession:
             )
         tone_request = make_tone_request(context.scene, look)
         check_tones(tone_request, [(entry.instance.tone, entry.owner) for entry in with_field])
+        check_colored(
+            color_attribute_of(context.scene, look),
+            [(entry.instance.color_values, entry.owner) for entry in with_field],
+        )
         reference = self._references.current(context.scene, depsgraph, look)
         if look.tone == "picture" and reference is None:
             return visible, None  # not loaded yet

@@ -245,6 +245,8 @@ def tone(monkey):
     settings = bpy.context.scene.rosy
     settings.look.tone = monkey.pick(["light", "attribute", "image", "picture"])
     settings.tone_attribute = monkey.pick(["", "Occlusion", "position", "rosy", monkey.name()])
+    settings.look.hue = monkey.pick(["one", "families", "values"])
+    settings.color_attribute = monkey.pick(["", "Occlusion", "position", "rosy", monkey.name()])
     settings.tone_picture = monkey.pick(["", str(monkey.folder / "none.png"), "//x####.png"])
     obj = select_mesh(monkey)
     if obj is not None and obj.library is None:

@@ -86,6 +86,12 @@ def add_tone(value=0.5):
         mesh.update()
 
 
+def colors(scene):
+    look = scene.rosy.look
+    look.hue, look.values_high, scene.rosy.color_attribute = "values", 1.0, "dark"
+    add_tone()
+
+
 def tone_and_lights(scene):
     tone(scene)
     scene_lights(scene)
@@ -437,6 +443,10 @@ TABLE = {
     "shadows of a headlight": (put("rosy.look.shadows", True), None, ""),
     "preset": (preset, None, "the look was changed"),
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),
+    "colored attribute": (lambda scene: add_tone(0.2), colors, "field of 'Plain' was changed"),
+    "name of the colored attribute": (put("rosy.color_attribute", "light"), colors, None),
+    "range of colors": (put("rosy.look.values_low", 0.4), colors, "the look was changed"),
+    "range of colors unused": (put("rosy.look.values_low", 0.4), None, ""),
     "tone attribute unused": (lambda scene: add_tone(0.2), None, ""),
     "tone picture": (write_reference(0.6), tone_picture, "the picture of the tone was changed"),
     "tone picture of the same name": (write_reference(0.3), tone_picture, ""),

@@ -1,0 +1,151 @@
+"""Attributes whose numbers are colors: how they are read, their pictures, and mistakes."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.bake_texture import bake_texture
+from rosy.rosy_addon.color import map_colors
+from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.progress import run_to_completion
+from rosy.rosy_addon.scene.bake_records import list_bakes
+from rosy.rosy_addon.scene.color_inputs import color_attribute_of
+from rosy.rosy_addon.scene.read_view import read_turntable_task
+from rosy.rosy_addon.scene.scene_cache import SceneCache
+from rosy.rosy_addon.scene.scene_reader import read_scene
+from scenes import add_field, add_plane, pixels
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def set_values(mesh, values, domain="POINT", kind="FLOAT", name="Angle"):
+    attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
+    attribute.data.foreach_set("value", values)
+    mesh.update()
+
+
+@pytest.fixture
+def wall(scene, camera):
+    """A square across the view, of four faces."""
+    return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))
+
+
+def values_of(name, obj):
+    scene_data = read_scene(depsgraph(), color_attribute=name)
+    return scene_data.instances[scene_data.objects.index(obj)].color_values
+
+
+@pytest.mark.parametrize("kind", ["FLOAT", "INT"])
+@pytest.mark.parametrize(("domain", "count"), [("POINT", 9), ("FACE", 4), ("CORNER", 16)])
+def test_attributes_of_all_domains(wall, domain, count, kind):
+    mesh, numbers = wall.data, np.arange(count)
+    set_values(mesh, numbers, domain, kind)
+    corner_vertex = [loop.vertex_index for loop in mesh.loops]
+    element = {"POINT": corner_vertex, "FACE": np.repeat(range(4), 4), "CORNER": range(16)}[domain]
+    np.testing.assert_array_equal(values_of("Angle", wall), numbers[element])
+
+
+def test_numbers_that_are_not_finite_are_none(wall, monkey):
+    set_values(wall.data, [np.nan, np.inf, 2.0, 3.0], "FACE")
+    expected = np.repeat([np.nan, np.nan, 2.0, 3.0], 4)
+    np.testing.assert_array_equal(values_of("Angle", wall), expected)
+    assert values_of("Angle", monkey) is None
+
+
+def test_mistakes_are_one_line_that_lists_the_attributes(wall):
+    set_values(wall.data, np.zeros(4), "FACE", name="Error")
+    only = "'Error'$"
+    with pytest.raises(RosyError, match=f"^'Plane': there is no attribute 'Angel' .*only {only}"):
+        read_scene(depsgraph(), color_attribute="Angel")
+    with pytest.raises(RosyError, match=f"^'Plane': choose an attribute for the colors.*: {only}"):
+        read_scene(depsgraph(), color_attribute="")
+    with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected a number"):
+        read_scene(depsgraph(), color_attribute="rosy")
+
+
+def test_looks_that_color_an_attribute(scene):
+    scene.rosy.color_attribute = "Angle"
+    assert color_attribute_of(scene, Look()) is None
+    assert color_attribute_of(scene, Look(hue="values")) == "Angle"
+    assert color_attribute_of(scene, Look(hue="values", magnitude="both")) is None
+
+
+def test_a_live_view_reads_numbers_again_when_they_change(wall):
+    set_values(wall.data, np.zeros(9))
+    scene_cache = SceneCache()
+    first, second = (scene_cache.read(depsgraph(), color_attribute="Angle")[0] for _ in range(2))
+    assert second.version == first.version and not first.instance.color_values.any()
+    set_values(wall.data, np.ones(9))
+    scene_cache.invalidate({"Plane"})
+    (changed,) = scene_cache.read(depsgraph(), color_attribute="Angle")
+    assert changed.version != first.version and changed.instance.color_values.all()
+    (without,) = scene_cache.read(depsgraph())
+    assert without.instance.color_values is None
+
+
+@pytest.fixture
+def colored(scene, wall):
+    """The wall with a number on each face, drawn in flat colors."""
+    set_values(wall.data, [0.0, 1.0, 2.0, np.nan], "FACE")
+    look = scene.rosy.look
+    look.hue, look.gain, look.shading, scene.rosy.color_attribute = "values", 0.0, 0.0, "Angle"
+    return wall
+
+
+def colors_in(rgba, count):
+    """Return the most frequent opaque colors of a picture, with 8 bits."""
+    opaque = rgba.reshape(-1, 4)[rgba[..., 3].ravel() == 1][:, :3]
+    found, counts = np.unique(np.rint(255 * opaque).astype(int), axis=0, return_counts=True)
+    return {tuple(map(int, color)) for color in found[np.argsort(counts)[-count:]]}
+
+
+EXPECTED = {
+    *(tuple(map(int, np.rint(255 * color))) for color in map_colors([0.0, 0.5, 1.0], "viridis")),
+    (128, 128, 128),
+}
+
+
+def test_pictures_and_turntables(scene, colored):
+    (result,) = bake(scene)
+    assert colors_in(pixels(result.image), 4) == EXPECTED
+    task = read_turntable_task(scene, depsgraph(), colored, Look(hue="values"))
+    instance, _ = run_to_completion(task)
+    assert np.isfinite(instance.color_values).sum() == 12
+
+
+def test_textures(scene, colored):
+    mesh = colored.data
+    layer = mesh.uv_layers.new(name="UVMap")
+    corners = [mesh.vertices[loop.vertex_index].co for loop in mesh.loops]
+    layer.uv.foreach_set(
+        "vector", np.array([((co.x + 1) / 2, (co.z + 1) / 2) for co in corners]).ravel()
+    )
+    scene.rosy.texture_size, scene.rosy.texture_margin = 64, 0
+    (result,) = bake_texture(scene, [colored])
+    assert colors_in(pixels(result.image), 4) >= EXPECTED - {(128, 128, 128)}
+    (info,) = list_bakes(scene)
+    assert info.stale_reason == ""
+    set_values(colored.data, [0.0, 1.5, 2.0, 0.0], "FACE")
+    (info,) = list_bakes(scene)
+    assert "'Plane' was changed" in info.stale_reason
+    bake_texture(scene, [colored])
+    scene.rosy.color_attribute = ""
+    with pytest.raises(RosyError, match="choose an attribute"):
+        bake_texture(scene, [colored])
+    # The thresholds of hatching have no color.
+    scene.rosy.look.ink = "hatch"
+    bake_texture(scene, [colored])
+
+
+def test_relit_hatching_needs_no_numbers(scene, colored):
+    scene.rosy.color_attribute = "none"
+    scene.rosy.look.ink = "hatch"
+    with pytest.raises(RosyError, match="no attribute 'none'"):
+        bake(scene)
+    scene.rosy.relight = True
+    bake(scene)

@@ -156,6 +156,7 @@ def render(
     size: tuple[int, int] = DEFAULT_SIZE,
     orthographic: bool = False,
     preset: str | os.PathLike[str] | None = None,
+    color_values: str | ArrayLike | None = None,
     tone_values: str | ArrayLike | None = None,
     tone_image: str | os.PathLike[str] | ArrayLike | Picture | None = None,
     tone_picture: str | os.PathLike[str] | ArrayLike | Picture | None = None,
@@ -178,6 +179,11 @@ def render(
         Orthographic projection instead of perspective.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
+    color_values : str or (F,), (V,) or (C,) array_like, optional
+        Numbers of the faces, vertices or corners, such as the angle between two fields, which the hue of
+        the lines shows through the `colour_map`; NaN where there is none. A string names an array of
+        `Surface.face_data` or `Surface.vertex_data`. If there are as many faces as vertices, they are of
+        faces. The settings `values_low` and `values_high` are the ends of the color map.
     tone_values : str or (V,) or (C,) array_like, optional
         For hatching: tones of the vertices or corners, linear, 0 is dark and 1 is light, such as
         `ambient_occlusion`. A string names an array of `Surface.vertex_data`; "Color" is the
@@ -212,12 +218,13 @@ def render(
     <Picture: 64 x 64 pixels>
     """
     sources = {"attribute": tone_values, "image": tone_image, "picture": tone_picture}
-    look = picture_look(surface.name, preset, settings, sources)
+    look = picture_look(surface.name, preset, settings, sources, color_values is not None)
     tone = _surface_tone(surface, tone_values, tone_image)
+    numbers = corner_numbers(surface, color_values)
     reference = None if tone_picture is None else _image_luminance(tone_picture)
     name = str(tone_picture) if isinstance(tone_picture, (str, os.PathLike)) else "tone_picture"
     picture_view = mesh_view(
-        upright_instance(surface, field, tone),
+        upright_instance(surface, field, tone, numbers),
         look,
         view,
         check_size(*size),
@@ -241,6 +248,7 @@ def turntable(
     size: tuple[int, int] = DEFAULT_VIDEO_SIZE,
     orthographic: bool = False,
     preset: str | os.PathLike[str] | None = None,
+    color_values: str | ArrayLike | None = None,
     tone_values: str | ArrayLike | None = None,
     tone_image: str | os.PathLike[str] | ArrayLike | Picture | None = None,
     workers: int = 0,
@@ -252,7 +260,7 @@ def turntable(
 
     Parameters
     ----------
-    surface, field, size, orthographic, preset, tone_values, tone_image, workers, **settings
+    surface, field, size, orthographic, preset, color_values, tone_values, tone_image, workers, **settings
         As for `render`.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
@@ -291,8 +299,9 @@ def turntable(
     if path.suffix.lower() == ".mp4" and encode is None:
         encode = find_ffmpeg()
     sources = {"attribute": tone_values, "image": tone_image}
-    look = picture_look(surface.name, preset, settings, sources)
-    instance = upright_instance(surface, field, _surface_tone(surface, tone_values, tone_image))
+    look = picture_look(surface.name, preset, settings, sources, color_values is not None)
+    tone = _surface_tone(surface, tone_values, tone_image)
+    instance = upright_instance(surface, field, tone, corner_numbers(surface, color_values))
     views = turntable_views(
         instance, look, pictures, check_size(*size), view, perspective=not orthographic
     )
@@ -308,6 +317,7 @@ def picture_look(
     preset: str | os.PathLike[str] | None,
     settings: Mapping[str, Any],
     tone_sources: Mapping[str, Any],
+    has_color_values: bool = False,
 ) -> Look:
     """Return the look of a picture of a surface that is not in a scene.
 
@@ -321,6 +331,8 @@ def picture_look(
         Settings of `Look`, after the preset.
     tone_sources : mapping
         The sources of the tone by the values of `Look.tone`; None where there is none.
+    has_color_values : bool
+        Whether there are numbers for the hue to show.
 
     Raises
     ------
@@ -336,6 +348,7 @@ def picture_look(
     given = [source for source, value in tone_sources.items() if value is not None]
     if len(given) > 1:
         raise RosyError(f"{name}: choose one source of the tone, {' or '.join(given)}")
+    look = replace(look, hue="values") if has_color_values else look
     return replace(look, tone=given[0]) if given else look
 
 
@@ -358,12 +371,75 @@ def find_ffmpeg() -> Encoder | None:
 
 
 def upright_instance(
-    surface: Surface, field: Field | None, tone: SurfaceTone | None
+    surface: Surface,
+    field: Field | None,
+    tone: SurfaceTone | None,
+    color_values: NDArray[np.float32] | None = None,
 ) -> MeshInstance:
     """Return a surface with its field in world space, upright."""
     field = form(surface) if field is None else field
     check_same_surface(surface, field)
-    return mesh_instance(surface.mesh, field.rosy, surface.up, tone)
+    return mesh_instance(surface.mesh, field.rosy, surface.up, tone, color_values)
+
+
+def corner_numbers(
+    surface: Surface, color_values: str | ArrayLike | None
+) -> NDArray[np.float32] | None:
+    """Return the numbers for the color map at the corners of a surface; NaN where they are not finite.
+
+    Parameters
+    ----------
+    surface : Surface
+    color_values : str or (F,), (V,) or (C,) array_like or None
+        As for `render`.
+
+    Returns
+    -------
+    (C,) float32 ndarray or None
+
+    Raises
+    ------
+    RosyError
+        If they are not one number for each face, vertex or corner, or no array has the name.
+    """
+    if color_values is None:
+        return None
+    mesh = surface.mesh
+    if isinstance(color_values, str):
+        color_values = _named_numbers(surface, color_values)
+    try:
+        array = np.asarray(color_values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RosyError(f"{surface.name}: color_values must be numbers") from None
+    counts = surface.face_count, len(surface.vertices), len(mesh.corner_vertex)
+    if array.ndim != 1 or len(array) not in counts:
+        raise RosyError(
+            f"{surface.name}: color_values must be {counts[0]:,} numbers, one for each face, "
+            f"{counts[1]:,}, one for each vertex, or {counts[2]:,}, one for each corner, not an array of "
+            f"shape {array.shape}"
+        )
+    if len(array) == counts[0]:
+        array = array[mesh.corner_face]
+    elif len(array) == counts[1]:
+        array = array[mesh.corner_vertex]
+    numbers: NDArray[np.float32] = array.astype(np.float32)
+    numbers[~np.isfinite(numbers)] = np.nan
+    return numbers
+
+
+def _named_numbers(surface: Surface, name: str) -> NDArray[Any]:
+    """Return an array of the faces or of the vertices."""
+    for data in (surface.face_data, surface.vertex_data):
+        if name in data:
+            return data[name]
+    known = dict.fromkeys([*surface.face_data, *surface.vertex_data])
+    if not known:
+        raise RosyError(
+            f"{surface.name}: has no attributes of faces or vertices; of mesh files, only .ply files have "
+            "any"
+        )
+    available = ", ".join(f"'{key}'" for key in known)
+    raise RosyError(f"{surface.name}: there is no attribute '{name}', only: {available}")
 
 
 def _surface_tone(

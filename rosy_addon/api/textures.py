@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..color import to_linear
-from ..compositor.look import Look
+from ..compositor.look import Look, is_hatched
 from ..compositor.shading import Light
 from ..errors import RosyError
 from ..field.frames import unit_direction
@@ -26,7 +27,7 @@ from ..surface_texture.draw import (
 )
 from .field import Field, warn
 from .generators import uv_map
-from .pictures import Picture, upright_instance
+from .pictures import Picture, corner_numbers, upright_instance
 from .surface import Surface
 
 #: What stands for the number of the tile in the name of a file, as in Blender.
@@ -111,6 +112,7 @@ def texture(
     light_direction: ArrayLike | None = None,
     content: str = "look",
     preset: str | os.PathLike[str] | None = None,
+    color_values: str | ArrayLike | None = None,
     **settings: Any,
 ) -> Texture:
     """Draw a field as a texture for the UV map of a surface.
@@ -141,6 +143,8 @@ def texture(
         anisotropy map of glTF, along u and v in a flow map. Blue is 1, and 0 where the field is undefined.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
+    color_values : str or (F,), (V,) or (C,) array_like, optional
+        Numbers that the hue of the streaks shows, as for `render`. Hatching shows none.
     **settings
         Settings of the look, after the preset: ``grain=3, seed=3``. A pixel is that of a square with the
         area of the surface and 1024 pixels on each side, whatever the size of the texture. With
@@ -158,8 +162,8 @@ def texture(
     Raises
     ------
     RosyError
-        If there is no UV map, it cannot be drawn, a setting or the preset is not possible, or there is
-        not enough memory.
+        If there is no UV map, it cannot be drawn, a setting, the preset or the colors are not possible,
+        or there is not enough memory.
 
     Examples
     --------
@@ -172,12 +176,12 @@ def texture(
     >>> rf.texture(square, rf.along_axis(square, (1, 1, 0), degree=2), size=64)
     <Texture: 64 x 64 texels>
     """
-    look = texture_look(preset, settings)
+    look = texture_look(preset, settings, color_values is not None)
     check_texture_size(size, margin)
     if content not in CONTENTS:
         raise RosyError(f"content must be one of {', '.join(CONTENTS)}, not '{content}'")
     uv = uv_map(surface)
-    instance = upright_instance(surface, field, None)
+    instance = upright_instance(surface, field, None, corner_numbers(surface, color_values))
     task = draw_texture_task(
         instance,
         uv,
@@ -216,13 +220,20 @@ def _lamp(light_direction: ArrayLike, instance: MeshInstance) -> Light:
     return Light("sun", world / np.linalg.norm(world), np.ones(3), 1.0)
 
 
-def texture_look(preset: str | os.PathLike[str] | None, settings: dict[str, Any]) -> Look:
+def texture_look(
+    preset: str | os.PathLike[str] | None,
+    settings: dict[str, Any],
+    has_color_values: bool = False,
+) -> Look:
     """Return the look of a texture.
 
     Raises
     ------
     RosyError
-        If a setting is not possible.
+        If a setting is not possible, or there are numbers to show as hues, and the look has ink.
     """
     look = Look() if preset is None else load_preset(Path(preset), default_user_folder()).look
-    return look.with_settings(dict(settings))
+    look = look.with_settings(dict(settings))
+    if has_color_values and is_hatched(look):
+        raise RosyError("textures of hatching show no numbers as colors: choose the ink 'soft'")
+    return replace(look, hue="values") if has_color_values else look

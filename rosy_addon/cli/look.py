@@ -1,4 +1,4 @@
-"""Options of the look of a picture, and of the source of its tone."""
+"""Options of the look of a picture, and of the sources of its colors and its tone."""
 
 from __future__ import annotations
 
@@ -29,6 +29,16 @@ def add_look_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME=VALUE",
         help=f"one setting of the look, after the preset: {', '.join(settings_of(Look))}",
+    )
+
+
+def add_color_option(parser: argparse.ArgumentParser) -> None:
+    """Add --color-values."""
+    parser.add_argument(
+        "--color-values",
+        metavar="NAME",
+        help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
+        "property of a .ply file",
     )
 
 
@@ -82,12 +92,13 @@ def picture_arguments(options: argparse.Namespace) -> dict[str, Any]:
         raise RosyError(f"give either {given[0]} or {given[1]}, not both")
     preset, settings = requested_preset(options), requested_settings(options)
     # Mistakes are reported before the mesh is read.
-    picture_look(str(options.mesh), preset, settings, sources)
+    picture_look(str(options.mesh), preset, settings, sources, options.color_values is not None)
     arguments = {
         "view": options.view,
         "size": requested_size(options),
         "orthographic": options.ortho,
         "preset": preset,
+        "color_values": options.color_values,
         "tone_values": sources["attribute"],
         "tone_image": sources["image"],
         "workers": options.workers,

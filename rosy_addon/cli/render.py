@@ -12,7 +12,7 @@ from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIDEO_SIZE, find_ffmpeg
 from ..errors import RosyError
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
 from .extras import Extras
-from .look import add_look_options, add_tone_options, picture_arguments
+from .look import add_color_option, add_look_options, add_tone_options, picture_arguments
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import (
     add_subcommand,
@@ -33,6 +33,7 @@ def add_render_command(subparsers: Any, extras: Extras) -> None:
     add_view_options(parser, DEFAULT_SIZE)
     add_workers_option(parser)
     add_look_options(parser)
+    add_color_option(parser)
     add_tone_options(parser)
     parser.add_argument(
         "--tone-picture",
@@ -67,6 +68,7 @@ def add_turntable_command(subparsers: Any, extras: Extras) -> None:
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
     add_workers_option(parser)
     add_look_options(parser)
+    add_color_option(parser)
     add_tone_options(parser)
 
 

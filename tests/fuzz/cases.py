@@ -265,7 +265,7 @@ def _look_case(rng: Generator, folder: Path) -> Case:
 
 
 def _tone_case(rng: Generator, folder: Path) -> Case:
-    """A tone from an image, a picture or an attribute."""
+    """A tone from an image, a picture or an attribute, and colors from an attribute."""
     mesh = random_mesh(rng, faults=0)
     kind = ("image", "picture", "attribute")[rng.integers(3)]
     suffix = {"image": ".obj", "picture": "", "attribute": ".ply"}[kind]
@@ -281,6 +281,8 @@ def _tone_case(rng: Generator, folder: Path) -> Case:
         data = png_bytes(rng, (width, height) if fits else None)
         (folder / "tone.png").write_bytes(damaged(rng, data) if rng.random() < 0.15 else data)
         options += ["tone.png", *([f"--size={width}x{height}"] if fits else [])]
+    if rng.random() < 0.3:
+        options.append(f"--color-values={('red', 'x', 'quality', '')[rng.integers(4)]}")
     command = "turntable" if kind != "picture" and rng.random() < 0.1 else "render"
     return _command(rng, folder, [name], options, command=command, rate=0.06)
 

@@ -18,7 +18,16 @@ from .preset_files import setting_value
 #: Options that `random_options` does not choose: cases give these files and names themselves.
 FILE_OPTIONS = {
     *("help", "mesh", "field", "output", "strokes", "guides", "field_mesh", "against", "scene"),
-    *("tone_image", "tone_picture", "tone_attribute", "uv", "object", "camera", "frames"),
+    *(
+        "tone_image",
+        "tone_picture",
+        "tone_attribute",
+        "color_values",
+        "uv",
+        "object",
+        "camera",
+        "frames",
+    ),
     *("singularities", "all_cameras", "out", "save", "jobs", "scheduler"),
 }
 

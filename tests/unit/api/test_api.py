@@ -14,6 +14,7 @@ from shapes import icosphere, torus
 import rosy_addon as rf
 from rosy_addon import api
 from rosy_addon.api.mesh_objects import MeshArrays
+from rosy_addon.api.pictures import corner_numbers
 from rosy_addon.cli.parser import main
 from rosy_addon.field.formats.polygons import offsets_from_sizes
 
@@ -232,6 +233,33 @@ def test_the_command_draws_the_same_picture(tmp_path):
     same = rf.Surface(surface.vertices, surface.faces, up="y")
     again = rf.render(same, rf.smoothest(same), size=(64, 48), preset="plaid", seed=3)
     assert again._repr_png_() == picture._repr_png_()
+
+
+def test_numbers_as_colors(error_of):
+    """Of faces, vertices and corners; those of faces if there are as many of both."""
+    quad = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    tetrahedron = rf.Surface(
+        [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]],
+        [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]],
+    )
+    for surface, numbers, expected in (
+        (quad, [1, 2], [1, 1, 1, 2, 2, 2]),
+        (quad, [1, 2, np.nan, np.inf], [1, 2, np.nan, 1, np.nan, np.nan]),
+        (quad, range(6), range(6)),
+        (tetrahedron, range(4), np.repeat(range(4), 3)),
+    ):
+        np.testing.assert_array_equal(corner_numbers(surface, numbers), expected)
+    keywords = {"view": (0, 90), "size": (16, 16), "orthographic": True, "gain": 0.0}
+    colors = {"color_values": [0, 1], "colour_map": "grey", "shading": 0.0}
+    picture = np.asarray(rf.render(quad, **keywords, **colors))
+    assert set(np.unique(picture[picture[..., 3] == 255][:, :3])) >= {17, 255}
+    for wrong, expected in (
+        ({"color_values": [1, 2, 3]}, "surface: color_values must be 2 numbers"),
+        ({"color_values": "angle"}, "surface: has no attributes of faces or vertices"),
+        ({"color_values": ["a", "b"]}, "surface: color_values must be numbers"),
+        ({"hue": "values"}, "hue 'values' needs numbers"),
+    ):
+        assert expected in error_of(rf.render, quad, **keywords, **wrong)
 
 
 def test_sources_of_the_tone(sphere, field, error_of):

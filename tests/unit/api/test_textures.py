@@ -43,6 +43,19 @@ def test_the_command_draws_the_same_texture(tmp_path, words, options):
     assert (read_png(out)[..., 3] == 1).all()
 
 
+def test_numbers_as_colors(error_of):
+    """u, from 0 to 1 between the borders of the chart, is the gray of the texels."""
+    square = rf.Surface(*SQUARE, name="square", uv=UV)
+    flat = {"gain": 0.0, "colour_map": "grey", "values_high": 1.0, "margin": 0, "size": 64}
+    texture = rf.texture(square, rf.along_uv(square, 2), color_values=square.vertices[:, 0], **flat)
+    gray = np.asarray(texture.tiles[1001])[32, 4:60, 0]
+    expected = ((np.arange(4, 60) + 0.5) / 64 - 0.05) / 0.9
+    np.testing.assert_allclose(gray, 17 + 238 * expected, atol=1)
+    assert "'values' needs numbers" in error_of(rf.texture, square, hue="values")
+    hatched = {"color_values": [1.0], "preset": "engraving"}
+    assert "choose the ink 'soft'" in error_of(rf.texture, square, **hatched)
+
+
 def test_tiles_have_files_of_their_own(tmp_path, error_of):
     square = rf.Surface(*SQUARE, name="square", uv=UV * [2, 1])
     texture = rf.texture(square, rf.along_uv(square, 2), size=32, udim=True)

@@ -512,6 +512,17 @@ def test_tones_of_vertices(painted, tmp_path):
     assert done == 0
 
 
+def test_colors_of_vertices(painted, tmp_path):
+    out = tmp_path / "a.png"
+    words = ["--generate", "axis", "--color-values", "cavity", "--set", "colour_map=grey"]
+    flat = ["--set", "gain=0", "--set", "shading=0", "--size", "128x128"]
+    assert main(["render", str(painted), *words, *flat, "-o", str(out), "--view", "0,0"]) == 0
+    left, right = halves_of(out)
+    assert left == pytest.approx(0.0056, abs=0.001) and right == pytest.approx(1, abs=0.001)
+    words[3] = "Cavity"
+    assert_refused(rosy("render", painted, *words, "-o", out), "'Cavity'", "'cavity'", "ball.ply")
+
+
 @pytest.mark.slow
 def test_tones_of_pictures_and_images(sphere, tmp_path):
     picture = np.ones((64, 64, 4), dtype=np.float32)

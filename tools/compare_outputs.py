@@ -131,6 +131,8 @@ RENDERS = {
     "magnitude-length-magma": "@bumpy.ply magnitude=length colour_map=magma",
     "magnitude-both-magma": "@torus.obj @member.rosy magnitude=both colour_map=magma",
     "magnitude-grey-range": "@bumpy.ply magnitude=colour colour_map=grey magnitude_range=0.5",
+    "values": "@bumpy.ply --color-values weight",
+    "values-hatch": f"@bumpy.ply --color-values weight {HATCH} values_low=1 values_high=-1",
     "lamp-shadows": "@pair.stl light=lamp shadows=on shading=1 --generate smoothest",
     "tone-colour": f"@bumpy.ply --tone-attribute Color {HATCH}",
     "tone-number": f"@bumpy.ply --tone-attribute weight {HATCH} tone_black=-0.5 tone_white=0.8",
@@ -328,6 +330,8 @@ OPERATORS = {
     "rosy.look.light = 'scene'; ops.bake(); dump_images()",
     "bake-preset": "ops.preset_apply(preset='woodcut'); ops.bake(); dump_images()",
     "bake-tone-attribute": "rosy.look.tone = 'attribute'; rosy.look.ink = 'hatch'; ops.bake(); "
+    "dump_images()",
+    "bake-values": "rosy.look.hue = 'values'; rosy.color_attribute = 'shade'; ops.bake(); "
     "dump_images()",
     "bake-tone-image": "rosy.look.tone = 'image'; rosy.look.tone_lit = True; "
     "ring.rosy.tone_image = bpy.data.images.load(f'{os.getcwd()}/@tone.png'); ops.bake(); "

@@ -656,7 +656,7 @@ def run_child(tree: Path, outputs: Path, lane: str, names: Sequence[str]) -> Non
     cases = {case.name: case for case in all_cases()}
     sys.path.insert(0, str(tree))
     extension = None if lane == "numpy" else load_extension(tree)
-    main = importlib.import_module("rosy_addon.cli" if extension is None else "rosy.rosy_addon.cli")
+    main = importlib.import_module(f"{'rosy.' * (extension is not None)}rosy_addon.cli.parser")
     assert Path(main.__file__).is_relative_to(tree)
     for name in names:
         folder = outputs / name

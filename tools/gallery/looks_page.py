@@ -6,9 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
+from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.curvature import curvature_field
+from rosy_addon.field.generate import generate
 from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
 from rosy_addon.settings import Choice, Color, Number, Setting, Switch, settings_of
 
 from .figure_11 import smoothed_a_little
@@ -81,6 +86,33 @@ OWN = (
     "`read_preset` and `write_preset`.",
 )
 
+#: Paragraphs about numbers as colors.
+NUMBERS = (
+    "`hue` with `values` shows numbers on the surface through the color map: the angle between two "
+    "fields, a curvature, an error. In Blender, choose *Look > Color > Hue: Values* and the "
+    "*Attribute*: numbers on points, faces or corners; of colors, the luminance. Scripts give "
+    "`color_values` to `render`, `turntable` and `texture`, and the commands `render` and `turntable` "
+    "have `--color-values NAME`, for an array of the file:",
+    """```python
+import numpy as np
+import rosyfields as rf
+
+surface = rf.Surface("spot.obj")
+field, other = rf.form(surface, 4), rf.curvature(surface, 4)
+degrees = np.degrees(field.difference(other).angle)
+rf.render(surface, field, color_values=degrees, values_high=45.0).save("spot.png")
+```""",
+    "- Numbers of faces are constant on each face; those of points and corners are interpolated.\n"
+    "- `values_low` and `values_high` are the numbers at the bottom and at the top of `colour_map`. If "
+    "both are 0, they are the lowest and the highest number on all objects with a field, whether the "
+    "camera sees them or not, so that pictures from several sides have the same colors. If the lower "
+    "end is the greater number, the map is inverted.\n"
+    "- Where there is no number (NaN, or another object without the attribute), streaks are gray, and "
+    "hatching has the color of its ink.\n"
+    "- `magnitude` with `colour` or `both` has precedence. Hatching of [textures](textures.md) and "
+    "pictures with *Output > Relight* have the colors of their inks.",
+)
+
 
 def write() -> None:
     """Draw and write the page."""
@@ -97,6 +129,9 @@ def write() -> None:
         *OWN,
         "## What the main settings do",
         *(_setting(name, values, text) for name, (values, text) in SHOWN.items()),
+        "## Numbers as colors",
+        _numbers(),
+        *NUMBERS,
         "## All settings",
         _table(),
     ]
@@ -121,6 +156,34 @@ def _presets() -> str:
     lines = [f"![Suzanne in every preset](images/{path.name})", ""]
     lines += [f"- **{preset.name}**: {preset.description}." for preset in presets]
     return "\n".join(lines)
+
+
+def _numbers() -> str:
+    """Draw Suzanne with the angle between two fields, and with a height that is not known everywhere."""
+    monkey = suzanne()
+    field, other = generate(monkey, "form", 4), curvature_field(monkey, 4)
+    angle = np.degrees(angle_errors(monkey, field, other))[monkey.corner_face]
+    height = monkey.vertices[monkey.corner_vertex, 2]
+    known = np.where(monkey.vertices[monkey.corner_vertex, 0] < 0.2, height, np.nan)
+    panels = []
+    for text, preset, values, settings in (
+        ("angle to the curvature field", "default", angle, {"values_high": 45.0}),
+        ("height, magma, as an engraving", "engraving", height, {"colour_map": "magma"}),
+        ("height, on the left only", "default", known, {}),
+    ):
+        look = load_preset(preset).look.with_settings(
+            {"supersampling": 2, "hue": "values", **settings}
+        )
+        instance = MeshInstance(monkey, np.eye(4), field, color_values=values.astype(np.float32))
+        camera = view(monkey, (-26, 8), (SIDE, SIDE), look.supersampling)
+        rgba = compose(project([instance], camera, look.display), look).rgba
+        panels.append(Panel(display(rgba), text))
+    path = IMAGES / "looks-values.png"
+    save(sheet([panels]), path)
+    return (
+        "![Suzanne, colored by the angle between two fields, by height, and by height on one side]"
+        f"(images/{path.name})"
+    )
 
 
 def _pair(p: np.ndarray) -> np.ndarray:

@@ -21,9 +21,6 @@ from .uniforms import (
     tone_uniforms,
 )
 
-#: Largest scale of numbers in shaders, where products with it must be finite.
-MAX_VALUES_SCALE = 1e30
-
 
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel, as ``frame.textures["tones"]``.
@@ -37,7 +34,7 @@ def render_target_tones(frame: Frame) -> None:
     shared_uniforms = {
         **tone_uniforms(look, frame.camera, reference),
         "values_bottom": low,
-        "values_scale": min(scale, MAX_VALUES_SCALE),
+        "values_scale": scale,
     }
     shader = passes.TONE_AND_VALUES if colors_values(look) else passes.TONE
     reference_atlas = None if reference is None else frame.resources.reference_atlas(reference)

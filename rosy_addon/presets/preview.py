@@ -29,6 +29,7 @@ BACKGROUND = "#292929"
 def draw_preview(look: Look) -> np.ndarray:
     """Draw a trefoil knot in a look, with a field along its principal curvatures.
 
+    Its tone is the light, and the numbers that are colored run from left to right: a look has none.
     This takes about a second for any look, because expensive settings are reduced.
 
     Parameters
@@ -44,12 +45,14 @@ def draw_preview(look: Look) -> np.ndarray:
     surface, field = _trefoil_mesh()
     render_size = PREVIEW_SIZE * look.supersampling
     camera = orbit_camera(surface, *VIEW_ANGLES, render_size, render_size, margin=0.03)
-    gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera, look.display)
+    across = surface.vertices[surface.corner_vertex, 0].astype(np.float32)
+    instance = MeshInstance(surface, np.eye(4), field, color_values=across)
+    gbuffer = project([instance], camera, look.display)
     return _over_background(compose(gbuffer, look).rgba, look)
 
 
 def _fast_look(look: Look) -> Look:
-    """Reduce settings of a look that take long and are hardly visible in a small picture.
+    """Reduce settings that take long and are hardly visible in a small picture, or need a scene.
 
     Brute force is replaced by the method "sheets", which follows the same streamlines. The method
     "members" is drawn without supersampling, as its cost is proportional to the number of samples.
@@ -60,6 +63,9 @@ def _fast_look(look: Look) -> Look:
             "method": "sheets" if look.method == "brute" else look.method,
             "supersampling": 1 if look.method == "members" else 2,
             "unit": "pixels",
+            "tone": "light",
+            "values_low": 0.0,
+            "values_high": 0.0,
             "length": min(look.length, PREVIEW_SIZE // 2),
             "grain": min(look.grain, PREVIEW_SIZE / 2),
             "high_pass": min(look.high_pass, PREVIEW_SIZE / 4),

@@ -313,6 +313,15 @@ def test_a_saved_preset_is_found(user_folder):
         )
 
 
+def test_previews_of_looks_that_need_a_scene():
+    """The tone is the light. The numbers run from left to right, through the whole map."""
+    look = Look(hue="values", values_low=90.0, tone="attribute", shading=0.0)
+    colors = draw_preview(look).reshape(-1, 4)[:, :3]
+    is_purple = (colors[:, 2] > 2 * colors[:, 1]) & (colors[:, 0] > colors[:, 1])
+    is_yellow = (colors[:, 1] > 3 * colors[:, 2]) & (colors[:, 0] > 0.3 * colors[:, 1])
+    assert is_purple.sum() > 200 and is_yellow.sum() > 200
+
+
 def test_presets_are_replaced_only_on_request(user_folder, blank_previews, error_of):
     save_preset(MINE, user_folder)
     other = MINE._replace(name="my INK", look=Look(length=7))

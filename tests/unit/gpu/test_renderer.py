@@ -886,6 +886,10 @@ COLORED = {
     "soft": {},
     "hatched": {"ink": "hatch", "grain": 3.0, "outline": 2.0},
     "light ink": {"ink": "hatch", "ink_colour": "#f0f0e0", "paper_colour": "#101018", "layers": 1},
+    "inks that are nearly paper": {
+        **{"ink": "hatch", "shading": 0.95, "light": "lamp", "grain": 3.0, "values_low": -1.0},
+        **{"values_high": 1.0, "colour_map": "grey"},
+    },
     "a range, inverted": {"values_low": 0.8, "values_high": 0.2, "colour_map": "magma"},
     "colored noise": {"noise": "colour"},
     "with tones": {"tone": "attribute", "tone_gamma": 1.5},

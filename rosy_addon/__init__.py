@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .api import (
+        Comparison,
         Difference,
         Drawing,
         Field,
@@ -42,8 +43,10 @@ if TYPE_CHECKING:
         along_axis,
         along_uv,
         ambient_occlusion,
+        compare,
         curvature,
         features,
+        figure,
         form,
         from_angles,
         from_array,
@@ -56,6 +59,7 @@ if TYPE_CHECKING:
         prescribed,
         read_field,
         render,
+        save_figures,
         smoothest,
         strokes,
         texture,
@@ -63,6 +67,7 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
+    "Comparison",
     "Difference",
     "Drawing",
     "Field",
@@ -75,8 +80,10 @@ __all__ = [
     "along_axis",
     "along_uv",
     "ambient_occlusion",
+    "compare",
     "curvature",
     "features",
+    "figure",
     "form",
     "from_angles",
     "from_array",
@@ -89,6 +96,7 @@ __all__ = [
     "prescribed",
     "read_field",
     "render",
+    "save_figures",
     "smoothest",
     "strokes",
     "texture",

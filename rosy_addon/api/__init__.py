@@ -6,11 +6,14 @@ Angles are in radians, except those of a view, which are in degrees.
     field        `Field`: a field on a surface; fields from arrays and files
     generators   fields that are computed
     pictures     pictures and turntables
+    comparison   how fields differ
+    figures      fields side by side, with their keys
     drawings     strokes
     textures     textures
 """
 
 from ..errors import RosyError, RosyWarning
+from .comparison import Comparison, compare
 from .drawings import Drawing, strokes
 from .field import (
     Difference,
@@ -24,6 +27,7 @@ from .field import (
     from_vectors,
     read_field,
 )
+from .figures import figure, save_figures
 from .generators import (
     along_axis,
     along_uv,
@@ -39,6 +43,7 @@ from .surface import Surface
 from .textures import Texture, texture
 
 __all__ = [
+    "Comparison",
     "Difference",
     "Drawing",
     "Field",
@@ -51,8 +56,10 @@ __all__ = [
     "along_axis",
     "along_uv",
     "ambient_occlusion",
+    "compare",
     "curvature",
     "features",
+    "figure",
     "form",
     "from_angles",
     "from_array",
@@ -65,6 +72,7 @@ __all__ = [
     "prescribed",
     "read_field",
     "render",
+    "save_figures",
     "smoothest",
     "strokes",
     "texture",

@@ -50,8 +50,12 @@ class Difference:
         either field is undefined.
     mean, rms : float
         Of the angle in radians, weighted by area.
+    p95 : float
+        The largest angle on 95 % of the area, radians.
     max : float
         Radians.
+    worst_face : int
+        The face of the largest angle; -1 if there is nothing to compare.
     compared : float
         Fraction of the faces on which both fields are defined.
     """
@@ -59,7 +63,9 @@ class Difference:
     angle: NDArray[np.float64]
     mean: float
     rms: float
+    p95: float
     max: float
+    worst_face: int
     compared: float
 
 
@@ -260,7 +266,8 @@ class Field:
     def difference(self, other: Field) -> Difference:
         """Return the angle to another field of the same degree on the same surface.
 
-        Two smoothest fields of a closed surface may differ by a constant angle, which costs no energy.
+        If the directions of one of them are not rotationally symmetric, it is the mean angle between the
+        directions of their best matching, and may be larger than pi/N. Two smoothest fields of a closed surface may differ by a constant angle, which costs no energy.
 
         Raises
         ------
@@ -269,9 +276,7 @@ class Field:
         """
         check_same_surface(self.surface, other)
         angle = angle_errors(self.surface.mesh, self.rosy, other.rosy)
-        facts = error_statistics(self.surface.mesh, angle)
-        mean, rms, largest = (float(np.radians(facts[name])) for name in ("mean", "rms", "max"))
-        return Difference(angle, mean, rms, largest, facts["compared"])
+        return Difference(angle, **error_statistics(self.surface.mesh, angle)._asdict())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the field to a file.

@@ -10,6 +10,7 @@ from typing import TextIO
 
 from ..errors import REPORTED_ERRORS, error_text
 from .bake import add_bake_command
+from .compare import add_compare_command
 from .extras import NO_EXTRAS, Extras
 from .field import add_field_command, add_info_command
 from .presets import add_presets_command
@@ -94,6 +95,7 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentPar
         add_texture_command,
         add_field_command,
         add_info_command,
+        add_compare_command,
     ):
         add_command(subparsers, extras)
     for add_command in (*extras.add_commands, add_presets_command):

@@ -12,6 +12,17 @@ from .options import float_tuple, parse_size
 
 def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:
     """Add the options of the view. `size` is the default of --size."""
+    add_direction_options(parser)
+    parser.add_argument(
+        "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"
+    )
+    parser.add_argument(
+        "--ortho", action="store_true", help="orthographic projection instead of perspective"
+    )
+
+
+def add_direction_options(parser: argparse.ArgumentParser) -> None:
+    """Add --view and --up."""
     parser.add_argument(
         "--view",
         type=float_tuple(2, "AZ,EL"),
@@ -24,12 +35,6 @@ def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | No
         "--up",
         choices=list(UP_AXIS_MATRIX),
         help="upward axis of the file; by default y for .obj and .off, otherwise z",
-    )
-    parser.add_argument(
-        "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"
-    )
-    parser.add_argument(
-        "--ortho", action="store_true", help="orthographic projection instead of perspective"
     )
 
 

@@ -44,8 +44,17 @@ def value_range(values: np.ndarray) -> ValueRange:
     return float(low), float(high)
 
 
-def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
-    """Return (low, scale) of a look: a number v is at (v - low) * scale in the color map.
+def value_ranges(instances: Iterable[MeshInstance]) -> list[ValueRange]:
+    """Return the range of the numbers of each mesh instance that has a field and numbers."""
+    return [
+        value_range(instance.color_values)
+        for instance in instances
+        if instance.field is not None and instance.color_values is not None
+    ]
+
+
+def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
+    """Return the numbers at the bottom and at the top of the color map of a look.
 
     Parameters
     ----------
@@ -54,10 +63,18 @@ def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]
     ranges : iterable of (float, float) or None
         From `value_range`, of the mesh instances that have a field and numbers.
     """
-    low, high = look.values_low, look.values_high
-    if low == high == 0:
-        known = [entry for entry in ranges if entry is not None] or [(0.0, 0.0)]
-        low, high = min(entry[0] for entry in known), max(entry[1] for entry in known)
+    if not look.values_low == look.values_high == 0:
+        return look.values_low, look.values_high
+    known = [entry for entry in ranges if entry is not None] or [(0.0, 0.0)]
+    return min(low for low, _ in known), max(high for _, high in known)
+
+
+def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
+    """Return (low, scale) of a look: a number v is at (v - low) * scale in the color map.
+
+    Parameters as in `value_ends`.
+    """
+    low, high = value_ends(look, ranges)
     difference = high - low
     if abs(difference) < MIN_VALUE_RANGE:
         difference = MIN_VALUE_RANGE
@@ -89,12 +106,7 @@ def map_positions_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
         See `check_color_values`.
     """
     check_color_values(look, gbuffer.instances)
-    ranges = [
-        value_range(instance.color_values)
-        for instance in gbuffer.instances
-        if instance.field is not None and instance.color_values is not None
-    ]
-    low, scale = value_scale(look, ranges)
+    low, scale = value_scale(look, value_ranges(gbuffer.instances))
     positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
     for block in pixel_blocks(len(positions)):
         yield Progress(block.start / len(positions), "finding colors")

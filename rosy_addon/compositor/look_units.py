@@ -86,7 +86,7 @@ def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]
     exact_scale = look.unit_size / (
         pixel_world_size(np.concatenate(bounds), camera) * look.supersampling
     )
-    return _scaled_look(
+    return scaled_look(
         look, 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
     )
 
@@ -120,10 +120,10 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
         step=1.0,
         length=max(round(look.length * look.step), 1),
     )
-    return _scaled_look(look, unit_size / step)
+    return scaled_look(look, unit_size / step)
 
 
-def _scaled_look(look: Look, scale: float) -> Look:
+def scaled_look(look: Look, scale: float) -> Look:
     """Multiply the lengths of a look, as far as their ranges allow."""
     scale = float(np.clip(scale, *_scale_limits(look)))
     lengths = {

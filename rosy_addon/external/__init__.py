@@ -2,6 +2,7 @@
 
 Each module says so if something is missing::
 
-    ffmpeg            ffmpeg: videos in .mp4 files
-    simulation_files  pyvista and meshio: meshes with arrays in the files of simulations
+    ffmpeg             ffmpeg: videos in .mp4 files
+    matplotlib_figure  matplotlib: figures
+    simulation_files   pyvista and meshio: meshes with arrays in the files of simulations
 """

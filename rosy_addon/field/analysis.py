@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..errors import RosyError
+from .directional_field import field_directions
 from .frames import dot, normalize
 from .representation import (
     face_frames,
@@ -14,6 +17,33 @@ from .representation import (
 )
 from .rosy_field import RosyField
 from .surface import Surface, build_edges
+
+#: Part of the area of which `ErrorStatistics.p95` is the largest error.
+PERCENTILE = 0.95
+
+
+class ErrorStatistics(NamedTuple):
+    """Angular errors over a surface, in radians. All are 0 if no face has an error.
+
+    Attributes
+    ----------
+    mean, rms : float
+        Weighted by area.
+    p95 : float
+        The largest error on 95 % of the area.
+    max : float
+    worst_face : int
+        The face of the largest error, -1 without any.
+    compared : float
+        Fraction of the faces that have an error.
+    """
+
+    mean: float
+    rms: float
+    p95: float
+    max: float
+    worst_face: int
+    compared: float
 
 
 def dirichlet_energy(surface: Surface, field: RosyField) -> float:
@@ -79,8 +109,10 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians from a member to the nearest member of the other field, 0 to pi / N. NaN on
-        faces where either field is undefined.
+        Angle in radians from a member to the nearest member of the other field, 0 to pi / N. If the
+        directions of one of them are not rotationally symmetric: the mean angle between the directions
+        of the matching, of the N that keep their order, for which it is least. NaN on faces where
+        either field is undefined.
 
     Raises
     ------
@@ -92,13 +124,31 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
             f"{surface.name}: a field of degree {field.degree} cannot be compared with one of "
             f"{other.degree}"
         )
-    z, other_z = face_representation(surface, field), face_representation(surface, other)
-    error = np.abs(np.angle(z * other_z.conj())) / field.degree
-    error[(z == 0) | (other_z == 0)] = np.nan
+    if field.direction_ratios is None and other.direction_ratios is None:
+        z, other_z = face_representation(surface, field), face_representation(surface, other)
+        error = np.abs(np.angle(z * other_z.conj())) / field.degree
+        error[(z == 0) | (other_z == 0)] = np.nan
+        return error
+    error = _matched_direction_angles(surface, field, other)
+    error[~(field.vectors.any(axis=1) & other.vectors.any(axis=1))] = np.nan
     return error
 
 
-def error_statistics(surface: Surface, error: np.ndarray) -> dict[str, float]:
+def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
+    """(F,) mean angles between the directions of two fields, for the best of their N matchings."""
+    x, y = face_frames(surface)
+    z, other_z = (
+        dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+        for directions in (field_directions(surface, field), field_directions(surface, other))
+    )
+    best = np.full(surface.face_count, np.inf)
+    for shift in range(field.degree):
+        angles = np.abs(np.angle(z * np.roll(other_z, shift, axis=1).conj()))
+        np.minimum(best, angles.mean(axis=1), out=best)
+    return best
+
+
+def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
     """Summarize angular errors over the surface.
 
     Parameters
@@ -106,23 +156,22 @@ def error_statistics(surface: Surface, error: np.ndarray) -> dict[str, float]:
     surface : Surface
     error : (F,) float ndarray
         Radians, as from `angle_errors`; NaN is ignored.
-
-    Returns
-    -------
-    dict of str to float
-        "mean" and "rms", weighted by face area, and "max", in degrees; and "compared", the fraction
-        of the faces whose error is not NaN. All are 0 if there are none.
     """
+    defined = np.flatnonzero(np.isfinite(error))
+    if not len(defined):
+        return ErrorStatistics(0.0, 0.0, 0.0, 0.0, -1, 0.0)
     area = np.bincount(surface.triangle_face, _triangle_areas(surface), surface.face_count)
-    defined = np.isfinite(error)
-    weight = area[defined] / max(float(area[defined].sum()), 1e-300)
-    degrees = np.degrees(error[defined])
-    return {
-        "mean": float(weight @ degrees),
-        "rms": float(np.sqrt(weight @ degrees**2)),
-        "max": float(degrees.max(initial=0.0)),
-        "compared": float(defined.mean()),
-    }
+    values, weight = error[defined], area[defined] / max(float(area[defined].sum()), 1e-300)
+    order = np.argsort(values, kind="stable")
+    rank = np.searchsorted(np.cumsum(weight[order]), PERCENTILE)
+    return ErrorStatistics(
+        float(weight @ values),
+        float(np.sqrt(weight @ values**2)),
+        float(values[order[min(rank, len(order) - 1)]]),
+        float(values.max()),
+        int(defined[np.argmax(values)]),
+        len(defined) / len(error),
+    )
 
 
 def _triangle_areas(surface: Surface) -> np.ndarray:

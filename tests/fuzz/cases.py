@@ -316,6 +316,26 @@ def _texture_case(rng: Generator, folder: Path) -> Case:
     return Case(["texture", *inputs, *words, "--size", size, "-o", output], outputs=outputs)
 
 
+def _comparison_case(rng: Generator, folder: Path) -> Case:
+    """Field files and generated fields side by side, as a table and as a figure."""
+    mesh = random_mesh(rng, faults=int(rng.random() < 0.3))
+    words = ["compare", _write_mesh(rng, folder, mesh)]
+    for number in range(rng.integers(1, 4)):
+        source = ("form", "smoothest", "curvature", "features", "uv")[rng.integers(5)]
+        if rng.random() < 0.4:
+            source = _write_field(rng, folder, mesh, f"field{number}")
+        words.append(
+            f"{('a', 'b=', '$', '')[rng.integers(4)]}={source}" if rng.random() < 0.3 else source
+        )
+    words += random_options(rng, "compare", rate=0.12)
+    case = Case(words)
+    if rng.random() < 0.5:
+        output = "out" + (".pdf", ".svg", ".png", ".gif")[rng.choice(4, p=[0.4, 0.3, 0.28, 0.02])]
+        case.arguments += ["-o", output, *([] if _has(words, "--dpi") else ["--dpi", "40"])]
+        case.outputs.add(output)
+    return case
+
+
 def _path_case(rng: Generator, folder: Path) -> Case:
     """Paths that are not plain files, too long, linked, odd, or the input itself."""
     mesh = random_mesh(rng, faults=0)
@@ -424,6 +444,7 @@ CATEGORIES = {
     "looks": Category(_look_case),
     "tones": Category(_tone_case),
     "textures": Category(_texture_case),
+    "comparisons": Category(_comparison_case),
     "paths": Category(_path_case, share=5),
     "streams": Category(_stream_case, share=1),
     "kills": Category(_kill_case, share=1),

@@ -29,6 +29,7 @@ FILE_OPTIONS = {
         "frames",
     ),
     *("singularities", "all_cameras", "out", "save", "jobs", "scheduler"),
+    "fields",
 }
 
 
@@ -132,6 +133,12 @@ def _colors(rng: Generator) -> str:
     return ("red", "#000,#f00", "", "url(#a)", '"/><script>', "rgb(1,2,3)")[rng.integers(6)]
 
 
+def _text(rng: Generator) -> str:
+    return ("mm", "a caption " * 40, "", "$x_", r"$\frac{1}{$", "two\nlines", "\U0001f600é")[
+        rng.integers(7)
+    ]
+
+
 #: A value of each option that takes one.
 _VALUES: dict[str, Callable[[Generator], str]] = {
     "degree": _degree,
@@ -161,6 +168,12 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "overshoot": _number(0, 256, (5.0,)),
     "singularity_size": _number(1, 256, (9.0, 20.0)),
     "width": _number(0.01, 1000, (1.6,)),
+    "match_reach": _number(0, 10, (0.05, 0.5)),
+    "columns": lambda rng: str(rng.integers(0, 5)),
+    "dpi": lambda rng: str(rng.integers(9, 70)),
+    "caption": _text,
+    "scale_bar": _text,
+    "color_label": _text,
     "millimetres": _number(1, 1e5, (200.0,)),
     "colours": _colors,
 }

@@ -82,11 +82,12 @@ MAY_IMPORT = {
         "bake",
         "viewport",
     },
-    "external": BASE_ROOMS | {"field", "turntable_video"},
+    "external": BASE_ROOMS | {"field", "annotation", "turntable_video"},
     "api": BASE_ROOMS
     | {
         "field",
         "projection",
+        "annotation",
         "compositor",
         "line_drawing",
         "surface_texture",

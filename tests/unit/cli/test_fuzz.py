@@ -12,7 +12,9 @@ from conftest import ROOT
 from tests.fuzz.options import random_options
 
 
-@pytest.mark.parametrize("command", ["field", "info", "render", "strokes", "texture", "turntable"])
+@pytest.mark.parametrize(
+    "command", ["compare", "field", "info", "render", "strokes", "texture", "turntable"]
+)
 def test_every_option_has_random_values(command):
     assert random_options(np.random.default_rng(0), command, rate=1.0, wild=0.0)
 

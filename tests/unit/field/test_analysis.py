@@ -8,8 +8,10 @@ from shapes import from_triangles, icosphere, plane, torus
 
 from rosy_addon.field.analysis import angle_errors, dirichlet_energy, error_statistics
 from rosy_addon.field.convert import rotate_field
+from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
+from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import description_task
 from rosy_addon.progress import run_to_completion
@@ -63,14 +65,45 @@ def test_errors_are_angles_to_the_nearest_member(degree, error_of):
     error = angle_errors(ball, field, other)
     np.testing.assert_allclose(error, angle, atol=1e-9)
     statistics = error_statistics(ball, error)
-    for name in ("mean", "rms", "max"):
-        assert np.isclose(statistics[name], np.degrees(angle))
+    np.testing.assert_allclose(statistics[:4], angle)
     vectors = field.vectors.copy()
     vectors[:10] = 0
     partial = angle_errors(ball, RosyField(degree, vectors), other)
     assert np.isnan(partial[:10]).all() and np.isfinite(partial[10:]).all()
-    assert np.isclose(error_statistics(ball, partial)["compared"], 1 - 10 / ball.face_count)
+    assert np.isclose(error_statistics(ball, partial).compared, 1 - 10 / ball.face_count)
     assert "cannot be compared" in error_of(angle_errors, ball, field, axis_field(ball, 12))
+
+
+def test_percentiles_of_errors_are_weighted_by_area():
+    """The face of 3/4 of the area has the least error."""
+    area = np.array([0.75, 0.075, 0.15, 0.025])
+    corners = [[(0, 0, k), (2 * width, 0, k), (0, 1, k)] for k, width in enumerate(area)]
+    mesh = from_triangles(np.reshape(corners, (-1, 3)), np.arange(12).reshape(4, 3))
+    error = np.array([0.1, 0.2, 0.3, 0.4])
+    statistics = error_statistics(mesh, error)
+    assert np.isclose(statistics.mean, area @ error) and statistics.p95 == 0.3
+    assert statistics.worst_face == 3 and statistics.max == 0.4
+    error[3] = np.nan
+    assert error_statistics(mesh, error).worst_face == 2
+    assert error_statistics(mesh, np.full(4, np.nan)) == (0, 0, 0, 0, -1, 0)
+
+
+def test_fields_that_are_no_rosys_are_compared_by_their_best_matching():
+    """Three directions at free angles, once with the first and once with the second one stored."""
+    ball = icosphere(2)
+    x, y = face_frames(ball)
+    angles = np.array([0.1, 1.0, 4.0])
+
+    def field_at(offsets, first):
+        turned = np.roll(angles + offsets, -first)[:, None, None]
+        return field_from_directions(
+            ball, np.moveaxis(np.cos(turned) * x + np.sin(turned) * y, 0, 1)
+        )
+
+    same = angle_errors(ball, field_at(0, 0), field_at(0, 1))
+    np.testing.assert_allclose(same, 0, atol=1e-7)
+    error = angle_errors(ball, field_at(0, 0), field_at(np.array([0.3, 0.0, -0.3]), 2))
+    np.testing.assert_allclose(error, 0.2, atol=1e-7)
 
 
 def test_fields_are_described():

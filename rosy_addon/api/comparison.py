@@ -1,0 +1,245 @@
+"""`compare`: how several fields differ, as a table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import RosyError
+from ..field.singularity_matching import SingularityMatching, match_singularities_task
+from ..progress import run_to_completion
+from .field import Difference, Field
+
+#: Singularities of two fields match if they are nearer than this fraction of the longest side of the mesh.
+DEFAULT_REACH = 0.05
+
+#: Characters that LaTeX would interpret, and what prints them.
+_LATEX = {
+    **{character: f"\\{character}" for character in "&%$#_{}"},
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
+
+
+class _Column(NamedTuple):
+    """A column of the table: its title, the key of its values, and their format."""
+
+    title: str
+    key: str
+    format: str
+
+
+_COLUMNS = (
+    _Column("degree", "degree", "{:d}"),
+    _Column("energy", "energy", "{:.4g}"),
+    _Column("singularities", "singularities", "{:d}"),
+    _Column("positive", "positive", "{:d}"),
+    _Column("negative", "negative", "{:d}"),
+)
+_DIFFERENCE_COLUMNS = (
+    _Column("matched", "matched", "{:d}"),
+    _Column("mean (deg)", "mean", "{:.3g}"),
+    _Column("95 % (deg)", "p95", "{:.3g}"),
+    _Column("largest (deg)", "max", "{:.3g}"),
+    _Column("on face", "worst_face", "{:d}"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How fields differ from the first of them. A notebook shows it as a table.
+
+    Attributes
+    ----------
+    fields : dict of str to Field
+        By their titles.
+    differences : dict of str to Difference
+        From the first field, by the titles of the others. Fields of another degree or on another surface
+        have none.
+    matchings : dict of str to SingularityMatching
+        Which singularities of the first field correspond to which of another one, in the same way.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> comparison = rf.compare({"form": rf.form(torus), "turned": rf.form(torus).rotated(0.1)})
+    >>> round(comparison.rows[1]["mean"], 2)
+    5.73
+    """
+
+    fields: dict[str, Field]
+    differences: dict[str, Difference]
+    matchings: dict[str, SingularityMatching]
+
+    def __repr__(self) -> str:
+        return f"<Comparison: {', '.join(self.fields)}>"
+
+    def __str__(self) -> str:
+        return self.to_text()
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The facts of each field, with angles in degrees.
+
+        Keys are title, degree, energy, singularities, positive and negative (how many there are), and
+        for each field with a difference from the first: mean, rms, p95, max, worst_face, worst_position
+        (the center of that face), compared, matched and matched_distance (how many singularities match,
+        and how far apart they are on average, in units of the mesh; None without any).
+        """
+        return [self._row(title, field) for title, field in self.fields.items()]
+
+    def _row(self, title: str, field: Field) -> dict[str, Any]:
+        index = field.singularities.index
+        row: dict[str, Any] = {
+            "title": title,
+            "degree": field.degree,
+            "energy": field.energy,
+            "singularities": len(index),
+            "positive": int((index > 0).sum()),
+            "negative": int((index < 0).sum()),
+        }
+        if title not in self.differences:
+            return row
+        difference, matching = self.differences[title], self.matchings[title]
+        has_worst = difference.worst_face >= 0
+        center = field.surface.mesh.face_center
+        row |= {
+            name: float(np.degrees(getattr(difference, name)))
+            for name in ("mean", "rms", "p95", "max")
+        }
+        row["worst_face"] = difference.worst_face
+        row["worst_position"] = center[difference.worst_face].tolist() if has_worst else None
+        row["compared"] = difference.compared
+        row["matched"] = len(matching.distance)
+        row["matched_distance"] = float(matching.distance.mean()) if row["matched"] else None
+        return row
+
+    def cells(self) -> list[list[str]]:
+        """The table as texts: a row of titles, then one for each field; "-" where there is no value."""
+        columns = _COLUMNS + (_DIFFERENCE_COLUMNS if self.differences else ())
+        cells = [["field", *(column.title for column in columns)]]
+        for row in self.rows:
+            values = [
+                column.format.format(row[column.key]) if column.key in row else "-"
+                for column in columns
+            ]
+            cells.append([row["title"], *values])
+        return cells
+
+    def to_text(self) -> str:
+        """The table with columns of equal width, for a terminal."""
+        cells = self.cells()
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        lines = [
+            "  ".join(
+                [row[0].ljust(widths[0])]
+                + [text.rjust(width) for text, width in zip(row[1:], widths[1:], strict=True)]
+            ).rstrip()
+            for row in cells
+        ]
+        if self.differences:
+            lines.append(
+                f"Angles and matched singularities are those to '{next(iter(self.fields))}'."
+            )
+        return "\n".join(lines)
+
+    def to_json(self) -> str:
+        """The `rows` as a JSON array."""
+        return json.dumps(self.rows)
+
+    def to_latex(self) -> str:
+        """The table as a ``tabular`` of LaTeX; it needs the package ``booktabs``."""
+        cells = self.cells()
+        lines = [" & ".join(map(_latex_text, row)) + r" \\" for row in cells]
+        columns = "l" + "r" * (len(cells[0]) - 1)
+        return "\n".join(
+            [rf"\begin{{tabular}}{{{columns}}}", r"\toprule", lines[0], r"\midrule", *lines[1:]]
+            + [r"\bottomrule", r"\end{tabular}"]
+        )
+
+    def _repr_html_(self) -> str:
+        head, *body = [[escape(text) for text in row] for row in self.cells()]
+        rows = ["<tr>" + "".join(f"<th>{text}</th>" for text in head) + "</tr>"]
+        rows += ["<tr>" + "".join(f"<td>{text}</td>" for text in row) + "</tr>" for row in body]
+        return f"<table>{''.join(rows)}</table>"
+
+
+def _latex_text(text: str) -> str:
+    """Return what prints a text in LaTeX; "--" for a missing value."""
+    return "--" if text == "-" else "".join(_LATEX.get(letter, letter) for letter in text)
+
+
+def compare(
+    fields: Sequence[Field] | Mapping[str, Field], *, reach: float = DEFAULT_REACH
+) -> Comparison:
+    """Compare fields with the first of them: angles, energies and singularities.
+
+    Parameters
+    ----------
+    fields : sequence of Field, or mapping of str to Field
+        The keys of a mapping are their titles; without, they are "field 1", "field 2" and so on.
+    reach : float
+        Largest distance of two singularities of the same index that match, as a fraction of the longest
+        side of the mesh. Of several, the nearest two match.
+
+    Raises
+    ------
+    RosyError
+        If there is no field.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> print(rf.compare({"form": rf.form(torus), "along z": rf.along_axis(torus, (0, 0, 1))}))
+    field    degree  energy  singularities  ...
+    """
+    titled = titled_fields(fields)
+    reference = next(iter(titled.values()))
+    differences: dict[str, Difference] = {}
+    matchings: dict[str, SingularityMatching] = {}
+    for title, field in list(titled.items())[1:]:
+        if not is_comparable(reference, field):
+            continue
+        differences[title] = reference.difference(field)
+        points = field.surface.vertices
+        first, second = reference.singularities, field.singularities
+        matchings[title] = run_to_completion(
+            match_singularities_task(
+                points[first.vertex],
+                first.index,
+                points[second.vertex],
+                second.index,
+                reach * field.surface.mesh.extent,
+            )
+        )
+    return Comparison(titled, differences, matchings)
+
+
+def titled_fields(fields: Iterable[Field] | Mapping[str, Field]) -> dict[str, Field]:
+    """Return fields by their titles; see `compare`.
+
+    Raises
+    ------
+    RosyError
+        If there is none.
+    """
+    if isinstance(fields, Mapping):
+        titled = dict(fields)
+    else:
+        titled = {f"field {number}": field for number, field in enumerate(fields, 1)}
+    if not titled:
+        raise RosyError("there is no field to compare: give one or more")
+    return titled
+
+
+def is_comparable(field: Field, other: Field) -> bool:
+    """Whether the angle between two fields is defined: same degree, same surface."""
+    return field.degree == other.degree and field.surface.mesh is other.surface.mesh

@@ -1,0 +1,493 @@
+"""`figure`: fields side by side with their keys, drawn by matplotlib."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..annotation.singularity_marks import SingularityMarks, singularity_marks_task
+from ..annotation.singularity_settings import shows_singularities
+from ..cache import Cache
+from ..color import color_stops, map_colors
+from ..compositor.color_values import value_ends, value_ranges
+from ..compositor.look import Look, colors_magnitude, colors_values
+from ..compositor.look_units import scaled_look
+from ..errors import RosyError, counted
+from ..file_io import write_bytes
+from ..image_io.png import to_srgb_uint8
+from ..progress import run_to_completion
+from ..projection.camera import Camera, orbit_basis, orbit_camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.visible_vertices import project_vertices_task
+from ..rendering.band_workers import BandWorkers
+from ..rendering.cpu import CpuRenderer
+from ..rendering.view_input import ViewInput
+from .comparison import DEFAULT_REACH, Comparison, compare
+from .field import Field
+from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..external.matplotlib_figure import ColorBar, Panel, Row
+
+#: What a figure may have, from top to bottom.
+PARTS = ("fields", "differences", "table")
+
+#: The lines over a difference: of the other field, of the first, or of both.
+LINES = ("other", "first", "both")
+
+#: The resolution at which the lengths of the look are pixels. Lines are as wide in print at any other.
+LENGTH_DPI = 150
+
+#: Limits of the height of a panel, relative to its width.
+MIN_ASPECT, MAX_ASPECT = 0.4, 1.6
+
+#: Panels side by side, unless the caller says how many; empty border of a panel, as a fraction.
+MAX_COLUMNS, MARGIN = 3, 0.02
+
+#: The files of figures.
+FIGURE_SUFFIXES = (".pdf", ".svg", ".png")
+
+#: The color map of differences, and where in it an angle of 0 and the largest one are: light and dark, but
+#: not so dark that lines vanish.
+DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
+
+
+def figure(
+    fields: Field | Sequence[Field] | Mapping[str, Field],
+    *,
+    parts: Sequence[str] = ("fields",),
+    columns: int | None = None,
+    width: float = 7.0,
+    dpi: int = 300,
+    view: tuple[float, float] = DEFAULT_VIEW,
+    orthographic: bool = True,
+    preset: str | os.PathLike[str] | None = None,
+    color_values: str | Sequence[str | ArrayLike] | None = None,
+    color_label: str | None = None,
+    largest_angle: float = 0.0,
+    lines: str = "other",
+    reach: float = DEFAULT_REACH,
+    scale_bar: str | None = None,
+    caption: str = "",
+    workers: int = 0,
+    **settings: Any,
+) -> Figure:
+    """Draw fields side by side with their keys: a figure of matplotlib, for papers and talks.
+
+    All panels have one camera, one light and one range of colors. Titles, keys and singularities are
+    text and vectors. Singularities are shown unless ``singularity_dots="none"``.
+
+    Parameters
+    ----------
+    fields : Field, sequence of Field, or mapping of str to Field
+        The keys of a mapping are the titles. Fields may be on different surfaces.
+    parts : sequence of {"fields", "differences", "table"}
+        What to draw: the fields; the angle of each field to the first as a color, from 0 to 180/N
+        degrees, with a cross at the largest, and the singularities of both; the table of `compare`.
+    columns : int, optional
+        Panels side by side; by default at most 3.
+    width : float
+        Inches. The height follows from the contents.
+    dpi : int
+        Resolution of the pictures. Lines do not get thinner with it: lengths of the look are in
+        pixels at 150 dpi.
+    view, preset
+        As for `render`.
+    orthographic : bool
+        Whether the projection is orthographic; a scale bar needs it.
+    color_values : str, or sequence of str or array_like, optional
+        Numbers that are shown as colors, as for `render`: for each field, or a name for all.
+    color_label : str, optional
+        What the color bar of the fields says: a quantity and its unit. By default the name of the numbers,
+        or "magnitude" if that is what is shown.
+    largest_angle : float
+        Angle at the top of the color map of differences, in degrees; 0 for 180/N.
+    lines : {"other", "first", "both"}
+        Which lines are drawn over a difference.
+    reach : float
+        Largest distance of singularities that match; see `compare`.
+    scale_bar : str, optional
+        Unit of the coordinates, such as "mm" or "": draw a scale bar.
+    caption : str
+        Below everything.
+    workers
+        As for `render`.
+    **settings
+        Settings of the look, as for `render`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        ``savefig`` writes it as ``.pdf``, ``.svg`` or ``.png``. Journals want fonts of the type
+        ``matplotlib.rcParams["pdf.fonttype"] = 42``.
+
+    Raises
+    ------
+    RosyError
+        If matplotlib is not installed, there is no field or nothing to compare, or as `render`.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> methods = {"Form": rf.form(torus), "Smoothest": rf.smoothest(torus)}
+    >>> page = rf.figure(methods, parts=("fields", "differences", "table"), dpi=60)
+    >>> page.savefig("torus.pdf")
+    """
+    drawing = load_drawing()
+    is_single = isinstance(fields, Field)
+    titled = {fields.surface.name: fields} if isinstance(fields, Field) else fields
+    comparison = compare(titled, reach=reach)
+    parts = (parts,) if isinstance(parts, str) else tuple(parts)
+    _check_parts(comparison, parts, lines)
+    name = next(iter(comparison.fields.values())).surface.name
+    if not (orthographic or scale_bar is None):
+        raise RosyError(f"{name}: a scale bar needs the orthographic projection")
+    for text, value, low, high in (
+        ("width", width, 0.5, 100.0),
+        ("dpi", dpi, 10, 2400),
+        ("largest_angle", largest_angle, 0.0, 360.0),
+    ):
+        if not low <= value <= high:
+            raise RosyError(
+                f"{name}: {text} is {value:g}: it must be a number from {low:g} to {high:g}"
+            )
+    shown = {"singularity_dots": "visible", **settings}
+    look = picture_look(name, preset, shown, {}, color_values is not None)
+    numbers = _numbers_of_fields(name, comparison.fields, color_values)
+    instances = {
+        title: upright_instance(field.surface, field, None, values)
+        for (title, field), values in zip(comparison.fields.items(), numbers, strict=True)
+    }
+    look = _figure_look(look, comparison.fields, instances.values(), dpi / LENGTH_DPI)
+    if color_label is None:
+        color_label = color_values if isinstance(color_values, str) else ""
+        color_label = "magnitude" if colors_magnitude(look) else color_label
+    count = len(instances)
+    columns = min(count, MAX_COLUMNS) if columns is None else max(columns, 1)
+    has_key = (
+        shows_singularities(look) or _color_bar(look, "") is not None or "differences" in parts
+    )
+    pixels = drawing.panel_width(width, columns, has_key, dpi)
+    points = np.concatenate([instance.face_points() for instance in instances.values()])
+    size = pixels, max(round(pixels * _aspect(points, view)), 1)
+    camera = orbit_camera(points, *view, *size, perspective=not orthographic, margin=MARGIN)
+    with BandWorkers(workers) as pool:
+        studio = _Studio(camera, look, CpuRenderer(Cache(), keep_gbuffers=False, workers=pool))
+        rows = []
+        if "fields" in parts:
+            panels = [
+                drawing.Panel(
+                    "" if is_single else title, studio.picture(instance), studio.marks(instance)
+                )
+                for title, instance in instances.items()
+            ]
+            rows.append(drawing.Row(panels, _color_bar(look, color_label)))
+        if "differences" in parts:
+            rows.append(studio.difference_row(comparison, instances, lines, largest_angle))
+    table = comparison.cells() if "table" in parts else []
+    bar = None if scale_bar is None else _scale_bar(camera, scale_bar, drawing.SCALE_BAR_SHARE)
+    return drawing.draw_page(drawing.Page(rows, table, caption, bar), width, columns, dpi)
+
+
+def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure]) -> None:
+    """Write figures to a file, with embedded fonts and text as text.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.pdf``, with a page for each figure; or ``.svg`` or ``.png`` for a single one.
+    figures : matplotlib.figure.Figure, or sequence of them
+
+    Raises
+    ------
+    RosyError
+        If the format cannot hold them, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> fields = {"Form": rf.form(torus), "Smoothest": rf.smoothest(torus)}
+    >>> pages = [rf.figure(fields, dpi=60), rf.figure(fields, parts=("differences", "table"), dpi=60)]
+    >>> rf.save_figures("methods.pdf", pages)
+    """
+    pages = list(figures) if isinstance(figures, Sequence) else [figures]
+    check_figure_path(Path(path), len(pages))
+    write_bytes(path, load_drawing().encode_figures(pages, Path(path).suffix.lower()))
+
+
+def check_figure_path(path: Path, count: int = 1) -> None:
+    """Check that a file can hold a number of figures.
+
+    Raises
+    ------
+    RosyError
+        If not.
+    """
+    if path.suffix.lower() not in FIGURE_SUFFIXES:
+        raise RosyError(f"{path}: the name of the file must end in {', '.join(FIGURE_SUFFIXES)}")
+    if not count:
+        raise RosyError(f"{path}: there is no figure to write")
+    if count > 1 and path.suffix.lower() != ".pdf":
+        raise RosyError(f"{path}: only a .pdf can hold {count} figures")
+
+
+def load_drawing() -> ModuleType:
+    """Return the module that draws figures.
+
+    Raises
+    ------
+    RosyError
+        If matplotlib is not installed, or this is the extension for Blender.
+    """
+    try:
+        from ..external import matplotlib_figure
+    except ImportError:
+        raise RosyError(
+            "figures are drawn by the Python package: pip install rosyfields[figures]"
+        ) from None
+    matplotlib_figure.check_matplotlib()
+    return matplotlib_figure
+
+
+def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> None:
+    """Check what a figure is to show.
+
+    Raises
+    ------
+    RosyError
+        If a part or the lines are unknown, or there is nothing to compare.
+    """
+    for part in parts:
+        if part not in PARTS:
+            raise RosyError(f"a figure has no part {part!r}: choose {', '.join(PARTS)}")
+    if not parts:
+        raise RosyError(f"a figure needs parts: choose {', '.join(PARTS)}")
+    if lines not in LINES:
+        raise RosyError(f"lines is {lines!r}: choose {', '.join(LINES)}")
+    if "differences" in parts and not comparison.differences:
+        raise RosyError(
+            f"'{next(iter(comparison.fields))}': there is no other field of its degree on its surface to compare"
+        )
+
+
+def _numbers_of_fields(
+    name: str,
+    fields: Mapping[str, Field],
+    color_values: str | Sequence[str | ArrayLike] | None,
+) -> list[NDArray[np.float32] | None]:
+    """Return the numbers at the corners of the surface of each field, as for `figure`.
+
+    Raises
+    ------
+    RosyError
+        If there is not one set of numbers for each field, or as `corner_numbers`.
+    """
+    if color_values is None or isinstance(color_values, str):
+        values: Sequence[str | ArrayLike | None] = [color_values] * len(fields)
+    else:
+        values = list(color_values)
+    if len(values) != len(fields):
+        raise RosyError(
+            f"{name}: color_values has {counted(len(values), 'array')} for {counted(len(fields), 'field')}"
+        )
+    return [
+        corner_numbers(field.surface, array)
+        for field, array in zip(fields.values(), values, strict=True)
+    ]
+
+
+def _figure_look(
+    look: Look, fields: Mapping[str, Field], instances: Iterable[MeshInstance], scale: float
+) -> Look:
+    """Return the look of all panels: its lengths in pixels, and common ranges of the color map."""
+    look = scaled_look(look, scale)
+    look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
+    if look.magnitude != "none" and not look.magnitude_range:
+        largest = max(float(field.magnitude.max()) for field in fields.values())
+        look = replace(look, magnitude_range=largest or 1.0)
+    if colors_values(look):
+        low, high = value_ends(look, value_ranges(instances))
+        look = replace(look, values_low=low, values_high=high)
+    return look
+
+
+def _aspect(points: NDArray[np.float64], view: tuple[float, float]) -> float:
+    """Return the height of the panels relative to their width, so that they fit what they show."""
+    right, up, _ = orbit_basis(*view) @ points.T
+    return float(np.clip(np.ptp(up) / max(float(np.ptp(right)), 1e-30), MIN_ASPECT, MAX_ASPECT))
+
+
+def _color_bar(look: Look, label: str) -> ColorBar | None:
+    """Return the color bar of the fields; None if neither magnitudes nor numbers are shown as color."""
+    if colors_magnitude(look):
+        ends = 0.0, look.magnitude_range
+    elif colors_values(look):
+        ends = look.values_low, look.values_high
+    else:
+        return None
+    bar: ColorBar = load_drawing().ColorBar(label, *ends, color_stops(look.colour_map))
+    return bar
+
+
+def _numbers_at_ends(top: float) -> tuple[float, float]:
+    """Return the numbers at both ends of the color map of differences, for the largest angle."""
+    at_zero, at_top = DIFFERENCE_ENDS
+    slope = top / (at_top - at_zero)
+    return -slope * at_zero, slope * (1.0 - at_zero)
+
+
+def _difference_stops() -> NDArray[np.float64]:
+    """Return the (n, 3) display values of the color map of differences, from 0 to the largest angle."""
+    positions = np.linspace(*DIFFERENCE_ENDS, 33)
+    return map_colors(positions, DIFFERENCE_COLORS).astype(np.float64)
+
+
+def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
+    """Return the length of a scale bar in pixels, and its text.
+
+    Its length is 1, 2 or 5 times a power of ten in units of the coordinates.
+    """
+    longest = share * camera.width / camera.pixels_per_unit
+    power = 10.0 ** np.floor(np.log10(longest))
+    length = power * max(factor for factor in (1, 2, 5) if factor * power <= longest * (1 + 1e-9))
+    return length * camera.pixels_per_unit, f"{length:g} {unit}".strip()
+
+
+@dataclass(frozen=True, eq=False)
+class _Studio:
+    """What all panels of a figure share.
+
+    Attributes
+    ----------
+    camera : Camera
+    look : Look
+    renderer : CpuRenderer
+    """
+
+    camera: Camera
+    look: Look
+    renderer: CpuRenderer
+
+    def picture(self, instance: MeshInstance, **changes: Any) -> NDArray[np.uint8]:
+        """Return the picture of an instance, (H, W, 4) sRGB, the top row first, without singularities."""
+        return to_srgb_uint8(self._linear(instance, **changes)[::-1])
+
+    def _linear(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
+        look = replace(self.look, singularity_dots="none", **changes)
+        view = ViewInput((instance,), self.camera, look)
+        return run_to_completion(self.renderer.render_task(view)).rgba
+
+    def marks(self, instance: MeshInstance) -> SingularityMarks | None:
+        """Return the singularities of an instance in the picture; None if the look shows none."""
+        if not shows_singularities(self.look):
+            return None
+        return run_to_completion(singularity_marks_task([instance], self.camera, self.look))
+
+    def difference_row(
+        self,
+        comparison: Comparison,
+        instances: Mapping[str, MeshInstance],
+        lines: str,
+        largest_angle: float,
+    ) -> Row:
+        """Return the panels of the differences from the first field, below those of their fields."""
+        drawing = load_drawing()
+        reference = next(iter(instances))
+        degree = comparison.fields[reference].degree
+        top = largest_angle or 180.0 / degree
+        panels = [
+            self._difference_panel(comparison, instances, title, lines, top)
+            if title in comparison.differences
+            else None
+            for title in instances
+        ]
+        legend = f"Angle to \u201c{reference}\u201d\n\u00d7  largest angle"
+        if shows_singularities(self.look):
+            legend += (
+                f"\nOpen circles: singularities of\n\u201c{reference}\u201d; dots: of the other field."
+                "\nLines connect those that match."
+            )
+        bar = drawing.ColorBar("angle (degrees)", 0.0, top, _difference_stops())
+        row: Row = drawing.Row(panels, bar, legend)
+        return row
+
+    def _difference_panel(
+        self,
+        comparison: Comparison,
+        instances: Mapping[str, MeshInstance],
+        title: str,
+        lines: str,
+        top: float,
+    ) -> Panel:
+        """Return the panel of the difference of a field from the first one."""
+        first, other = next(iter(instances.values())), instances[title]
+        difference = comparison.differences[title]
+        drawn = {"first": [first], "other": [other], "both": [first, other]}[lines]
+        degrees = np.degrees(difference.angle)
+        values = degrees.astype(np.float32)[first.surface.corner_face]
+        low, high = _numbers_at_ends(top)
+        pictures = [
+            self._linear(
+                replace(instance, color_values=values),
+                hue="values",
+                magnitude="none",
+                values_low=low,
+                values_high=high,
+                colour_map=DIFFERENCE_COLORS,
+            )
+            for instance in drawn
+        ]
+        # The pictures cover the same pixels.
+        rgba = np.mean(pictures, axis=0)
+        facts = (np.degrees(value) for value in (difference.mean, difference.p95, difference.max))
+        note = "mean {:.3g}\u00b0, 95 % {:.3g}\u00b0, largest {:.3g}\u00b0".format(*facts)
+        shown = shows_singularities(self.look)
+        panel: Panel = load_drawing().Panel(
+            f"{title} vs. {next(iter(instances))}",
+            to_srgb_uint8(rgba[::-1]),
+            self.marks(other),
+            self.marks(first),
+            self._links(comparison, title, first) if shown else None,
+            self._worst_place(first, difference.worst_face),
+            note,
+        )
+        return panel
+
+    def _links(
+        self, comparison: Comparison, title: str, instance: MeshInstance
+    ) -> NDArray[np.float64]:
+        """Return the (n, 2, 2) ends of lines between singularities that match, if both are visible."""
+        first = next(iter(comparison.fields.values())).singularities
+        second, matching = comparison.fields[title].singularities, comparison.matchings[title]
+        ends = np.concatenate([first.vertex[matching.first], second.vertex[matching.second]])
+        place, is_visible = self._projected(instance, ends)
+        count = len(matching.distance)
+        both = is_visible[:count] & is_visible[count:]
+        return np.stack([place[:count], place[count:]], axis=1)[both]
+
+    def _worst_place(self, instance: MeshInstance, face: int) -> NDArray[np.float64] | None:
+        """Return the place of a face in the picture, (2,) pixels; None if none of its corners is visible."""
+        if face < 0:
+            return None
+        surface = instance.surface
+        corners = surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]]
+        place, is_visible = self._projected(instance, corners)
+        return place[is_visible].mean(axis=0) if is_visible.any() else None
+
+    def _projected(
+        self, instance: MeshInstance, vertices: NDArray[np.integer[Any]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the (n, 2) places of vertices in pixels, and which are visible."""
+        projected = run_to_completion(project_vertices_task([instance], self.camera, [vertices]))
+        return projected.position, projected.is_visible

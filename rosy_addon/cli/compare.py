@@ -1,0 +1,194 @@
+"""The command `compare`: fields on a mesh side by side, as a table and as a figure."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .. import api
+from ..api.comparison import DEFAULT_REACH
+from ..api.figures import LINES, check_figure_path, load_drawing
+from ..api.pictures import picture_look
+from ..errors import RosyError
+from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
+from ..field.mesh_io import READERS
+from ..field.rosy_field import check_degree
+from .extras import Extras
+from .look import add_look_options, requested_preset, requested_settings
+from .mesh_field import printed_warnings, read_field
+from .options import (
+    add_subcommand,
+    add_workers_option,
+    check_output,
+    float_between,
+    int_between,
+)
+from .streams import print_line
+from .view import add_direction_options
+
+#: Generators that need nothing but the mesh and a degree.
+GENERATORS = {
+    "form": api.form,
+    "smoothest": api.smoothest,
+    "curvature": api.curvature,
+    "features": api.features,
+    "uv": api.along_uv,
+}
+
+
+def add_compare_command(subparsers: Any, extras: Extras) -> None:
+    """Add the command `compare`."""
+    parser = add_subcommand(subparsers, "compare", run_compare)
+    suffixes = [*READERS, *extras.simulation_suffixes]
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
+    parser.add_argument(
+        "fields",
+        nargs="+",
+        metavar="[TITLE=]FIELD",
+        help=f"a field file ({', '.join(READ_SUFFIXES)}), or what to generate: "
+        f"{', '.join(GENERATORS)}. The first one is what the others are compared with",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="OUT.pdf|OUT.svg|OUT.png",
+        help="draw the fields, their differences and the table; a .pdf has two pages",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "latex"),
+        default="text",
+        help="of the table that is printed (%(default)s)",
+    )
+    parser.add_argument(
+        "--degree",
+        type=int,
+        metavar="N",
+        help="degree of generated fields, 1 to 12; by default that of the first field file, or 4",
+    )
+    parser.add_argument(
+        "--field-mesh",
+        type=Path,
+        metavar="MESH",
+        help="mesh file that the field files belong to, if it is not MESH; the fields are transferred by "
+        "position",
+    )
+    parser.add_argument(
+        "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
+    )
+    parser.add_argument(
+        "--match-reach",
+        type=float_between(0.0, 10.0),
+        default=DEFAULT_REACH,
+        metavar="SHARE",
+        help="largest distance of singularities that match, as a fraction of the size of the mesh "
+        "(%(default)g)",
+    )
+    parser.add_argument(
+        "--lines",
+        choices=LINES,
+        default=LINES[0],
+        help="lines that are drawn over differences (%(default)s)",
+    )
+    parser.add_argument(
+        "--columns", type=int_between(1, 100), metavar="N", help="panels side by side; at most 3"
+    )
+    parser.add_argument(
+        "--width",
+        type=float_between(0.5, 100.0),
+        default=7.0,
+        metavar="INCHES",
+        help="width of the figure (%(default)g)",
+    )
+    parser.add_argument(
+        "--dpi",
+        type=int_between(10, 2400),
+        default=300,
+        metavar="N",
+        help="resolution of the pictures (%(default)d)",
+    )
+    parser.add_argument("--caption", default="", metavar="TEXT", help="text below the fields")
+    parser.add_argument(
+        "--scale-bar", metavar="UNIT", help="draw a scale bar, in this unit of the coordinates"
+    )
+    parser.add_argument(
+        "--color-label",
+        default="magnitude",
+        metavar="TEXT",
+        help="title of the color bar (%(default)s)",
+    )
+    add_direction_options(parser)
+    parser.add_argument(
+        "--perspective", action="store_true", help="perspective projection instead of orthographic"
+    )
+    add_workers_option(parser)
+    add_look_options(parser)
+
+
+def run_compare(options: argparse.Namespace) -> None:
+    """Compare fields on a mesh: angles, energies and singularities."""
+    preset, settings = requested_preset(options), requested_settings(options)
+    if options.output is not None:
+        check_figure_path(options.output)
+        check_output(options)
+        picture_look(str(options.mesh), preset, settings, {})
+        load_drawing()
+    fields = _load_fields(options)
+    comparison = api.compare(fields, reach=options.match_reach)
+    if options.output is not None:
+        _draw(options, fields, comparison, {"preset": preset, **settings})
+    write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
+    print_line(write[options.format]())
+
+
+def _draw(
+    options: argparse.Namespace,
+    fields: dict[str, api.Field],
+    comparison: api.Comparison,
+    settings: dict[str, Any],
+) -> None:
+    """Write the figures."""
+    names = ("columns", "width", "dpi", "view", "lines", "workers", "scale_bar", "color_label")
+    arguments = {name: getattr(options, name) for name in names} | settings
+    arguments |= {"reach": options.match_reach, "orthographic": not options.perspective}
+    rest = ("differences", "table") if comparison.differences else ("table",)
+    if options.output.suffix.lower() == ".pdf":
+        pages = [
+            api.figure(fields, caption=options.caption, **arguments),
+            api.figure(fields, parts=rest, **arguments),
+        ]
+    else:
+        pages = [api.figure(fields, parts=("fields", *rest), caption=options.caption, **arguments)]
+    api.save_figures(options.output, pages)
+
+
+def _load_fields(options: argparse.Namespace) -> dict[str, api.Field]:
+    """Read or generate the fields, by their titles."""
+    if options.degree is not None:
+        check_degree(options.degree)
+    sources = dict(_titled_source(text) for text in options.fields)
+    if len(sources) < len(options.fields):
+        raise RosyError(f"{options.mesh}: two fields have the same title: give TITLE=FIELD")
+    fields: dict[str, api.Field | None] = dict.fromkeys(sources)
+    with printed_warnings():
+        surface = api.Surface(options.mesh, up=options.up)
+        degree = options.degree
+        for title, source in sources.items():
+            if source not in GENERATORS:
+                field = fields[title] = read_field(options, Path(source), surface, None)
+                degree = field.degree if degree is None else degree
+        for title, source in sources.items():
+            if source in GENERATORS:
+                make = GENERATORS[source]
+                fields[title] = make(surface, DEFAULT_DEGREE if degree is None else degree)
+    return fields
+
+
+def _titled_source(text: str) -> tuple[str, str]:
+    """Return the title and the source of [TITLE=]FIELD."""
+    title, separator, source = text.partition("=")
+    if separator and source and not Path(text).exists():
+        return title, source
+    return (text.capitalize() if text in GENERATORS else Path(text).stem), text

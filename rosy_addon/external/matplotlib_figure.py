@@ -1,0 +1,492 @@
+"""Figures of pictures with their keys, drawn by matplotlib as vectors and text."""
+
+from __future__ import annotations
+
+import io
+import re
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..annotation.index_labels import placed_labels
+from ..annotation.singularity_marks import (
+    COLOR_BY_SIGN,
+    HIDDEN_OPACITY,
+    OUTLINE,
+    OUTLINE_COLOR,
+    SingularityMarks,
+)
+from ..errors import RosyError
+from ..field.singularities import format_index
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Sizes of text in points: titles, everything else.
+TITLE_SIZE, TEXT_SIZE = 8.0, 7.0
+
+#: Points in an inch, and the height of a line of text in its sizes.
+POINTS, LINE_HEIGHT = 72, 1.35
+
+#: Lengths in inches: between panels, above a row for its titles, between rows, and of the column of keys.
+GAP, TITLE_HEIGHT, ROW_GAP, KEY_WIDTH = 0.08, 0.2, 0.14, 0.95
+
+#: Width of a letter of average text, and height of a capital letter, in sizes of the font.
+LETTER_WIDTH, CAPITAL_HEIGHT = 0.52, 0.73
+
+#: Length of a scale bar, at most this fraction of a panel.
+SCALE_BAR_SHARE = 0.3
+
+INK = "#141414"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """A picture with a title.
+
+    Attributes
+    ----------
+    title : str
+    picture : (H, W, 4) uint8 ndarray
+        sRGB, the top row first.
+    dots : SingularityMarks or None
+        Filled dots, in pixels of the picture.
+    rings : SingularityMarks or None
+        Open circles.
+    links : (n, 2, 2) float64 ndarray
+        Lines between the ends of pairs, in pixels from the lower left.
+    cross : (2,) float64 ndarray or None
+        A place that is marked with a cross, in pixels from the lower left.
+    note : str
+        Below the picture.
+    """
+
+    title: str
+    picture: np.ndarray
+    dots: SingularityMarks | None = None
+    rings: SingularityMarks | None = None
+    links: np.ndarray | None = None
+    cross: np.ndarray | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ColorBar:
+    """The key of a color map.
+
+    Attributes
+    ----------
+    label : str
+    low, high : float
+        The numbers at its ends.
+    stops : (n, 3) float64 ndarray
+        Display values at even distances from the lower end.
+    """
+
+    label: str
+    low: float
+    high: float
+    stops: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """Panels with one key.
+
+    Attributes
+    ----------
+    panels : sequence of Panel or None
+        None leaves the place of a panel empty.
+    color_bar : ColorBar or None
+    legend : str
+        In the place of the first empty panel.
+    """
+
+    panels: Sequence[Panel | None]
+    color_bar: ColorBar | None = None
+    legend: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """What a figure shows, from top to bottom.
+
+    Attributes
+    ----------
+    rows : sequence of Row
+        Each may take several lines of the grid.
+    table : list of list of str
+        The first row has the titles. Empty without a table.
+    caption : str
+    scale_bar : (float, str) or None
+        Its length in pixels, and its text.
+    """
+
+    rows: Sequence[Row]
+    table: list[list[str]]
+    caption: str = ""
+    scale_bar: tuple[float, str] | None = None
+
+
+def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
+    """Return the contents of a file with figures: pages of a .pdf, or a single .svg or .png.
+
+    Fonts are embedded as TrueType in a .pdf, as journals ask. Text in an .svg is text. The same figures
+    give the same bytes.
+
+    Parameters
+    ----------
+    figures : sequence of matplotlib.figure.Figure
+    suffix : {".pdf", ".svg", ".png"}
+
+    Raises
+    ------
+    RosyError
+        If a text between dollar signs is not a formula that matplotlib can read.
+    """
+    import matplotlib
+    from matplotlib.backends.backend_pdf import PdfPages
+
+    fonts = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "rosyfields"}
+    contents = io.BytesIO()
+    try:
+        with matplotlib.rc_context(fonts):
+            if suffix == ".pdf":
+                with PdfPages(contents, metadata={"CreationDate": None}) as pages:
+                    for figure in figures:
+                        pages.savefig(figure)
+            else:
+                metadata = {"Date": None} if suffix == ".svg" else {}
+                figures[0].savefig(contents, format=suffix[1:], metadata=metadata)
+    except ValueError as error:
+        if not re.search(r"\bParse\w*Exception\b", str(error)):
+            raise
+        formula = str(error).strip().splitlines()[0]
+        raise RosyError(f"{formula}: is not a formula: write \\$ for a dollar sign") from None
+    return contents.getvalue()
+
+
+def check_matplotlib() -> None:
+    """Check that matplotlib is installed.
+
+    Raises
+    ------
+    RosyError
+        If not.
+    """
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError:
+        raise RosyError(
+            "figures are drawn by matplotlib: pip install rosyfields[figures]"
+        ) from None
+
+
+def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
+    """Return the width of a panel in pixels.
+
+    Parameters
+    ----------
+    width : float
+        Of the figure, inches.
+    columns : int
+    has_key : bool
+        Whether there is a column of keys.
+    dpi : int
+    """
+    room = width - (KEY_WIDTH + GAP if has_key else 0.0) - (columns - 1) * GAP
+    return max(int(room / columns * dpi), 1)
+
+
+def draw_page(page: Page, width: float, columns: int, dpi: int) -> Figure:
+    """Draw a figure.
+
+    Parameters
+    ----------
+    page : Page
+        Its pictures have the width `panel_width`.
+    width : float
+        Inches. The height follows from the contents.
+    columns : int
+        Of the grid of panels.
+    dpi : int
+        Pixels of pictures in an inch.
+    """
+    from matplotlib.figure import Figure
+
+    return _Layout(page, width, columns, dpi, Figure(dpi=dpi)).draw()
+
+
+class _Layout:
+    """The places of the parts of a figure, in inches from its upper left corner."""
+
+    def __init__(self, page: Page, width: float, columns: int, dpi: int, figure: Figure) -> None:
+        self.page, self.columns, self.dpi, self.figure = page, columns, dpi, figure
+        self.width = width
+        first = (
+            next(panel for row in page.rows for panel in row.panels if panel is not None)
+            if (page.rows)
+            else None
+        )
+        self.panel_size = (
+            (0.0, 0.0)
+            if first is None
+            else (first.picture.shape[1] / dpi, first.picture.shape[0] / dpi)
+        )
+        self.has_letters = sum(panel is not None for row in page.rows for panel in row.panels) > 1
+        letters = max(int(width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
+        self.caption = [
+            line
+            for paragraph in page.caption.splitlines()
+            for line in textwrap.wrap(paragraph, letters) or [""]
+        ]
+        self.height = self._table_top() + self._table_height() + self._caption_height()
+        figure.set_size_inches(width, max(self.height, 0.1))
+
+    # --- places --------------------------------------------------------------------------------
+
+    def _row_height(self, row: Row) -> float:
+        lines = -(-len(row.panels) // self.columns)
+        return lines * self._line_height(row) + (lines - 1) * ROW_GAP
+
+    def _line_height(self, row: Row) -> float:
+        has_notes = any(panel is not None and panel.note for panel in row.panels)
+        note = _text_height(TEXT_SIZE) if has_notes else 0.0
+        return self._title_height(row) + self.panel_size[1] + note
+
+    def _title_height(self, row: Row) -> float:
+        has_titles = any(panel is not None and panel.title for panel in row.panels)
+        return TITLE_HEIGHT if has_titles else 0.0
+
+    def _table_top(self) -> float:
+        return sum(self._row_height(row) + ROW_GAP for row in self.page.rows)
+
+    def _table_height(self) -> float:
+        rows = len(self.page.table)
+        return (rows + 1) * _text_height(TEXT_SIZE) * 1.15 if rows else 0.0
+
+    def _caption_height(self) -> float:
+        return (len(self.caption) + 0.5) * _text_height(TITLE_SIZE) if self.caption else 0.0
+
+    def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
+        """Add axes with their upper left corner and size in inches, on whole pixels."""
+        unit = self.dpi * self.width, self.dpi * self.height
+        x, y = round(left * self.dpi), round((self.height - top - height) * self.dpi)
+        size = round(width * self.dpi), round(height * self.dpi)
+        place = x / unit[0], y / unit[1], size[0] / unit[0], size[1] / unit[1]
+        return self.figure.add_axes(place)
+
+    def _text(self, left: float, top: float, text: str, size: float, **options: object) -> None:
+        """Write a line of text whose upper left corner is at a place in inches."""
+        baseline = top + 0.8 * _text_height(size)
+        place = left / self.width, 1 - baseline / self.height
+        self.figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
+
+    # --- drawing -------------------------------------------------------------------------------
+
+    def draw(self) -> Figure:
+        """Draw all parts."""
+        top, number = 0.0, 0
+        for row in self.page.rows:
+            number = self._draw_row(row, top, number)
+            top += self._row_height(row) + ROW_GAP
+        if self.page.table:
+            self._draw_table(top)
+        top += self._table_height()
+        for line_number, line in enumerate(self.caption):
+            offset = (line_number + 0.25) * _text_height(TITLE_SIZE)
+            self._text(0.0, top + offset, line, TITLE_SIZE)
+        return self.figure
+
+    def _draw_row(self, row: Row, top: float, number: int) -> int:
+        """Draw the panels of a row and its keys; return the number of panels so far."""
+        panel_width, panel_height = self.panel_size
+        legend, title_height = row.legend, self._title_height(row)
+        for place, panel in enumerate(row.panels):
+            line, column = divmod(place, self.columns)
+            left = column * (panel_width + GAP)
+            line_top = top + line * (self._line_height(row) + ROW_GAP)
+            if panel is None:
+                for text_line, text in enumerate(legend.splitlines()):
+                    offset = title_height + text_line * _text_height(TEXT_SIZE)
+                    self._text(left, line_top + offset, text, TEXT_SIZE)
+                legend = ""
+                continue
+            letter = f"({chr(ord('a') + number % 26)}) " if self.has_letters else ""
+            self._text(left, line_top, letter + panel.title, TITLE_SIZE)
+            axes = self._axes(left, line_top + title_height, panel_width, panel_height)
+            _draw_panel(axes, panel, self.dpi)
+            if panel.note:
+                note_top = line_top + title_height + panel_height
+                self._text(left, note_top, panel.note, TEXT_SIZE)
+            if self.page.scale_bar is not None and number == 0:
+                _draw_scale_bar(axes, *self.page.scale_bar, self.dpi)
+            number += 1
+        self._draw_keys(row, top)
+        return number
+
+    def _draw_keys(self, row: Row, top: float) -> None:
+        """Draw the color bar and the legend of the singularities of a row, in the column of keys."""
+        left = self.columns * (self.panel_size[0] + GAP) + GAP
+        top += self._title_height(row)
+        marks = [
+            marks
+            for panel in row.panels
+            if panel is not None
+            for marks in (panel.dots, panel.rings)
+            if marks is not None
+        ]
+        entries = _legend_entries(marks)
+        legend_height = len(entries) * _text_height(TEXT_SIZE) * 1.2
+        if row.color_bar is not None:
+            height = self.panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)
+            self._draw_color_bar(row.color_bar, left, top, max(height, 0.5 * self.panel_size[1]))
+        bottom = top + self.panel_size[1] - legend_height
+        for number, (text, color, diameter) in enumerate(entries):
+            line_top = bottom + number * _text_height(TEXT_SIZE) * 1.2
+            middle = (
+                line_top + 0.8 * _text_height(TEXT_SIZE) - 0.5 * CAPITAL_HEIGHT * TEXT_SIZE / POINTS
+            )
+            axes = self._axes(left, middle - 0.1, 0.2, 0.2)
+            axes.axis("off")
+            axes.plot(0.5, 0.5, **_dot_style(diameter / self.dpi * POINTS, color))
+            axes.set(xlim=(0, 1), ylim=(0, 1))
+            self._text(left + 0.25, line_top, text, TEXT_SIZE)
+
+    def _draw_color_bar(self, bar: ColorBar, left: float, top: float, height: float) -> None:
+        """Draw a color bar with ticks and its label."""
+        from matplotlib.colorbar import Colorbar
+        from matplotlib.colors import LinearSegmentedColormap, Normalize
+
+        axes = self._axes(left, top, 0.12, height)
+        colors = LinearSegmentedColormap.from_list("rosy", bar.stops)
+        low, high = sorted((bar.low, bar.high))
+        if low > bar.low or high < bar.high:
+            colors = colors.reversed()
+        from matplotlib.cm import ScalarMappable
+
+        mappable = ScalarMappable(Normalize(low, high if high > low else low + 1), colors)
+        drawn = Colorbar(axes, mappable)
+        drawn.set_label(bar.label, fontsize=TEXT_SIZE, color=INK)
+        drawn.ax.tick_params(labelsize=TEXT_SIZE, width=0.5, length=2, color=INK)
+        drawn.outline.set_linewidth(0.5)
+        drawn.solids.set_edgecolor("face")
+
+    def _draw_table(self, top: float) -> None:
+        """Draw a table with lines above, below and under its titles."""
+        from matplotlib.lines import Line2D
+
+        table, height = self.page.table, _text_height(TEXT_SIZE) * 1.15
+        lengths = [max(map(len, column)) + 2 for column in zip(*table, strict=True)]
+        share = self.width / sum(lengths)
+        right = np.cumsum(lengths) * share
+        for number, row in enumerate(table):
+            line_top = top + (number + (0.4 if number else 0.2)) * height
+            for column, text in enumerate(row):
+                left = 0.0 if column == 0 else float(right[column])
+                self._text(left, line_top, text, TEXT_SIZE, ha="left" if column == 0 else "right")
+        for offset, line_width in ((0.1, 0.8), (1.25, 0.5), (len(table) + 0.55, 0.8)):
+            y = 1 - (top + offset * height) / self.height
+            line = Line2D([0, 1], [y, y], linewidth=line_width, color=INK)
+            self.figure.add_artist(line)
+
+
+def _text_height(size: float) -> float:
+    """Return the height of a line of text in inches."""
+    return LINE_HEIGHT * size / POINTS
+
+
+def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
+    """Draw a picture with its marks."""
+    height, width = panel.picture.shape[:2]
+    axes.imshow(panel.picture, extent=(0, width, 0, height), interpolation="antialiased")
+    axes.set(xlim=(0, width), ylim=(0, height))
+    axes.axis("off")
+    if panel.links is not None:
+        for link in panel.links:
+            axes.plot(*link.T, color=OUTLINE_COLOR, linewidth=0.6, solid_capstyle="round")
+    for marks, is_open in ((panel.rings, True), (panel.dots, False)):
+        if marks is not None:
+            _draw_marks(axes, marks, dpi, is_open)
+    if panel.cross is not None:
+        for color, line_width in (("white", 2.4), (INK, 1.2)):
+            axes.plot(
+                *panel.cross, marker="x", color=color, markersize=6, markeredgewidth=line_width
+            )
+
+
+def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) -> None:
+    """Draw dots or rings, and the labels beside visible dots."""
+    marks = marks.in_drawing_order()
+    for number, radius in enumerate(marks.radius.tolist()):
+        color = COLOR_BY_SIGN[int(np.sign(marks.index[number]))]
+        opacity = 1.0 if marks.is_visible[number] else HIDDEN_OPACITY
+        diameter = 2 * radius * POINTS / dpi
+        style = _ring_style(diameter, color) if is_open else _dot_style(diameter, color)
+        axes.plot(*marks.position[number], alpha=opacity, **style)
+    if is_open:
+        return
+    plate = {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.4}
+    for label in placed_labels(marks):
+        size = label.height / CAPITAL_HEIGHT * POINTS / dpi
+        text = _with_minus_sign(label.text)
+        axes.text(label.left, label.bottom, text, fontsize=size, color=INK, bbox=plate)
+
+
+def _dot_style(diameter: float, color: str) -> dict[str, object]:
+    """Return the style of a filled dot, given its diameter in points without the outline."""
+    outline = 2 * OUTLINE / (1 + 2 * OUTLINE) * diameter
+    return {
+        "marker": "o",
+        "markersize": diameter + outline / 2,
+        "markerfacecolor": color,
+        "markeredgecolor": OUTLINE_COLOR,
+        "markeredgewidth": outline / 2,
+        "linestyle": "none",
+    }
+
+
+def _ring_style(diameter: float, color: str) -> dict[str, object]:
+    """Return the style of an open circle around a dot of a diameter in points."""
+    return {
+        "marker": "o",
+        "markersize": 1.75 * diameter,
+        "markerfacecolor": "none",
+        "markeredgecolor": color,
+        "markeredgewidth": 0.22 * diameter,
+        "linestyle": "none",
+    }
+
+
+def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, float]]:
+    """Return text, color and diameter in pixels of each index that occurs, the largest first."""
+    entries = {}
+    for part in marks:
+        for index, degree, radius in zip(
+            part.index.tolist(), part.degree.tolist(), part.radius.tolist(), strict=True
+        ):
+            key = index / degree, index
+            entries[key] = (
+                f"index {_with_minus_sign(format_index(index, degree))}",
+                COLOR_BY_SIGN[int(np.sign(index))],
+                2 * radius,
+            )
+    return [entries[key] for key in sorted(entries, reverse=True)]
+
+
+def _with_minus_sign(text: str) -> str:
+    """Return a number with a minus sign instead of a hyphen."""
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def _draw_scale_bar(axes: Axes, length: float, text: str, dpi: int) -> None:
+    """Draw a bar of a length in pixels at the lower left, with its text."""
+    margin, gap = 0.06 * dpi, 0.03 * dpi
+    axes.plot(
+        [margin, margin + length], [margin, margin], color=INK, linewidth=1.2, solid_capstyle="butt"
+    )
+    axes.text(margin, margin + gap, text, fontsize=TEXT_SIZE, color=INK, va="bottom")

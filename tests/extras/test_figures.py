@@ -1,0 +1,211 @@
+"""`figure`: pictures, keys and text are what and where they should be, also in the files."""
+
+from __future__ import annotations
+
+import io
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import pyvista as pv
+from matplotlib.figure import Figure
+from PIL import Image
+
+import rosy_addon as rf
+from rosy_addon.color import from_hex
+from rosy_addon.projection.camera import orbit_camera
+
+#: Small and fast.
+SMALL = {"dpi": 60, "supersampling": 1}
+
+
+@pytest.fixture(scope="module")
+def surface():
+    mesh = pv.Icosphere(nsub=3, radius=2.5)
+    return rf.Surface(mesh.points, mesh.faces.reshape(-1, 4)[:, 1:], name="ball")
+
+
+@pytest.fixture(scope="module")
+def fields(surface):
+    smoothest = rf.smoothest(surface)
+    return {"Ours": smoothest, "Turned & moved": smoothest.rotated(0.3)}
+
+
+def panels_of(figure: Figure):
+    """The axes with pictures."""
+    return [axes for axes in figure.axes if axes.images]
+
+
+def texts_of(figure: Figure):
+    return [text.get_text() for text in figure.texts]
+
+
+def test_panels_fill_the_width_on_whole_pixels(fields):
+    figure = rf.figure(fields, width=5.0, **SMALL)
+    first, second = panels_of(figure)
+    size = figure.get_size_inches() * 60
+    for axes in (first, second):
+        place = axes.get_position()
+        corners = np.array([place.x0, place.y0, place.x1, place.y1]) * np.tile(size, 2)
+        assert np.allclose(corners, np.rint(corners), atol=1e-6)
+        height, width = axes.images[0].get_array().shape[:2]
+        assert np.allclose(corners[2:] - corners[:2], (width, height))
+    assert texts_of(figure)[:2] == ["(a) Ours", "(b) Turned & moved"]
+
+
+def test_pictures_have_one_camera_and_one_range(surface):
+    """The magnitude of one field is twice that of the other: both get the color map of the larger one."""
+    one = rf.along_axis(surface, (0, 0, 1), degree=2).with_magnitude("unit")
+    fields = {"one": one, "two": one.with_magnitude(2.0)}
+    look = {"magnitude": "colour", "colour_map": "grey", "gain": 0, "shading": 0, "hue": "one"}
+    figure = rf.figure(fields, singularity_dots="none", color_label="speed (m/s)", **look, **SMALL)
+    bar = next(axes for axes in figure.axes if axes.get_ylabel() == "speed (m/s)")
+    assert bar.get_ylim() == (0, 2)
+    first, second = (axes.images[0].get_array() for axes in panels_of(figure))
+    assert np.array_equal(first[..., 3], second[..., 3])
+    inside = first[..., 3] == 255
+    ends = np.array([from_hex("#111111")[0], 1.0]) * 255
+    assert abs(np.median(np.asarray(first)[inside, 0]) - ends.mean()) < 2
+    assert abs(np.median(np.asarray(second)[inside, 0]) - ends[1]) < 2
+
+
+def test_numbers_as_colors(surface):
+    """The height over two fields, of which one has half of it: one range, whose name is the label."""
+    one, height = rf.form(surface), surface.vertices[:, 2]
+    figure = rf.figure([one, one], color_values=[height, height / 2], colour_map="magma", **SMALL)
+    bar = next(axes for axes in figure.axes if not axes.images and axes.axison)
+    assert np.allclose(bar.get_ylim(), (-2.5, 2.5)) and bar.get_ylabel() == ""
+    with pytest.raises(rf.RosyError, match="1 array for 2 fields"):
+        rf.figure([one, one], color_values=[height], **SMALL)
+
+
+def test_dots_are_at_the_singularities(fields, surface):
+    """Projected by hand: the camera looks along y, and x is to the right."""
+    figure = rf.figure(fields["Ours"], view=(0, 0), **SMALL)
+    (axes,) = panels_of(figure)
+    height, width = axes.images[0].get_array().shape[:2]
+    camera = orbit_camera(surface.vertices, 0, 0, width, height, perspective=False, margin=0.02)
+    drawn = np.array([line.get_xydata()[0] for line in axes.lines])
+    points = surface.vertices[fields["Ours"].singularities.vertex]
+    place = points[:, [0, 2]] * camera.pixels_per_unit + (width / 2, height / 2)
+    is_drawn = np.linalg.norm(drawn[:, None] - place, axis=2).min(axis=0) < 0.5
+    depth = points[:, 1]
+    assert is_drawn[depth < -0.1].all() and not is_drawn[depth > 0.1].any()
+    assert len(drawn) == is_drawn.sum() > 2
+    assert "index +1/4" in texts_of(figure)
+
+
+def test_differences(fields):
+    """A field that is turned by 0.3: one color, the angle in the note, rings around dots."""
+    look = {"gain": 0, "shading": 0, **SMALL}
+    parts = ("differences",)
+    for lines in ("other", "first", "both"):
+        figure = rf.figure(fields, parts=parts, lines=lines, largest_angle=40, **look)
+        (axes,) = panels_of(figure)
+        picture = axes.images[0].get_array()
+        colors = picture[picture[..., 3] == 255][:, :3].astype(int)
+        assert np.ptp(colors, axis=0).max() <= 1
+        bar = next(axes for axes in figure.axes if axes.get_ylabel() == "angle (degrees)")
+        mappable = bar._colorbar.mappable
+        expected = np.array(mappable.to_rgba(np.degrees(0.3))[:3]) * 255
+        assert np.abs(colors.mean(axis=0) - expected).max() < 3
+    assert any(text.startswith("mean 17.2°, 95 % 17.2°") for text in texts_of(figure))
+    markers = [line for line in axes.lines if line.get_marker() == "o"]
+    open_ones = [line for line in markers if line.get_markerfacecolor() == "none"]
+    assert len(open_ones) == len(markers) / 2 > 0
+
+
+def test_a_table_and_a_caption(fields):
+    figure = rf.figure(fields, parts=("table",), caption="Two fields. " * 20, dpi=60)
+    texts = texts_of(figure)
+    assert not figure.axes and "energy" in texts and "17.2" in texts
+    assert sum(text.count("Two fields.") for text in texts) >= 19  # the caption is in several lines
+    height = figure.get_size_inches()[1]
+    for text in figure.texts:
+        box = text.get_window_extent().transformed(figure.dpi_scale_trans.inverted())
+        assert box.x0 > -0.02 and box.x1 < 7.02 and box.y0 > -0.02 and box.y1 < height + 0.02
+
+
+def test_the_scale_bar_has_a_round_length(fields, surface):
+    """The ball has a diameter of 5: its picture is 96 % of the panel."""
+    figure = rf.figure(fields["Ours"], scale_bar="mm", singularity_dots="none", **SMALL)
+    (axes,) = panels_of(figure)
+    (line,) = axes.lines
+    width = axes.images[0].get_array().shape[1]
+    assert axes.texts[0].get_text() == "1 mm"
+    assert np.isclose(np.ptp(line.get_xdata()), 0.96 * width / 5, rtol=0.01)
+    with pytest.raises(rf.RosyError, match="orthographic"):
+        rf.figure(fields["Ours"], scale_bar="mm", orthographic=False)
+
+
+def test_files(fields, tmp_path):
+    """Fonts are embedded as TrueType, text is text, pages are pages, and bytes are the same again."""
+    pages = [rf.figure(fields, **SMALL), rf.figure(fields, parts=("differences", "table"), **SMALL)]
+    for name in ("a.pdf", "b.pdf"):
+        rf.save_figures(tmp_path / name, pages)
+    pdf = (tmp_path / "a.pdf").read_bytes()
+    assert pdf == (tmp_path / "b.pdf").read_bytes()
+    assert len(re.findall(rb"/Type /Page\b", pdf)) == 2
+    assert b"/FontFile2" in pdf and b"/Type3" not in pdf
+    rf.save_figures(tmp_path / "a.svg", pages[0])
+    root = ElementTree.parse(tmp_path / "a.svg").getroot()
+    written = [
+        "".join(node.itertext()).strip() for node in root.iter("{http://www.w3.org/2000/svg}text")
+    ]
+    assert "(b) Turned & moved" in written and "index +1/4" in written
+    rf.save_figures(tmp_path / "a.png", pages[0])
+    with Image.open(tmp_path / "a.png") as image:
+        size = pages[0].get_size_inches() * 60
+        assert np.allclose(image.size, size, atol=1)
+        picture = np.asarray(image.convert("RGBA"))
+    panel = panels_of(pages[0])[0]
+    own = panel.images[0].get_array()
+    top = round((1 - panel.get_position().y1) * size[1])
+    shown = picture[top : top + own.shape[0], : own.shape[1]]
+    solid = own[..., 3] == 255
+    off = np.abs(shown[..., :3].astype(int) - own[..., :3]).max(axis=2)[solid]
+    assert np.mean(off > 0) < 0.1  # dots are drawn over it
+    with pytest.raises(rf.RosyError, match=r"only a \.pdf can hold 2 figures"):
+        rf.save_figures(tmp_path / "a.svg", pages)
+    with pytest.raises(rf.RosyError, match=r"\.pdf, \.svg, \.png"):
+        rf.save_figures(tmp_path / "a.jpg", pages[0])
+
+
+def test_formulas(fields, tmp_path, error_of):
+    figure = rf.figure(fields, parts=("table",), caption=r"$\frac{1}{$", dpi=60)
+    message = error_of(rf.save_figures, tmp_path / "a.svg", figure)
+    assert "is not a formula" in message and not list(tmp_path.iterdir())
+    figure = rf.figure(fields, parts=("table",), caption=r"$\frac{1}{2}$ for 3 \$", dpi=60)
+    rf.save_figures(tmp_path / "a.svg", figure)
+
+
+def test_what_a_figure_refuses(fields, error_of):
+    other = rf.Surface(
+        pv.Icosphere(nsub=1).points, pv.Icosphere(nsub=1).faces.reshape(-1, 4)[:, 1:]
+    )
+    for arguments, message in (
+        ({"parts": ("legend",)}, "choose fields, differences, table"),
+        ({"parts": ()}, "needs parts"),
+        ({"lines": "none"}, "choose other, first, both"),
+        ({"dpi": 3}, "from 10 to 2400"),
+        ({"width": float("nan")}, "from 0.5 to 100"),
+        ({"gian": 3}, "no setting 'gian'"),
+    ):
+        assert message in error_of(rf.figure, fields, **arguments)
+    mixed = [fields["Ours"], rf.form(other)]
+    assert "no other field" in error_of(rf.figure, mixed, parts="differences")
+    assert len(panels_of(rf.figure(mixed, **SMALL))) == 2
+
+
+def test_the_command(tmp_path, rosy, fields, surface):
+    pv.PolyData.from_regular_faces(surface.vertices, surface.faces).save(tmp_path / "ball.ply")
+    words = ("compare", tmp_path / "ball.ply", "Ours=smoothest", "form", "--dpi", 50)
+    status, output, errors = rosy(
+        *words, "-o", tmp_path / "a.pdf", "--caption", "A ball", "--degree", 2
+    )
+    assert (status, errors) == (0, "") and "Ours" in output
+    assert len(re.findall(rb"/Type /Page\b", (tmp_path / "a.pdf").read_bytes())) == 2
+    assert rosy(*words, "-o", tmp_path / "a.png", "--set", "supersampling=1")[0] == 0
+    with Image.open(io.BytesIO((tmp_path / "a.png").read_bytes())) as image:
+        assert image.width == 350

@@ -1,0 +1,148 @@
+"""`compare`: angles, matched singularities, and the table in text, JSON and LaTeX."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from shapes import icosphere, torus
+
+import rosy_addon as rf
+from rosy_addon.cli.parser import main
+
+
+def surface_of(mesh, **options):
+    return rf.Surface(mesh.vertices, np.split(mesh.corner_vertex, mesh.face_start[1:-1]), **options)
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    return surface_of(icosphere(2), name="sphere")
+
+
+def members(surface, vectors, degree):
+    """The members of one face: a vector rotated about the normal."""
+    angles = 2 * np.pi * np.arange(degree) / degree
+    for vector, normal in zip(vectors, surface.face_normals, strict=True):
+        perpendicular = np.cross(normal, vector)
+        yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * perpendicular
+
+
+@pytest.mark.parametrize("degree", range(1, 8))
+def test_angles_are_those_of_the_nearest_members(degree):
+    """Every member of one field against every member of the other, face by face."""
+    surface = surface_of(torus(16, 10))
+    one, other = rf.form(surface, degree), rf.along_axis(surface, (1, 2, 3), degree=degree)
+    difference = rf.compare([one, other]).differences["field 2"]
+    for face, (a, b) in enumerate(
+        zip(
+            members(surface, one.vectors, degree),
+            members(surface, other.vectors, degree),
+            strict=True,
+        )
+    ):
+        a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
+        nearest = np.arctan2(np.linalg.norm(np.cross(a[0], b), axis=1), b @ a[0]).min()
+        assert np.isclose(difference.angle[face], nearest, atol=1e-6)
+
+
+def test_rows_of_fields_that_are_turned(sphere):
+    one = rf.smoothest(sphere)
+    comparison = rf.compare({"One": one, "turned": one.rotated(0.1), "lines": one.to_degree(2)})
+    first, turned, lines = comparison.rows
+    assert [row["title"] for row in comparison.rows] == ["One", "turned", "lines"]
+    assert first["singularities"] == first["positive"] == 8 and first["negative"] == 0
+    assert first["energy"] == one.energy and "mean" not in first and "mean" not in lines
+    for name in ("mean", "rms", "p95", "max"):
+        assert np.isclose(turned[name], np.degrees(0.1))
+    assert turned["matched"] == 8 and turned["matched_distance"] == 0 and turned["compared"] == 1
+
+
+def test_the_face_of_the_largest_angle(sphere):
+    one = rf.along_axis(sphere, (0, 0, 1), degree=1)
+    turn = np.zeros(sphere.face_count)
+    turn[:] = 0.1
+    turn[7] = 0.4
+    x, y = one.vectors, np.cross(sphere.face_normals, one.vectors)
+    other = rf.from_vectors(sphere, np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * y, degree=1)
+    row = rf.compare([one, other]).rows[1]
+    assert row["worst_face"] == 7 and np.isclose(row["max"], np.degrees(0.4))
+    assert np.allclose(row["worst_position"], sphere.vertices[sphere.faces[7]].mean(axis=0))
+
+
+def test_singularities_match_within_reach(sphere):
+    """One of four moves along an edge; in another field, two of them are one of twice the index."""
+    start, end = sphere.faces[0][:2].tolist()
+    edge = np.linalg.norm(sphere.vertices[start] - sphere.vertices[end])
+    others = [int(np.argmin(sphere.vertices @ sphere.vertices[start]))]
+    for _ in range(2):
+        nearest = np.max(sphere.vertices @ sphere.vertices[[start, *others]].T, axis=1)
+        others.append(int(np.argmin(nearest)))
+    first, second, third = others
+    one = rf.prescribed(sphere, {start: 1, first: 1, second: 1, third: 1}, 2)
+    moved = rf.prescribed(sphere, {end: 1, first: 1, second: 1, third: 1}, 2)
+    merged = rf.prescribed(sphere, {start: 2, second: 1, third: 1}, 2)
+    wide, narrow = (rf.compare([one, moved, merged], reach=reach).rows for reach in (0.2, 0.01))
+    assert [row["matched"] for row in wide[1:]] == [4, 2]
+    assert np.isclose(wide[1]["matched_distance"], edge / 4)
+    assert [row["matched"] for row in narrow[1:]] == [3, 2]
+
+
+def test_tables(sphere):
+    one = rf.form(sphere)
+    comparison = rf.compare({"50 % & more_1": one, "b": one.rotated(0.1)})
+    text, latex = str(comparison), comparison.to_latex()
+    lines = text.splitlines()
+    assert lines[1].startswith("50 % & more_1") and " 5.73 " in lines[2]
+    assert len({len(line) for line in lines[:3]}) == 1  # columns of equal width
+    assert r"50 \% \& more\_1 & 4" in latex and latex.count(r"\\") == 3
+    assert re.search(r"tabular\}\{l(r+)\}", latex)[1] == "r" * latex.splitlines()[2].count("&")
+    assert " & -- & -- " in latex
+    assert json.loads(comparison.to_json())[1]["title"] == "b"
+    assert "<td>50 % &amp; more_1</td>" in comparison._repr_html_()
+    assert "matched" not in str(rf.compare([one]))
+
+
+def test_nothing_to_compare(sphere):
+    with pytest.raises(rf.RosyError, match="there is no field"):
+        rf.compare([])
+    undefined = rf.from_vectors(sphere, np.zeros((sphere.face_count, 3)), degree=4)
+    row = rf.compare([rf.form(sphere), undefined]).rows[1]
+    assert row["worst_face"] == -1 and row["worst_position"] is None and row["compared"] == 0
+
+
+def test_the_command(sphere, tmp_path, capfd):
+    mesh, field = tmp_path / "sphere.off", tmp_path / "turned.rosy"
+    rows = [" ".join(map(str, row)) for row in sphere.vertices.tolist()]
+    rows += [" ".join(map(str, (3, *face))) for face in sphere.faces.tolist()]
+    head = ["OFF", f"{len(sphere.vertices)} {sphere.face_count} 0"]
+    mesh.write_text("\n".join([*head, *rows]))
+    rf.smoothest(rf.Surface(mesh), degree=6).rotated(0.05).save(field)
+    assert main(["compare", str(mesh), "Ours=smoothest", str(field), "--format", "json"]) == 0
+    ours, turned = json.loads(capfd.readouterr().out)
+    assert (ours["title"], turned["title"]) == ("Ours", "turned") and ours["degree"] == 6
+    assert np.isclose(turned["mean"], np.degrees(0.05), atol=1e-3)
+    for words, message in (
+        (["form", "form"], "same title"),
+        (["form", "b=curvature", "-o", str(tmp_path / "a.gif")], ".pdf, .svg, .png"),
+        (["nothing.rosy"], "nothing.rosy"),
+    ):
+        assert main(["compare", str(mesh), *words]) == 2
+        assert message in capfd.readouterr().err
+
+
+def test_figures_need_matplotlib(sphere):
+    """In another process, where it cannot be imported; and as in the extension, without the module."""
+    code = (
+        "import sys; sys.modules[{!r}] = None\nimport rosy_addon as rf\n"
+        "s = rf.Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])\n"
+        "try: rf.figure(rf.form(s))\nexcept rf.RosyError as error: print(error)"
+    )
+    for module in ("matplotlib", "rosy_addon.external.matplotlib_figure"):
+        words = [sys.executable, "-c", code.format(module)]
+        output = subprocess.check_output(words, text=True)
+        assert "pip install rosyfields[figures]" in output and output.count("\n") == 1

@@ -1,0 +1,45 @@
+"""Singularities of two fields are matched, the nearest pairs first."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from rosy_addon.field.singularity_matching import match_singularities_task
+from rosy_addon.progress import run_to_completion
+
+
+def match(*arguments):
+    return run_to_completion(match_singularities_task(*arguments))
+
+
+def greedy_pairs(points, index, other_points, other_index, reach):
+    """The same, one pair after another."""
+    distance = cdist(points, other_points)
+    distance[index[:, None] != other_index] = np.inf
+    pairs = []
+    while distance.size and distance.min() <= reach:
+        row, column = np.unravel_index(np.argmin(distance), distance.shape)
+        pairs.append((row, column))
+        distance[row], distance[:, column] = np.inf, np.inf
+    return sorted(pairs)
+
+
+def test_the_nearest_pairs_come_first():
+    random = np.random.default_rng(3)
+    for count, other_count, reach in ((40, 55, 0.2), (200, 120, 0.5), (60, 60, 9.0), (5, 0, 1.0)):
+        points, other_points = random.random((count, 3)), random.random((other_count, 3))
+        index, other_index = random.choice([-1, 1], count), random.choice([-1, 1, 2], other_count)
+        found = match(points, index, other_points, other_index, reach)
+        pairs = list(zip(found.first.tolist(), found.second.tolist(), strict=True))
+        assert pairs == greedy_pairs(points, index, other_points, other_index, reach)
+        distance = np.linalg.norm(points[found.first] - other_points[found.second], axis=1)
+        np.testing.assert_allclose(found.distance, distance)
+
+
+def test_a_chain_of_neighbors_is_matched_from_its_closest_pair():
+    """On a line at 0, 10 and 19; the others at 9 and 20: 19 and 20 first, 9 and 10 next, 0 stays."""
+    first = np.array([[0.0, 0, 0], [10, 0, 0], [19.2, 0, 0]])
+    second = np.array([[9.0, 0, 0], [20.0, 0, 0]])
+    found = match(first, np.ones(3), second, np.ones(2), 12.0)
+    assert found.first.tolist() == [1, 2] and found.second.tolist() == [0, 1]

@@ -5,7 +5,7 @@
 #   make check     check format, lint and types, and run the quick unit tests
 #   make test      all unit tests, the quick ones with old numpy as well, and the tests with
 #                  Blender 4.2's Python module
-#   make test-extras  the tests of what needs other libraries: the files of simulations
+#   make test-extras  the tests of what needs other libraries: the files of simulations, figures
 #   make smoke     the main job with Blender 4.5's and 5.0's modules
 #   make test-all  `make test`, and all tests with Blender 4.5's and 5.0's modules
 #   make test-notebooks  the notebooks, with the package as a user installs it

@@ -198,8 +198,9 @@ def compare(
     --------
     >>> import rosyfields as rf
     >>> torus = rf.Surface("torus.obj")
-    >>> print(rf.compare({"form": rf.form(torus), "along z": rf.along_axis(torus, (0, 0, 1))}))
-    field    degree  energy  singularities  ...
+    >>> fields = {"form": rf.form(torus), "along z": rf.along_axis(torus, (0, 0, 1))}
+    >>> print(rf.compare(fields))  # doctest: +ELLIPSIS
+    field    degree  energy  singularities  positive  negative ...
     """
     titled = titled_fields(fields)
     reference = next(iter(titled.values()))

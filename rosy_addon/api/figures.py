@@ -140,8 +140,8 @@ def figure(
     >>> import rosyfields as rf
     >>> torus = rf.Surface("torus.obj")
     >>> methods = {"Form": rf.form(torus), "Smoothest": rf.smoothest(torus)}
-    >>> page = rf.figure(methods, parts=("fields", "differences", "table"), dpi=60)
-    >>> page.savefig("torus.pdf")
+    >>> page = rf.figure(methods, parts=("fields", "differences", "table"), dpi=60)  # doctest: +SKIP
+    >>> page.savefig("torus.pdf")  # doctest: +SKIP
     """
     drawing = load_drawing()
     is_single = isinstance(fields, Field)
@@ -218,8 +218,8 @@ def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure
     >>> import rosyfields as rf
     >>> torus = rf.Surface("torus.obj")
     >>> fields = {"Form": rf.form(torus), "Smoothest": rf.smoothest(torus)}
-    >>> pages = [rf.figure(fields, dpi=60), rf.figure(fields, parts=("differences", "table"), dpi=60)]
-    >>> rf.save_figures("methods.pdf", pages)
+    >>> pages = [rf.figure(fields, dpi=60), rf.figure(fields, parts=("differences", "table"), dpi=60)]  # doctest: +SKIP
+    >>> rf.save_figures("methods.pdf", pages)  # doctest: +SKIP
     """
     pages = list(figures) if isinstance(figures, Sequence) else [figures]
     check_figure_path(Path(path), len(pages))

@@ -359,6 +359,7 @@ class _Layout:
 
     def _draw_color_bar(self, bar: ColorBar, left: float, top: float, height: float) -> None:
         """Draw a color bar with ticks and its label."""
+        from matplotlib.cm import ScalarMappable
         from matplotlib.colorbar import Colorbar
         from matplotlib.colors import LinearSegmentedColormap, Normalize
 
@@ -367,8 +368,6 @@ class _Layout:
         low, high = sorted((bar.low, bar.high))
         if low > bar.low or high < bar.high:
             colors = colors.reversed()
-        from matplotlib.cm import ScalarMappable
-
         mappable = ScalarMappable(Normalize(low, high if high > low else low + 1), colors)
         drawn = Colorbar(axes, mappable)
         drawn.set_label(bar.label, fontsize=TEXT_SIZE, color=INK)
@@ -381,14 +380,18 @@ class _Layout:
         from matplotlib.lines import Line2D
 
         table, height = self.page.table, _text_height(TEXT_SIZE) * 1.15
-        lengths = [max(map(len, column)) + 2 for column in zip(*table, strict=True)]
-        share = self.width / sum(lengths)
-        right = np.cumsum(lengths) * share
+        widths = np.array([max(map(_text_width, column)) for column in zip(*table, strict=True)])
+        # The text is smaller if the columns are too wide for the figure.
+        room, least_gap = self.width, _text_width("mm") * (len(widths) - 1)
+        scale = min(room / (widths.sum() + least_gap), 1.0)
+        gap = (room - scale * widths.sum()) / max(len(widths) - 1, 1)
+        right = np.cumsum(scale * widths) + gap * np.arange(len(widths))
+        size = scale * TEXT_SIZE
         for number, row in enumerate(table):
             line_top = top + (number + (0.4 if number else 0.2)) * height
             for column, text in enumerate(row):
                 left = 0.0 if column == 0 else float(right[column])
-                self._text(left, line_top, text, TEXT_SIZE, ha="left" if column == 0 else "right")
+                self._text(left, line_top, text, size, ha="left" if column == 0 else "right")
         for offset, line_width in ((0.1, 0.8), (1.25, 0.5), (len(table) + 0.55, 0.8)):
             y = 1 - (top + offset * height) / self.height
             line = Line2D([0, 1], [y, y], linewidth=line_width, color=INK)
@@ -398,6 +401,16 @@ class _Layout:
 def _text_height(size: float) -> float:
     """Return the height of a line of text in inches."""
     return LINE_HEIGHT * size / POINTS
+
+
+def _text_width(text: str) -> float:
+    """Return the width of a text in the size `TEXT_SIZE`, in inches."""
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import text_to_path
+
+    font = FontProperties(size=TEXT_SIZE)
+    width, _, _ = text_to_path.get_text_width_height_descent(text, font, ismath=False)
+    return width / POINTS
 
 
 def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:

@@ -105,6 +105,22 @@ def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
     assert file.is_file()
 
 
+def comparisons(field: rf.Field, folder: Path) -> None:
+    """A table, and a figure if matplotlib is installed."""
+    comparison: rf.Comparison = rf.compare({"one": field, "two": field.rotated(0.1)}, reach=0.1)
+    rows: list[dict[str, Any]] = comparison.rows
+    texts: list[str] = [str(comparison), comparison.to_json(), comparison.to_latex()]
+    differences: dict[str, rf.Difference] = comparison.differences
+    assert rows[1]["matched"] == len(comparison.matchings["two"].distance) and all(texts)
+    assert set(comparison.fields) == {"one", "two"} and comparison.cells()[0][0] == "field"
+    assert differences["two"].worst_face >= 0 and 0.09 < differences["two"].p95 < 0.11
+    try:
+        figure = rf.figure([field], parts=("fields", "table"), dpi=20, workers=1)
+        rf.save_figures(folder / "cube.pdf", figure)
+    except rf.RosyError as error:
+        assert "matplotlib" in str(error)
+
+
 def errors(cube: rf.Surface) -> None:
     """An error and a warning."""
     try:
@@ -121,5 +137,7 @@ def main(folder: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rf.RosyWarning)
         cube = surfaces()
-        pictures(cube, fields(cube, folder), folder)
+        field = fields(cube, folder)
+    comparisons(field, folder)
+    pictures(cube, field, folder)
     errors(cube)

@@ -11,12 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import RosyError
-from ..field.singularity_matching import SingularityMatching, match_singularities_task
+from ..field.singularity_matching import (
+    DEFAULT_REACH,
+    SingularityMatching,
+    match_singularities_task,
+)
 from ..progress import run_to_completion
 from .field import Difference, Field
-
-#: Singularities of two fields match if they are nearer than this fraction of the longest side of the mesh.
-DEFAULT_REACH = 0.05
 
 #: Characters that LaTeX would interpret, and what prints them.
 _LATEX = {

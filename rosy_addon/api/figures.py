@@ -20,6 +20,7 @@ from ..compositor.color_values import value_ends, value_ranges
 from ..compositor.look import Look, colors_magnitude, colors_values
 from ..compositor.look_units import scaled_look
 from ..errors import RosyError, counted
+from ..field.singularity_matching import DEFAULT_REACH
 from ..file_io import write_bytes
 from ..image_io.png import to_srgb_uint8
 from ..progress import run_to_completion
@@ -29,7 +30,7 @@ from ..projection.visible_vertices import project_vertices_task
 from ..rendering.band_workers import BandWorkers
 from ..rendering.cpu import CpuRenderer
 from ..rendering.view_input import ViewInput
-from .comparison import DEFAULT_REACH, Comparison, compare
+from .comparison import Comparison, compare
 from .field import Field
 from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
 

@@ -8,6 +8,9 @@ import numpy as np
 
 from ..progress import Progress, Task
 
+#: Singularities match if they are nearer than this fraction of the longest side of the mesh.
+DEFAULT_REACH = 0.05
+
 #: Distances that are computed in a step.
 DISTANCES_PER_STEP = 2_000_000
 

@@ -9,6 +9,7 @@ from ..errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field
+from ..scene.field_difference import other_field_names
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.scene_reader import field_objects
 from ..scene.staleness import SCENE_STATES
@@ -80,6 +81,12 @@ def _draw_existing_field(
     header.label(text="Convert")
     if body is not None:
         _draw_convert_settings(body, context)
+    other_fields = other_field_names(mesh)
+    if other_fields:
+        header, body = layout.panel("rosy_compare_field", default_closed=True)
+        header.label(text="Compare")
+        if body is not None:
+            _draw_compare_settings(body, context, other_fields)
     header, body = layout.panel("rosy_another_field", default_closed=True)
     header.label(text="Make Another Field")
     if body is not None:
@@ -96,6 +103,17 @@ def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Contex
         column.prop(settings, "values")
     layout.operator("rosy.field_convert")
     layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
+
+
+def _draw_compare_settings(
+    layout: bpy.types.UILayout, context: bpy.types.Context, other_fields: list[str]
+) -> None:
+    """Draw the settings and the button of the comparison with another field."""
+    settings = context.window_manager.operator_properties_last("rosy.field_compare")
+    column = layout.column()
+    column.prop(settings, "other", placeholder=other_fields[0] if len(other_fields) == 1 else "")
+    column.prop(settings, "use_as_color")
+    layout.operator("rosy.field_compare")
 
 
 def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

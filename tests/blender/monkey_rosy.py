@@ -175,6 +175,17 @@ def comb(monkey):
     )
 
 
+@action(1.5, uses_rosy=True)
+def compare_fields(monkey):
+    prepare(monkey)
+    obj = bpy.context.view_layer.objects.active
+    names = (
+        [attribute.name for attribute in obj.data.attributes] if obj and obj.type == "MESH" else []
+    )
+    other = monkey.pick([*names, *names, monkey.name(), ""])
+    monkey.rosy("field_compare", other=other, use_as_color=monkey.chance(0.7))
+
+
 @action(0.7, uses_rosy=True)
 def occlusion(monkey):
     prepare(monkey)

@@ -314,6 +314,11 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_convert": _FIELD,
     "field_singularities": _FIELD,
     "field_comb": (*_FIELD, "meshes/SELECTED/attributes/*rosy_guides*"),
+    "field_compare": (
+        "meshes/SELECTED/attributes/Difference",
+        "scenes/SCENE/rosy/color_attribute",
+        *(f"scenes/SCENE/rosy/look/{name}" for name in ("hue", "values_low", "values_high")),
+    ),
     "field_store": _FIELD,
     "field_import": _FIELD,
     "field_export": (),

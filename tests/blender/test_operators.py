@@ -710,6 +710,37 @@ def test_a_file_of_the_mesh_before_it_was_triangulated(suzanne, tmp_path):
     assert np.median(vectors @ axis) > 0.4
 
 
+# --- comparison ----------------------------------------------------------------------------------
+
+
+def test_fields_are_compared(suzanne):
+    """A field that is turned by 0.2 under another name: the angle is an attribute and the color."""
+    mesh, settings = suzanne.data, bpy.context.scene.rosy
+    bpy.ops.rosy.field_generate(kind="axis", degree=2)
+    with pytest.raises(RuntimeError, match="make one with another name of the attribute"):
+        bpy.ops.rosy.field_compare()
+    bpy.ops.rosy.field_generate(kind="axis", degree=2, attribute="turned")
+    bpy.ops.rosy.field_convert(angle=0.2)
+    assert bpy.ops.rosy.field_compare(other="rosy", use_as_color=False) == {"FINISHED"}
+    assert settings.look.hue == "one"
+    assert bpy.ops.rosy.field_compare() == {"FINISHED"}  # with the only other one
+    attribute = mesh.attributes["Difference"]
+    assert (attribute.domain, attribute.data_type) == ("FACE", "FLOAT")
+    values = np.empty(len(mesh.polygons), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    defined = np.isfinite(values)
+    assert defined.mean() > 0.9 and np.allclose(values[defined], np.degrees(0.2), atol=0.01)
+    assert (settings.color_attribute, settings.look.hue) == ("Difference", "values")
+    assert (settings.look.values_low, settings.look.values_high) == (0, 90)
+    for other, message in (("turned", "choose 'rosy'"), ("missing", "no attribute 'missing'")):
+        with pytest.raises(RuntimeError, match=message):
+            bpy.ops.rosy.field_compare(other=other)
+    mesh.attributes.remove(mesh.attributes["Difference"])
+    mesh.attributes.new("Difference", "INT", "POINT")
+    with pytest.raises(RuntimeError, match="another type"):
+        bpy.ops.rosy.field_compare(other="rosy")
+
+
 # --- occlusion ------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,83 @@
+"""Operator: compare the field of the active mesh with another one, and color the lines by the angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..rosy_addon.errors import counted
+from ..rosy_addon.progress import Task
+from ..rosy_addon.scene.field_difference import (
+    DIFFERENCE_ATTRIBUTE,
+    FieldDifference,
+    other_field_names,
+    store_difference_task,
+)
+from .modal_task import ModalTaskMixin
+from .poll import poll_active_field, poll_editable, selected_mesh_objects
+
+
+def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
+    return [
+        name for obj in selected_mesh_objects(context)[:1] for name in other_field_names(obj.data)
+    ]
+
+
+class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
+    """Compute the angle between the field of the active mesh and another one, store it as an attribute, and color the lines by it"""
+
+    bl_idname = "rosy.field_compare"
+    bl_label = "Compare"
+    bl_options = {"REGISTER", "UNDO"}
+
+    other: bpy.props.StringProperty(
+        name="With",
+        description="Attribute of the active mesh that holds the other field, of the same degree. Empty: the only "
+        "other one",
+        search=_search_fields,
+    )
+    use_as_color: bpy.props.BoolProperty(
+        name="Color Lines",
+        description="Color the lines by the angle, from 0 to 180/N degrees",
+        default=True,
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return poll_editable(cls, context) and poll_active_field(cls, context)
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        return [selected_mesh_objects(context)[0].data]
+
+    def make_task(self, context: bpy.types.Context) -> Task[FieldDifference]:
+        (mesh,) = self.required_data(context)
+        return store_difference_task(mesh, self.other)
+
+    def finish(self, context: bpy.types.Context, result: FieldDifference) -> None:
+        if self.use_as_color:
+            settings = context.scene.rosy
+            settings.color_attribute = DIFFERENCE_ATTRIBUTE
+            settings.look.hue = "values"
+            settings.look.values_low, settings.look.values_high = 0.0, 180.0 / result.degree
+        statistics = result.statistics
+        mean, p95, largest = np.degrees([statistics.mean, statistics.p95, statistics.max])
+        self.report(
+            {"INFO"},
+            f"Off by {mean:.3g} degrees on average, {p95:.3g} on 95 % of the area, at most {largest:.3g} on "
+            f"face {statistics.worst_face}; {result.matched_count} of "
+            f"{counted(result.singularity_count, 'singularity', 'singularities')} match the "
+            f"{result.other_count} of '{result.other}'",
+        )
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "other")
+        layout.prop(self, "use_as_color")
+
+
+CLASSES = (ROSY_OT_field_compare,)

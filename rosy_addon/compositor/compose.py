@@ -18,6 +18,7 @@ from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
 from .even_lines import EvenLines, even_line_images_task, has_even_lines
 from .family_hues import family_hues
+from .filter_kernel import look_for_symmetry
 from .hatching import (
     LineModulation,
     has_breaks,
@@ -119,10 +120,11 @@ def compose_task(
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
         yield Progress(start, "finding directions")
         field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
+        field_look = look_for_symmetry(pixel_look, field.symmetry)
         even_lines = break_images = None
-        break_look = replace(pixel_look, length=break_steps(pixel_look))
-        if has_even_lines(pixel_look):
-            task = stages.even_lines_task(field, pixel_look)
+        break_look = replace(field_look, length=break_steps(field_look))
+        if has_even_lines(field_look):
+            task = stages.even_lines_task(field, field_look)
             even_lines = yield from subtask(task, start, stop)
             images = yield from subtask(even_line_images_task(even_lines), stop, stop)
             if has_breaks(look):
@@ -130,19 +132,19 @@ def compose_task(
                     stages.lic_task(field, [break_look]), stop, stop
                 )
         elif has_breaks(look):
-            task = stages.lic_task(field, [pixel_look, break_look])
+            task = stages.lic_task(field, [field_look, break_look])
             images, break_images = yield from subtask(task, start, stop)
         else:
-            (images,) = yield from subtask(stages.lic_task(field, [pixel_look]), start, stop)
+            (images,) = yield from subtask(stages.lic_task(field, [field_look]), start, stop)
         part_look = (
-            with_magnitude_range(pixel_look, field) if colors_magnitude(look) else pixel_look
+            with_magnitude_range(field_look, field) if colors_magnitude(look) else field_look
         )
         tone = modulation = None
         drawn = stages.drawn(field)
         if is_hatched(look):
             tone = yield from subtask(_mean_tone_task(tone_rgb[field.gbuffer_index]), stop, stop)
             modulation = yield from subtask(
-                _line_modulation_task(stages, field, pixel_look, tone, break_images, even_lines),
+                _line_modulation_task(stages, field, field_look, tone, break_images, even_lines),
                 stop,
                 stop,
             )
@@ -150,7 +152,7 @@ def compose_task(
         field = field.part(drawn)
         if map_position is not None:
             field = replace(field, map_position=map_position[field.gbuffer_index])
-        layer = yield from subtask(layer_task(field, pixel_look, images), stop, stop)
+        layer = yield from subtask(layer_task(field, field_look, images), stop, stop)
         for block in pixel_blocks(len(field.pixel)):
             yield Progress(stop, "drawing the ink")
             part, part_images = field.part(block), images.part(block)
@@ -220,7 +222,7 @@ def compose_planar(
     field = planar_pixel_field(angles, degree, magnitude)
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
-    look = replace(look, supersampling=1)
+    look = look_for_symmetry(replace(look, supersampling=1), field.symmetry)
     images = run_to_completion(lic_task(field, look, noise))
     layer = run_to_completion(layer_task(field, look, images))
     color = colorize(field, layer.images, layer.tone, look)
@@ -274,7 +276,7 @@ def _tone_along_lines_task(
     """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
-    overshoot_look = replace(look, length=overshoot_steps(look), taper=False)
+    overshoot_look = replace(look, length=overshoot_steps(look), taper=False, oriented=False)
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .filter_kernel import full_sample_count
+from .filter_kernel import full_sample_count, kernel_of
 from .image_noise import NOISE_MEAN, streak_moments
 from .look import Look
 
@@ -23,7 +23,7 @@ def normalize_variance(mean: np.ndarray, effective_samples: np.ndarray, look: Lo
     effective_samples : (P,) float32 ndarray
         n, at least 1.
     look : Look
-        In pixels of the frame. Its `length`, `taper`, `step` and `grain` are used.
+        In pixels of the frame. Its `length`, `step`, `grain` and kernel are used.
 
     Returns
     -------
@@ -52,14 +52,14 @@ def blend_gain(image_count: int, effective_samples: np.ndarray, look: Look) -> n
     effective_samples : (P,) float32 ndarray
         Effective samples of a streamline, mean over the M lines of a pixel.
     look : Look
-        In pixels of the frame. Its `length`, `taper`, `step`, `grain` and `high_pass` are used.
+        In pixels of the frame. Its `length`, `step`, `grain`, `high_pass` and kernel are used.
 
     Returns
     -------
     (P,) float32 ndarray
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
-    _, correlation_sum = streak_moments(*streak_args(look), image_count, tapered=look.taper)
+    _, correlation_sum = streak_moments(*streak_args(look), image_count, kernel=kernel_of(look))
     pixel_correlation = np.clip(
         correlation_sum * full_sample_count(look) / effective_samples, 0, image_count - 1
     )
@@ -76,16 +76,18 @@ def supersampling_gain(look: Look) -> float:
     """
     subpixels = look.supersampling
     supersampled_args = streak_args(look)
-    supersampled_std, _ = streak_moments(*supersampled_args, average=subpixels, tapered=look.taper)
+    supersampled_std, _ = streak_moments(
+        *supersampled_args, average=subpixels, kernel=kernel_of(look)
+    )
     direct_std, _ = streak_moments(
-        *(length / subpixels for length in supersampled_args), tapered=look.taper
+        *(length / subpixels for length in supersampled_args), kernel=kernel_of(look)
     )
     return direct_std / supersampled_std
 
 
 def expected_std(look: Look) -> float:
     """Compute the theoretical standard deviation of one member image, with full streamlines."""
-    return streak_moments(*streak_args(look), tapered=look.taper)[0]
+    return streak_moments(*streak_args(look), kernel=kernel_of(look))[0]
 
 
 def streak_args(look: Look) -> tuple[float, float, float]:

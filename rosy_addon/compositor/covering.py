@@ -160,6 +160,13 @@ class Covering:
         entry_count = self.line_count * self.cell_count
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
+    def is_along_member(self, state: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether states of a field of odd degree are its directions, not their opposites."""
+        sheet = state // np.int32(self.cell_count)
+        if self.sheets_per_turn == self.sheets:
+            return sheet % 2 == 0
+        return sheet < self.line_count
+
     def neighbor_lines(
         self, line: np.ndarray, offsets: Sequence[tuple[int, int]]
     ) -> Iterator[np.ndarray]:

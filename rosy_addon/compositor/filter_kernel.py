@@ -1,16 +1,43 @@
-"""The filter kernel of LIC: weights of the samples along a streamline, constant or tapered.
+"""The filter kernel of LIC: weights of the samples along a streamline.
 
-With tapered weights, streaks end in points. Averages also change less when the length of a
-streamline in pixels changes, as it does when the camera moves closer.
+A box has constant weights. With tapered weights, streaks end in points. Averages also change less when
+the length of a streamline in pixels changes, as it does when the camera moves closer. With a ramp, the
+weights fall along the direction of the field: streaks have a bright head and a faint tail (Wegenkittl,
+Groeller and Purgathofer, Animating flow fields: rendering of oriented line integral convolution, 1997).
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ..field.symmetry import FieldSymmetry
 from .look import Look
+
+#: The kernels.
+Kernel = Literal["box", "taper", "ramp"]
+
+
+#: How much the weights of samples fall over the length of a streamline, forward and backward.
+WEIGHT_SLOPES: dict[Kernel, tuple[float, float]] = {
+    "box": (0.0, 0.0),
+    "taper": (1.0, 1.0),
+    "ramp": (1.0, -1.0),
+}
+
+
+def look_for_symmetry(look: Look, symmetry: FieldSymmetry) -> Look:
+    """Return the look without orientation, if the lines of a field point both ways."""
+    return replace(look, oriented=False) if look.oriented and symmetry.has_opposites else look
+
+
+def kernel_of(look: Look) -> Kernel:
+    """Return the kernel of a look that is for the symmetry of a field."""
+    if look.oriented:
+        return "ramp"
+    return "taper" if look.taper else "box"
 
 
 class KernelWeights(NamedTuple):
@@ -29,45 +56,42 @@ class KernelWeights(NamedTuple):
     effective_samples: np.ndarray
 
 
-def kernel_weights(forward: Any, backward: Any, full_length: Any, tapered: bool) -> KernelWeights:
+def kernel_weights(forward: Any, backward: Any, full_length: Any, kernel: Kernel) -> KernelWeights:
     """Sum the weights of streamlines through one sample.
 
     Parameters
     ----------
     forward, backward : ndarray or float
-        Numbers of samples on either side, as floats, at most `full_length`.
+        Numbers of samples on either side, as floats, at most `full_length`. Forward is along the
+        direction of the field, if the kernel is a ramp.
     full_length : ndarray or float
         Number of samples on either side of a streamline that does not end early.
-    tapered : bool
-        Whether the sample d steps from the center has the weight 1 - d / (full_length + 1)
-        instead of 1.
+    kernel : {"box", "taper", "ramp"}
+        The weight of the sample d steps from the center: 1; or 1 - d / (full_length + 1); or, with d
+        negative on the backward side, the same, which reaches 2 there.
 
     Returns
     -------
     KernelWeights
     """
-    if not tapered:
+    if kernel == "box":
         return KernelWeights(*[1 + forward + backward] * 2)
-    taper_slope = 1 / (1 + np.asarray(full_length, dtype=np.result_type(forward)))
-    total = 1 + _taper_sum(forward, taper_slope) + _taper_sum(backward, taper_slope)
-    return KernelWeights(
-        total,
-        total**2
-        / (1 + _taper_square_sum(forward, taper_slope) + _taper_square_sum(backward, taper_slope)),
+    slope = 1 / (1 + np.asarray(full_length, dtype=np.result_type(forward)))
+    (forward_sum, forward_squares), (backward_sum, backward_squares) = (
+        _weight_sums(count, direction * slope)
+        for count, direction in zip((forward, backward), WEIGHT_SLOPES[kernel], strict=True)
     )
+    total = 1 + forward_sum + backward_sum
+    return KernelWeights(total, total**2 / (1 + forward_squares + backward_squares))
 
 
 def full_sample_count(look: Look) -> float:
     """`KernelWeights.effective_samples` of streamlines that do not end early."""
     length = np.float64(look.length)
-    return float(kernel_weights(length, length, length, look.taper).effective_samples)
+    return float(kernel_weights(length, length, length, kernel_of(look)).effective_samples)
 
 
-def _taper_sum(count: Any, taper_slope: Any) -> Any:
-    """Sum of 1 - d taper_slope for d from 1 to count."""
-    return count - taper_slope * count * (count + 1) / 2
-
-
-def _taper_square_sum(count: Any, taper_slope: Any) -> Any:
-    """Sum of (1 - d taper_slope)^2 for d from 1 to count."""
-    return count - taper_slope * count * (count + 1) * (1 - taper_slope * (2 * count + 1) / 6)
+def _weight_sums(count: Any, slope: Any) -> tuple[Any, Any]:
+    """Sums of 1 - d slope, and of its square, for d from 1 to count."""
+    step_sum = slope * count * (count + 1)
+    return count - step_sum / 2, count - step_sum * (1 - slope * (2 * count + 1) / 6)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.pixel_blocks import pixel_blocks
+from .filter_kernel import Kernel
 from .picture_tiles import TileRectangle, cached_tiles_task, tile_rectangle
 
 #: Mean and standard deviation of binary noise.
@@ -284,7 +285,7 @@ def streak_moments(
     high_pass: float,
     images: int = 1,
     average: int = 1,
-    tapered: bool = False,
+    kernel: Kernel = "box",
 ) -> tuple[float, float]:
     """Compute the standard deviation and correlation of noise averaged along straight streamlines.
 
@@ -300,8 +301,9 @@ def streak_moments(
         M, the number of streamlines through a pixel. Their angles are multiples of pi / M.
     average : int
         Side in pixels of the squares that are averaged when the picture is downsampled.
-    tapered : bool
-        Whether the weights of samples fall toward the ends (see `filter_kernel`).
+    kernel : {"box", "taper", "ramp"}
+        The weights of the samples (see `filter_kernel`). With a ramp, the lines are those of a field of odd
+        degree: every other one points against its angle.
 
     Returns
     -------
@@ -320,7 +322,7 @@ def streak_moments(
     g^2 / 4 [sinc(g kx) sinc(g ky) sinc(kx') sinc(ky') (1 - exp(-2 pi^2 s^2 k^2))]^2.
     Here it is averaged over all directions, and the integral is taken in polar coordinates. Tapered
     weights are a box filter of half the length applied twice: sinc(l k.u) becomes
-    sinc(l k.u / 2)^2.
+    sinc(l k.u / 2)^2. The response of a ramp is complex, with the derivative of the sinc.
     """
     k, dk = np.linspace(0, 4 / (1 + grain), 700, retstep=True)
     angle = np.arange(1440) * np.pi / 1440
@@ -337,18 +339,27 @@ def streak_moments(
         1 - np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 1.0
     )
     weight = power.mean(axis=1) * high_pass_gain**2 * k * dk * (2 * np.pi / len(angle))
-    response = _line_response(length * kx, tapered)
-    variance = weight @ np.sum(response * response, axis=1)
+    response = _line_response(length * kx, kernel)
+    variance = weight @ np.sum(np.abs(response) ** 2, axis=1)
     correlation_sum = 0.0
     for line in range(1, images):
         line_angle = np.pi * line / images
         projected = np.cos(line_angle) * kx + np.sin(line_angle) * ky
-        correlation_sum += weight @ np.sum(
-            response * _line_response(length * projected, tapered), axis=1
-        )
+        other = _line_response((-1) ** line * length * projected, kernel)
+        correlation_sum += weight @ np.sum((response * other.conj()).real, axis=1)
     return float(np.sqrt(variance)), float(correlation_sum / variance)
 
 
-def _line_response(cycles: np.ndarray, tapered: bool) -> np.ndarray:
+def _line_response(cycles: np.ndarray, kernel: Kernel) -> np.ndarray:
     """Frequency response of the mean along a line, given the cycles of a wave along it."""
-    return np.sinc(cycles / 2) ** 2 if tapered else np.sinc(cycles)
+    if kernel == "taper":
+        return np.sinc(cycles / 2) ** 2
+    if kernel == "box":
+        return np.sinc(cycles)
+    # The mean of (1 - x) exp(i a x) over x from -1 to 1, with a = pi cycles. Near 0, the sine and the
+    # cosine cancel.
+    a = np.pi * cycles
+    small = np.abs(a) < 1e-3
+    safe = np.where(small, 1.0, a)
+    slope = np.where(small, -a / 3, (np.cos(safe) - np.sinc(safe / np.pi)) / safe)
+    return np.sinc(cycles) + 1j * slope

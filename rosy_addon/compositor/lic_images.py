@@ -11,7 +11,7 @@ from ..field.validate import MIN_COMPONENT
 from ..progress import Progress, Task, subtask
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
-from .filter_kernel import kernel_weights
+from .filter_kernel import WEIGHT_SLOPES, kernel_of, kernel_weights
 from .look import Look
 from .per_pixel_lic import DirectionSampler, integrate_noise
 from .pixel_field import PixelField
@@ -84,7 +84,7 @@ def convolve_members_task(
     ----------
     field : PixelField
     look : Look
-        In pixels of the frame. Its `length`, `taper`, `step` and `magnitude` are used.
+        In pixels of the frame. Its `length`, `step`, kernel and `magnitude` are used.
     noise : (P, K) float32 ndarray
     neighbors : (9, P + 1) int32 ndarray
         From `pixel_field.neighbor_table_task`.
@@ -100,6 +100,8 @@ def convolve_members_task(
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
+    kernel = kernel_of(look)
+    slopes = WEIGHT_SLOPES[kernel]
     for member, tracer in enumerate(tracers):
         for block in pixel_blocks(count):
             block_limit = None if step_limit is None else step_limit[block]
@@ -112,12 +114,12 @@ def convolve_members_task(
                     look.length,
                     look.step,
                     block_limit,
-                    look.taper,
+                    slope,
                 )
-                for direction_at in tracer(block)
+                for direction_at, slope in zip(tracer(block), slopes, strict=True)
             )
             full_length = look.length if block_limit is None else block_limit
-            weights = kernel_weights(forward, backward, full_length, look.taper)
+            weights = kernel_weights(forward, backward, full_length, kernel)
             mean = (noise[block] + forward_sum + backward_sum) / weights.total[:, None]
             members[member, block] = normalize_variance(mean, weights.effective_samples, look)
             effective_samples[block] += weights.effective_samples

@@ -164,6 +164,13 @@ class Look:
         panel="streaks",
         applies=_has_streaks,
     )
+    oriented: bool = switch(
+        False,
+        "Fade streaks from head to tail, so that they show which way they point. For fields of odd degree; "
+        "sparse streaks, of low density, show it best",
+        panel="streaks",
+        applies=_has_streaks,
+    )
     step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
     grain: float = number(
         1.5,

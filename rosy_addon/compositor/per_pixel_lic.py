@@ -95,7 +95,7 @@ def integrate_noise(
     length: int,
     step: float,
     step_limit: np.ndarray | None,
-    tapered: bool,
+    weight_slope: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
@@ -122,8 +122,9 @@ def integrate_noise(
         Length of a step in pixels, at most 1.
     step_limit : (B,) ndarray or None
         Number of steps after which each streamline ends. None for `length`.
-    tapered : bool
-        Whether the weights of samples fall toward the ends (see `filter_kernel`).
+    weight_slope : float
+        How much the weight of the samples falls over the whole length; negative if it rises. See
+        `filter_kernel`.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def integrate_noise(
     total = np.zeros((len(entry), noise.shape[1]), dtype=np.float32)
     samples = np.zeros(len(entry), dtype=np.float32)
     previous_direction = None
-    taper_slope = 1 / (
+    weight_step = weight_slope / (
         1 + np.asarray(length if step_limit is None else step_limit, dtype=np.float32)
     )
     for step_index in range(1, length + 1):
@@ -162,8 +163,8 @@ def integrate_noise(
         if not active.any():
             break
         noise_sample = noise.take(entry, axis=0)
-        if tapered:
-            noise_sample *= (1 - step_index * taper_slope)[..., None]
+        if weight_slope:
+            noise_sample *= (1 - step_index * weight_step)[..., None]
         total += noise_sample
         samples += active
     return total, samples

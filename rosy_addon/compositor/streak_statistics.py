@@ -14,6 +14,7 @@ import numpy as np
 
 from ..cache import Cache
 from ..progress import Progress, Task, run_to_completion, subtask
+from .filter_kernel import Kernel, kernel_of
 from .image_noise import image_noise
 from .look import Look
 from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
@@ -74,8 +75,8 @@ class StreakSettings:
         Settings of the noise; see `image_noise`.
     crispness, breaks, wobble : float
         Settings of the look, 0 to 1.
-    tapered : bool
-        Whether the weights of samples fall toward the ends (see `filter_kernel`).
+    kernel : {"box", "taper", "ramp"}
+        The weights of the samples; see `filter_kernel`.
     anchored : bool
         Whether the noise is anchored to surfaces.
     break_length : float
@@ -92,7 +93,7 @@ class StreakSettings:
     density: float
     high_pass: float
     crispness: float
-    tapered: bool = False
+    kernel: Kernel = "box"
     anchored: bool = False
     break_length: float = 1.0
     breaks: float = 0.0
@@ -163,7 +164,7 @@ def look_streak_statistics_task(look: Look) -> Task[StreakStatistics]:
         density=look.density,
         high_pass=look.high_pass,
         crispness=look.crispness,
-        tapered=look.taper,
+        kernel=kernel_of(look),
         anchored=look.anchor == "surface",
         break_length=(2 * break_steps(look) + 1) * look.step,
         breaks=look.breaks,
@@ -189,11 +190,11 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
         (side, width), settings.grain, settings.density, settings.high_pass, settings.anchored
     )
     yield Progress(0.2, STEP_LABEL)
-    streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, settings.tapered))
+    streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, settings.kernel))
     break_pixels = min(max(round(settings.break_length), 1), length_pixels)
     yield Progress(0.3, STEP_LABEL)
     break_streaks, break_std = _standardized(
-        _line_means(noise, break_pixels, side, settings.tapered)
+        _line_means(noise, break_pixels, side, settings.kernel)
     )
     yield Progress(0.4, STEP_LABEL)
     spots, disc_std = _standardized(disc_means(noise[:, :side], settings.grain))
@@ -307,14 +308,26 @@ def _noise_sample(
     return noise
 
 
-def _line_means(noise: np.ndarray, length: int, side: int, tapered: bool) -> np.ndarray:
+def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np.ndarray:
     """(n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
-    # Tapered weights are a box filter of half the length, applied twice.
-    for window in [max(length // 2, 1)] * 2 if tapered else [length]:
-        sums = np.cumsum(np.pad(noise, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
-        noise = (sums[:, window:] - sums[:, :-window]) / window
+    if kernel == "ramp":
+        # The weights of a window from column a on are 1 - 2 (j - middle) / length, for the column j.
+        column = np.arange(noise.shape[1])
+        means, moments = _window_means(noise, length), _window_means(noise * column, length)
+        middle = column[: means.shape[1]] + (length - 1) / 2
+        noise = means - (2 / length) * (moments - middle * means)
+    else:
+        # Tapered weights are a box filter of half the length, applied twice.
+        for window in [max(length // 2, 1)] * 2 if kernel == "taper" else [length]:
+            noise = _window_means(noise, window)
     start = (noise.shape[1] - side) // 2
     return noise[:, start : start + side]
+
+
+def _window_means(rows: np.ndarray, window: int) -> np.ndarray:
+    """(n, width - window + 1) float64 means over windows of the rows of (n, width) values."""
+    sums = np.cumsum(np.pad(rows, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
+    return (sums[:, window:] - sums[:, :-window]) / window
 
 
 def _standardized(means: np.ndarray) -> tuple[np.ndarray, float]:

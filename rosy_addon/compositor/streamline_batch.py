@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
-from .filter_kernel import kernel_weights
+from .filter_kernel import kernel_of, kernel_weights
 from .look import Look
 
 #: Steps between compactions, which remove streamlines that have ended.
@@ -49,7 +49,7 @@ class StreamlineBatch:
     ----------
     covering : Covering
     looks : sequence of Look
-        In pixels of the frame. Their `length`, `taper` and `step` are used. Averages are taken over
+        In pixels of the frame. Their `length`, `step` and kernel are used. Averages are taken over
         each of the lengths; all else is the same.
     step_limits : sequence of (C,) intp ndarray or None
         Steps in each direction that the average of a cell covers, for each look. None for its
@@ -75,7 +75,7 @@ class StreamlineBatch:
     ) -> None:
         self._covering = covering
         look = looks[0]
-        self._lengths, self._tapered = [look.length for look in looks], look.taper
+        self._lengths, self._kernel = [look.length for look in looks], kernel_of(look)
         self._half_window, self._max_steps = half_window, half_window + max(self._lengths)
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
@@ -121,7 +121,10 @@ class StreamlineBatch:
         opposite_counts = np.roll(step_counts, lanes // 2)
         values = [np.empty((lanes, channels + 1), dtype=np.float32) for _ in self._lengths]
         for step in range(min(last_step, self._half_window) + 1):
-            line = self._covering.fold_to_line(self._states[step, :lanes])
+            state, is_along = self._states[step, :lanes], None
+            if self._kernel == "ramp":
+                is_along = self._covering.is_along_member(state)
+            line = self._covering.fold_to_line(state)
             # A streamline passes the center of a pixel at up to half a pixel. The sum is corrected
             # to the center by its derivative across the streamline.
             lateral = self._lateral_offset[step, :lanes]
@@ -131,17 +134,23 @@ class StreamlineBatch:
                 self._lengths, self._step_limits, values, strict=True
             ):
                 length = full_length if limit is None else limit.take(line)
-                weights = kernel_weights(
-                    np.clip(forward, 0, length), np.minimum(backward, length), length, self._tapered
-                )
-                if self._tapered:
-                    noise_sum = self._tapered_sums(step, length, lanes)
-                    noise_sum *= (weights.effective_samples / weights.total)[:, None]
-                else:
+                ahead, behind = np.clip(forward, 0, length), np.minimum(backward, length)
+                if is_along is not None:
+                    ahead, behind = (
+                        np.where(is_along, *pair) for pair in ((ahead, behind), (behind, ahead))
+                    )
+                weights = kernel_weights(ahead, behind, length, self._kernel)
+                if self._kernel == "box":
                     last = np.minimum(step + length, last_step)
                     first = np.maximum(step - length, -last_step)
                     noise_sum = self._prefix_sums_through(last, lanes)
                     noise_sum = noise_sum - self._prefix_sums_before(first, lanes)
+                else:
+                    if is_along is None:
+                        noise_sum = self._tapered_sums(step, length, lanes)
+                    else:
+                        noise_sum = self._ramp_sums(step, length, lanes, is_along)
+                    noise_sum *= (weights.effective_samples / weights.total)[:, None]
                 np.multiply(noise_sum.real, self._noise_scale, out=out[:, :-1])
                 out[:, :-1] -= correction * noise_sum.imag
                 out[:, -1] = weights.effective_samples
@@ -153,7 +162,7 @@ class StreamlineBatch:
         Each row holds n forward halves of streamlines, then n backward halves. `_states` are their
         states, `_lateral_offset` their distances to the left of the centers of pixels. `_sums` are
         prefix sums of the noise, including the seed, with the derivative to the left as imaginary
-        part. For tapered weights `_sums` are prefix sums of these, in all rows.
+        part. For kernels that are not a box, `_sums` are prefix sums of these, in all rows.
 
         Returns
         -------
@@ -301,7 +310,7 @@ class StreamlineBatch:
         """Write row `step` of the buffers, for all lanes or the active ones."""
         self._totals[slice(lanes) if active is None else active] = total
         self._sums[step, :lanes] = self._totals[:lanes]
-        if self._tapered and step:
+        if self._kernel != "box" and step:
             self._sums[step, :lanes] += self._sums[step - 1, :lanes]
         if step > self._half_window:
             return
@@ -316,7 +325,7 @@ class StreamlineBatch:
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
         """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""
-        if self._tapered:
+        if self._kernel != "box":
             for step in range(last_step, self._max_steps):
                 np.add(
                     self._sums[step, :lanes], self._totals[:lanes], out=self._sums[step + 1, :lanes]
@@ -333,6 +342,26 @@ class StreamlineBatch:
         total += self._second_prefix_sums(step - half_width - 2, lanes)
         total *= 1 / np.asarray(half_width + 1, dtype=np.float32)[..., None]
         return total
+
+    def _ramp_sums(
+        self, step: int, half_width: int | np.ndarray, lanes: int, is_along: np.ndarray
+    ) -> np.ndarray:
+        """(2 n, K) complex64 sums of the noise that fall along the field, in the same way.
+
+        Along a streamline, weights that fall from 2 r + 1 to 1 are
+        E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1), with the prefix sums P(i) = E(i) - E(i - 1). Where
+        the lane runs against the field, they rise instead: twice the box without these.
+        """
+        last, before = step + half_width, step - half_width - 1
+        sums_through, sums_before = (self._second_prefix_sums(i, lanes) for i in (last, before))
+        prefix = sums_before - self._second_prefix_sums(before - 1, lanes)
+        width = np.asarray(half_width + 1, dtype=np.float32)[..., None]
+        falling = sums_through - sums_before - (2 * width - 1) * prefix
+        against = np.flatnonzero(~is_along)
+        box = sums_through - self._second_prefix_sums(last - 1, lanes) - prefix
+        falling[against] = (2 * np.broadcast_to(width, falling.shape) * box - falling)[against]
+        falling *= 1 / width
+        return falling
 
     def _second_prefix_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""

@@ -14,6 +14,7 @@ from ..color import REC709_LUMINANCE
 from ..compositor.compose import COLOR_CONTRAST
 from ..compositor.covering import ALL_NEIGHBORS
 from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOUNT
+from ..compositor.filter_kernel import Kernel
 from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
@@ -47,6 +48,9 @@ from ..projection.shadow_maps import PCF_WIDTH
 from ..projection.surface_sampling import MIN_FACING_COSINE
 from .line_records import MAX_TREE_DEPTH
 from .mesh_buffers import NORMAL_TEXEL, POSITION_TEXEL, ROW_BITS, VALUE_TEXEL
+
+#: The kernels of `filter_kernel`.
+KERNELS: dict[Kernel, int] = {"box": 0, "taper": 1, "ramp": 2}
 
 #: What the magnitude of the field drives: bit 0 is the color, bit 1 the length of streamlines.
 MAGNITUDE_COLOR, MAGNITUDE_LENGTH = 1, 2
@@ -130,6 +134,8 @@ INT_CONSTANTS = {
     "POSITION_TEXEL": POSITION_TEXEL,
     "NORMAL_TEXEL": NORMAL_TEXEL,
     "VALUE_TEXEL": VALUE_TEXEL,
+    "KERNEL_TAPER": KERNELS["taper"],
+    "KERNEL_RAMP": KERNELS["ramp"],
     "MAGNITUDE_COLOR": MAGNITUDE_COLOR,
     "MAGNITUDE_LENGTH": MAGNITUDE_LENGTH,
     "TONE_LIGHT": TONE_LIGHT,

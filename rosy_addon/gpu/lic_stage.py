@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.lic import noise_args
 from ..compositor.look import Look
 from ..progress import Progress, Task
@@ -44,7 +45,9 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         "max_magnitude": _max_magnitude(frame, textures, kind, look),
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
-        "ink_thresholds": lookup_tables.thresholds(resources, frame.pixel_look),
+        "ink_thresholds": lookup_tables.thresholds(
+            resources, look_for_symmetry(frame.pixel_look, kind.symmetry)
+        ),
         "disc_offsets": lookup_tables.undirected_offsets(resources, frame.pixel_look),
         "ink_table": lookup_tables.ink_table(resources, kind, look),
     }

@@ -41,7 +41,7 @@ _GUIDING: Uniforms = (("guiding_angle", "float"),)
 
 #: Settings of a look that shaders read unchanged, as uniforms of the same names. Lengths are in
 #: pixels of the supersampled frame.
-LIC_SETTINGS = ("taper", "grain", "clear_paper", "layers", "layering", "breaks", "outline")
+LIC_SETTINGS = ("grain", "clear_paper", "layers", "layering", "breaks", "outline")
 TONE_SETTINGS = ("shading", "tone_lit")
 
 
@@ -476,6 +476,7 @@ LIC = ComputePass(
         *_COVERING,
         *_GUIDING,
         *setting_uniforms(LIC_SETTINGS),
+        ("kernel", "int"),
         ("half_length", "int"),
         ("full_samples", "float"),
         ("step_length", "float"),
@@ -515,7 +516,7 @@ LIC = ComputePass(
     ),
     includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
     switches=(
-        *("taper", "magnitude_mode", "colors_values", "noise_channels", "family_count"),
+        *("kernel", "magnitude_mode", "colors_values", "noise_channels", "family_count"),
         *("is_hatched", "is_light_ink", "even_lines", "ink_count"),
     ),
 )

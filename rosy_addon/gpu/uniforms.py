@@ -18,7 +18,7 @@ from ..compositor.even_lines import (
     has_even_lines,
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
-from ..compositor.filter_kernel import full_sample_count
+from ..compositor.filter_kernel import full_sample_count, kernel_of, look_for_symmetry
 from ..compositor.hatching import (
     ONSET_LEAD,
     ONSET_RANGE,
@@ -53,7 +53,7 @@ from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
-from .defines import HEADLIGHT, MAGNITUDE_MODES, POINT_LIGHT, SUN_LIGHT
+from .defines import HEADLIGHT, KERNELS, MAGNITUDE_MODES, POINT_LIGHT, SUN_LIGHT
 from .field_kind import FieldKind
 from .passes import LIC_SETTINGS, TONE_SETTINGS
 from .resources import DrawItem
@@ -95,13 +95,15 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
 
     Lengths are in pixels of the supersampled frame.
     """
-    pixel_look = supersampled_look(look)
-    _, crossing = streak_moments(*streak_args(pixel_look), kind.line_count, tapered=look.taper)
+    look = look_for_symmetry(look, kind.symmetry)
+    pixel_look, kernel = supersampled_look(look), kernel_of(look)
+    _, crossing = streak_moments(*streak_args(pixel_look), kind.line_count, kernel=kernel)
     gain = supersampling_gain(pixel_look) if look.supersampling > 1 else 1.0
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
     statistics = look_streak_statistics(pixel_look) if is_hatched(look) else None
     return {
         **setting_values(pixel_look, LIC_SETTINGS),
+        "kernel": KERNELS[kernel],
         "half_length": 0 if has_even_lines(look) else pixel_look.length,
         "full_samples": full_sample_count(pixel_look),
         "step_length": pixel_look.step,

@@ -15,6 +15,7 @@ from ..compositor.color_values import (
     value_scale,
 )
 from ..compositor.compose import colorize, layer_task
+from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.lic import lic_lengths_task
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
@@ -49,7 +50,18 @@ MIN_STEP = 0.25
 
 #: The settings of a look that a texture is drawn with. All others have no effect on it.
 TEXTURE_SETTINGS = (
-    *("ink", "display", "unit", "unit_size", "length", "taper", "step", "grain", "density"),
+    *(
+        "ink",
+        "display",
+        "unit",
+        "unit_size",
+        "length",
+        "taper",
+        "oriented",
+        "step",
+        "grain",
+        "density",
+    ),
     *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
     *("magnitude", "magnitude_range", "values_low", "values_high", "colour_map"),
     *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
@@ -212,6 +224,7 @@ def draw_texture_task(
     field = yield from subtask(field_task, 0.15, 0.3)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
+    surface_look = look_for_symmetry(surface_look, field.symmetry)
     is_direction = content != "look"
     if is_direction:
         pixels_task, is_data = direction_map_task(on, content, look.guiding_angle), True

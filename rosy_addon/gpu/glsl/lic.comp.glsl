@@ -102,10 +102,12 @@ void main()
     bool has_opposite_sheet = sheet_count == 2 * line_count;
     int backward_sheet = has_opposite_sheet ? line + line_count : line;
     float backward_sign = has_opposite_sheet ? 1.0 : -1.0;
-    Half forward =
-        traced_half(pixel, line, 1.0, cell, step_count, break_step_count, overshoot_count);
+    // For odd N, every other sheet is the opposite half of a member.
+    float along = has_opposite_sheet && (line & 1) == 1 ? -1.0 : 1.0;
+    Half forward = traced_half(pixel, line, 1.0, cell, step_count, break_step_count,
+                               overshoot_count, weight_slope(along));
     Half backward = traced_half(pixel, backward_sheet, backward_sign, cell, step_count,
-                                break_step_count, overshoot_count);
+                                break_step_count, overshoot_count, weight_slope(-along));
     Sums sums = both_halves(cell.yzw, forward.all, backward.all);
     vec3 mean = normalized_mean(sums, full_samples);
     if (is_hatched != 0) {

@@ -52,16 +52,24 @@ float tone_at(ivec2 pixel)
   return clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
 }
 
+// How much the weights of the samples of half a streamline fall over its length (`filter_kernel`).
+// `along` is 1 along the directions of a field without opposites, and -1 against them.
+float weight_slope(float along)
+{
+  return kernel == KERNEL_TAPER ? 1.0 : kernel == KERNEL_RAMP ? along : 0.0;
+}
+
 // Trace half a streamline from a pixel on a sheet. Its state is a pixel and a sheet of the covering;
-// each step is second-order Adams-Bashforth. The sums do not contain the start.
+// each step is second-order Adams-Bashforth. The sums do not contain the start. `slope` is that of the
+// weights.
 Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, int step_count,
-                 int near_step_count, int overshoot_count)
+                 int near_step_count, int overshoot_count, float slope)
 {
   Half result;
   result.all = result.near = empty_sums();
   result.tones = vec2(0.0);
-  float weight_step = taper != 0 ? 1.0 / float(step_count + 1) : 0.0;
-  float near_weight_step = taper != 0 ? 1.0 / float(near_step_count + 1) : 0.0;
+  float weight_step = slope / float(step_count + 1);
+  float near_weight_step = slope / float(near_step_count + 1);
   vec2 offset = vec2(0.0), previous_velocity = vec2(0.0);
   for (int step_index = 0; step_index < max(step_count, overshoot_count); ++step_index) {
     bool opposite = sheet >= line_count;

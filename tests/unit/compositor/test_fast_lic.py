@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -24,6 +25,9 @@ from rosy_addon.progress import run_to_completion
 
 SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
+
+#: Settings that choose a kernel.
+KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
 
 
 def make_noise(field, look=LOOK, channels=1):
@@ -60,10 +64,11 @@ def singular_field(degree, size=SIZE):
     return planar_pixel_field(pair_angle(x, y, size, degree), degree)
 
 
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("taper", [False, True])
-def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(taper, degree):
-    field, look = uniform_field(0.0, degree), replace(LOOK, taper=taper)
+@pytest.mark.parametrize(
+    ("kernel", "degree"), [("box", 1), ("box", 2), ("taper", 1), ("taper", 2), ("ramp", 1)]
+)
+def test_averages_match_brute_force_if_noise_is_constant_across_streamlines(kernel, degree):
+    field, look = uniform_field(0.0, degree), replace(LOOK, **KERNELS[kernel])
     noise = np.tile(make_noise(field)[:SIZE], (SIZE, 1))
     actual, expected = fast_images(field, look, noise), brute_force_images(field, look, noise)
     np.testing.assert_allclose(actual.effective_samples, expected.effective_samples, rtol=1e-6)
@@ -141,10 +146,12 @@ def test_streaks_match_brute_force_in_contrast_length_and_width(degree):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [3, 4, *long(2, 6)])
-@pytest.mark.parametrize("taper", [False, True])
-def test_pictures_of_singular_fields_resemble_brute_force(taper, degree):
-    field, look = singular_field(degree), replace(LOOK, taper=taper)
+@pytest.mark.parametrize(
+    ("kernel", "degree"),
+    [("box", 4), ("taper", 3), ("ramp", 3), *long(*product(("box", "taper"), (2, 3, 4, 6)))],
+)
+def test_pictures_of_singular_fields_resemble_brute_force(kernel, degree):
+    field, look = singular_field(degree), replace(LOOK, **KERNELS[kernel])
     actual, expected = (
         fast_images(field, look).blend[:, 0],
         brute_force_images(field, look).blend[:, 0],
@@ -172,12 +179,12 @@ def test_the_surroundings_of_singularities_are_not_grainy(degree):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("taper", [False, True])
-def test_streamlines_end_where_brute_force_ends_them(taper):
-    look = replace(LOOK, taper=taper)
+@pytest.mark.parametrize(("kernel", "degree"), [("box", 4), ("taper", 4), ("ramp", 3)])
+def test_streamlines_end_where_brute_force_ends_them(kernel, degree):
+    look = replace(LOOK, **KERNELS[kernel])
     x, y = pixel_centers(SIZE)
-    angles = np.where(np.hypot(x - 128, y - 128) < 90, pair_angle(x, y, SIZE, 4), np.nan)
-    field = planar_pixel_field(angles, 4)
+    angles = np.where(np.hypot(x - 128, y - 128) < 90, pair_angle(x, y, SIZE, degree), np.nan)
+    field = planar_pixel_field(angles, degree)
     actual, expected = fast_images(field, look), brute_force_images(field, look)
     inside = field.representation != 0
     assert (actual.effective_samples[~inside] == 1).all()
@@ -186,15 +193,15 @@ def test_streamlines_end_where_brute_force_ends_them(taper):
     assert np.abs(difference).mean() < 2
 
 
-@pytest.mark.parametrize("taper", [False, True])
-def test_magnitude_determines_the_samples_of_a_pixel(taper):
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_magnitude_determines_the_samples_of_a_pixel(kernel):
     x, _ = pixel_centers(SIZE)
-    field = planar_pixel_field(np.zeros((SIZE, SIZE)), 2, magnitude=x / SIZE)
-    look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30, taper=taper)
+    field = planar_pixel_field(np.zeros((SIZE, SIZE)), 1, magnitude=x / SIZE)
+    look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30, **KERNELS[kernel])
     samples = fast_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     reach = np.rint(30 * x / SIZE)[:, 40:-40]
     np.testing.assert_allclose(
-        samples, kernel_weights(reach, reach, reach, taper).effective_samples, rtol=1e-5
+        samples, kernel_weights(reach, reach, reach, kernel).effective_samples, rtol=1e-5
     )
     expected = brute_force_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     np.testing.assert_allclose(samples, expected, rtol=1e-5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,29 +17,25 @@ def streamlines(draw):
     return draw(st.integers(0, full_length)), draw(st.integers(0, full_length)), full_length
 
 
+@pytest.mark.parametrize("kernel", ["box", "taper", "ramp"])
 @given(streamlines())
-def test_sums_of_tapered_weights_in_closed_form(streamline):
+def test_sums_of_weights_in_closed_form(kernel, streamline):
     forward, backward, full_length = streamline
-    distance = np.abs(np.arange(-backward, forward + 1))
+    offset = np.arange(-backward, forward + 1)
+    distance = {"box": 0 * offset, "taper": np.abs(offset), "ramp": offset}[kernel]
     weight = 1 - distance / (full_length + 1)
-    actual = kernel_weights(np.float64(forward), np.float64(backward), full_length, tapered=True)
+    actual = kernel_weights(np.float64(forward), np.float64(backward), full_length, kernel)
     np.testing.assert_allclose(actual.total, weight.sum(), rtol=1e-9)
     np.testing.assert_allclose(
         actual.effective_samples, weight.sum() ** 2 / (weight**2).sum(), rtol=1e-9
     )
 
 
-@given(streamlines())
-def test_without_taper_every_sample_counts_as_one(streamline):
-    forward, backward, full_length = streamline
-    actual = kernel_weights(forward, backward, full_length, tapered=False)
-    assert actual.total == actual.effective_samples == forward + backward + 1
-
-
-def test_tapered_streamlines_have_three_quarters_of_the_samples():
+def test_other_kernels_have_three_quarters_of_the_samples():
     for length in (40, 400):
-        plain, tapered = (
-            full_sample_count(Look(length=length, taper=taper)) for taper in (False, True)
+        plain, tapered, oriented = (
+            full_sample_count(Look(length=length, **settings))
+            for settings in ({}, {"taper": True}, {"oriented": True})
         )
         assert plain == 2 * length + 1
-        assert abs(tapered / plain - 0.75) < 0.01
+        assert abs(tapered / plain - 0.75) < 0.01 and abs(oriented / plain - 0.75) < 0.01

@@ -541,6 +541,8 @@ LOOKS = {
     "magnitude as both": {"magnitude": "both", "colour_map": "magma"},
     "magnitude as both, with a range": {"magnitude": "both", "magnitude_range": 0.9, "degree": 2},
     "families, of a field without families": {"hue": "families"},
+    "oriented, three directions": {"oriented": True, "degree": 3, "density": 0.03},
+    "oriented, of lines without a direction": {"oriented": True},
     "foreshortened": {"foreshorten": True},
     "foreshortened, three directions": {"foreshorten": True, "degree": 3},
     "supersampled": {"supersampling": 2},
@@ -558,6 +560,13 @@ LOOKS = {
     "on the surface, color noise": {"anchor": "surface", "noise": "colour", "high_pass": 0.0},
     "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
     "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
+    "hatched, oriented": {
+        "ink": "hatch",
+        "shading": 1.0,
+        "oriented": True,
+        "degree": 5,
+        "breaks": 0.4,
+    },
     "hatched, three directions": {"ink": "hatch", "shading": 0.8, "degree": 3, "layers": 2},
     "hatched in color, guided": {
         "ink": "hatch",

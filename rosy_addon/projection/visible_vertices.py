@@ -15,6 +15,7 @@ import numpy as np
 from ..field.blocks import concatenated_ranges
 from ..progress import Progress, Task
 from .camera import Camera
+from .clip_planes import is_cut_away
 from .gbuffer import MeshInstance
 from .project import all_triangles
 
@@ -86,11 +87,8 @@ def project_vertices_task(
     vertex = np.concatenate(
         [start + np.asarray(part, np.intp) for start, part in zip(first, vertices, strict=True)]
     )
-    is_cut = np.zeros(len(world), dtype=bool)
-    if clip_planes is not None:
-        is_cut = ((world @ clip_planes[:, :3].T + clip_planes[:, 3]) < 0).any(axis=1)
     x, y, z, w = clip[vertex].T
-    is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut[vertex]
+    is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut_away(world[vertex], clip_planes)
     ndc = np.full((len(vertex), 2), np.nan)
     np.divide(np.stack([x, y], axis=1), w[:, None], out=ndc, where=(w > 0)[:, None])
     position = (ndc + 1) * (0.5 * np.array([camera.width, camera.height]))
@@ -210,7 +208,7 @@ class _Occluders:
         hides = (np.abs(z) <= 1) & (distance < self.distance[vertex] - self.tolerance)
         if self.clip_planes is not None:
             hit = np.einsum("nk,nki->ni", weights, self.world[corner])
-            hides &= ((hit @ self.clip_planes[:, :3].T + self.clip_planes[:, 3]) >= 0).all(axis=1)
+            hides &= ~is_cut_away(hit, self.clip_planes)
         result = np.zeros(len(triangle), dtype=bool)
         result[other[hides]] = True
         return result

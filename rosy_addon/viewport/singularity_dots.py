@@ -28,6 +28,7 @@ from ..cache import Cache
 from ..color import from_hex
 from ..field.singularities import format_index
 from ..progress import run_to_completion
+from ..projection.clip_planes import is_cut_away
 from ..projection.gbuffer import MeshInstance
 
 #: Number of sides of the polygon that approximates a disc.
@@ -74,10 +75,8 @@ def singularity_dots(
     """
     vertex, index = run_to_completion(cached_singularities_task(instance, cache))
     points = instance.world_points()[vertex]
-    if clip_planes is not None:
-        kept = ((points @ clip_planes[:, :3].T + clip_planes[:, 3]) >= 0).all(axis=1)
-        points, index = points[kept], index[kept]
-    return SingularityDots(points, index, instance.field.degree)
+    kept = ~is_cut_away(points, clip_planes)
+    return SingularityDots(points[kept], index[kept], instance.field.degree)
 
 
 def draw_dots(

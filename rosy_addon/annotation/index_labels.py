@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..field.singularities import format_index
 from .label_placement import place_labels
-from .singularity_marks import OUTLINE, SingularityMarks
+from .singularity_marks import OUTLINE, SingularityMarks, dot_diameters
 
 #: Display colors of labels, and of the halo around them.
 LABEL_COLOR, HALO_COLOR = "#141414", "#ffffff"
@@ -55,22 +56,59 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
         Empty if there are to be none, or more than `MAX_LABELS`.
     """
     visible = np.flatnonzero(marks.is_visible)
-    if not marks.has_labels or not 0 < len(visible) <= MAX_LABELS:
+    if not marks.has_labels or len(visible) > MAX_LABELS:
         return []
+    nearest = marks.part(visible[np.argsort(marks.depth[visible], kind="stable")])
     size = marks.size
-    visible = visible[np.argsort(marks.depth[visible], kind="stable")]
-    texts = [
-        format_index(index, degree)
-        for index, degree in zip(
-            marks.index[visible].tolist(), marks.degree[visible].tolist(), strict=True
-        )
-    ]
     height, padding = LABEL_HEIGHT * size, (STROKE_WIDTH / 2 + HALO) * size
-    sizes = [(text_width(text) * height + 2 * padding, height + 2 * padding) for text in texts]
-    radii = marks.radius[visible] + OUTLINE * size
-    corners = place_labels(marks.position[visible], np.array(sizes), radii, marks.frame)
+
+    def label_size(text: str) -> tuple[float, float]:
+        return text_width(text) * height + 2 * padding, height + 2 * padding
+
     return [
         Label(text, left + padding, bottom + padding, height)
+        for text, left, bottom in place_indices(
+            nearest.position, nearest.index, nearest.degree, size, label_size, marks.frame
+        )
+    ]
+
+
+def place_indices(
+    position: np.ndarray,
+    index: np.ndarray,
+    degree: np.ndarray,
+    size: float,
+    label_size: Callable[[str], tuple[float, float]],
+    frame: tuple[int, int],
+) -> list[tuple[str, float, float]]:
+    """Place the index of each singularity beside its dot if there is room, the first ones first.
+
+    Parameters
+    ----------
+    position : (K, 2) ndarray
+        Centers of the dots, pixels.
+    index, degree : (K,) int ndarray
+        Indices in units of 1 / N, and N.
+    size : float
+        Diameter of a dot of index 1 / N, pixels.
+    label_size : callable
+        Returns the width and the height of the label with a text, pixels.
+    frame : (int, int)
+        Width and height of the picture, pixels.
+
+    Returns
+    -------
+    list of (str, float, float)
+        The text of each label that has a place, and its lower left corner.
+    """
+    if not len(index):
+        return []
+    texts = [format_index(*pair) for pair in zip(index.tolist(), degree.tolist(), strict=True)]
+    sizes = np.array([label_size(text) for text in texts])
+    radii = dot_diameters(index, size) / 2 + OUTLINE * size
+    corners = place_labels(position, sizes, radii, frame)
+    return [
+        (text, left, bottom)
         for text, (left, bottom) in zip(texts, corners.tolist(), strict=True)
         if np.isfinite(left)
     ]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import blf
 import bpy
@@ -14,8 +14,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
-from ..annotation.index_labels import MAX_LABELS
-from ..annotation.label_placement import place_labels
+from ..annotation.index_labels import MAX_LABELS, place_indices
 from ..annotation.singularity_marks import (
     COLOR_BY_SIGN,
     HIDDEN_OPACITY,
@@ -26,7 +25,6 @@ from ..annotation.singularity_marks import (
 )
 from ..cache import Cache
 from ..color import from_hex
-from ..field.singularities import format_index
 from ..progress import run_to_completion
 from ..projection.clip_planes import is_cut_away
 from ..projection.gbuffer import MeshInstance
@@ -170,25 +168,26 @@ def draw_labels(
     blf.color(font_id, 1.0, 1.0, 1.0, 1.0)
     blf.enable(font_id, blf.SHADOW)
     blf.shadow(font_id, 5, 0.0, 0.0, 0.0, 1.0)
-    places, radii, texts = [], [], []
+    places, indices, degrees = [], [], []
     for dots in objects:
         if len(dots.index) > MAX_LABELS:
             continue
-        radius = dot_diameters(dots.index, size) / 2 + OUTLINE * size
-        for number, (point, index) in enumerate(zip(dots.points, dots.index.tolist(), strict=True)):
+        for point, index in zip(dots.points, dots.index.tolist(), strict=True):
             place = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
             if place is not None and not is_occluded(context, point):
                 places.append(place)
-                radii.append(radius[number])
-                texts.append(format_index(index, dots.degree))
-    if texts:
-        sizes = [blf.dimensions(font_id, text) for text in texts]
-        frame = context.region.width, context.region.height
-        corners = place_labels(places, sizes, np.array(radii), frame).tolist()
-        for text, corner in zip(texts, corners, strict=True):
-            if math.isfinite(corner[0]):
-                blf.position(font_id, *corner, 0)
-                blf.draw(font_id, text)
+                indices.append(index)
+                degrees.append(dots.degree)
+    for text, left, bottom in place_indices(
+        np.array(places),
+        np.array(indices),
+        np.array(degrees),
+        size,
+        partial(blf.dimensions, font_id),
+        (context.region.width, context.region.height),
+    ):
+        blf.position(font_id, left, bottom, 0)
+        blf.draw(font_id, text)
     blf.disable(font_id, blf.SHADOW)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..color import from_hex, to_linear
 from ..progress import Progress, Task
-from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, STROKE_WIDTH, Label, placed_labels
+from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, Label, placed_labels, stroke_width
 from .singularity_marks import (
     COLOR_BY_SIGN,
     HIDDEN_OPACITY,
@@ -66,7 +66,7 @@ def _draw_label(
 ) -> None:
     """Draw a label and the halo around it, in place."""
     segments = label.segments()
-    width = max(STROKE_WIDTH * size, 1.0) / 2
+    width = stroke_width(size) / 2
     reach = width + HALO * size + 1
     window = _window(rgba, segments.min(axis=(0, 1)) - reach, segments.max(axis=(0, 1)) + reach)
     if window is None:

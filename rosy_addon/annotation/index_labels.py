@@ -18,6 +18,9 @@ LABEL_COLOR, HALO_COLOR = "#141414", "#ffffff"
 #: letters, in heights.
 LABEL_HEIGHT, STROKE_WIDTH, HALO, LETTER_SPACING = 1.1, 0.17, 0.16, 0.3
 
+#: Smallest width of the lines of labels, pixels.
+MIN_STROKE_WIDTH = 1.0
+
 #: Largest number of labels. More would hide the dots.
 MAX_LABELS = 250
 
@@ -60,7 +63,7 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
         return []
     nearest = marks.part(visible[np.argsort(marks.depth[visible], kind="stable")])
     size = marks.size
-    height, padding = LABEL_HEIGHT * size, (STROKE_WIDTH / 2 + HALO) * size
+    height, padding = LABEL_HEIGHT * size, stroke_width(size) / 2 + HALO * size
 
     def label_size(text: str) -> tuple[float, float]:
         return text_width(text) * height + 2 * padding, height + 2 * padding
@@ -112,6 +115,11 @@ def place_indices(
         for text, (left, bottom) in zip(texts, corners.tolist(), strict=True)
         if np.isfinite(left)
     ]
+
+
+def stroke_width(size: float) -> float:
+    """Return the width of the lines of labels in pixels, given the diameter of a dot of index 1 / N."""
+    return max(STROKE_WIDTH * size, MIN_STROKE_WIDTH)
 
 
 # --- letters -------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..annotation.index_labels import HALO, HALO_COLOR, LABEL_COLOR, STROKE_WIDTH, placed_labels
+from ..annotation.index_labels import HALO, HALO_COLOR, LABEL_COLOR, placed_labels, stroke_width
 from ..annotation.singularity_marks import (
     COLOR_BY_SIGN,
     HIDDEN_OPACITY,
@@ -242,7 +242,7 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
             f'<circle cx="{x:.2f}" cy="{height - y:.2f}" r="{radius + outline / 2:.2f}" '
             f'fill="{COLOR_BY_SIGN[1 if index > 0 else -1]}"{opacity}/>'
         )
-    width = STROKE_WIDTH * marks.size
+    width = stroke_width(marks.size)
     for label in placed_labels(marks):
         segments = label.segments() * (1, -1) + (0, height)
         path = " ".join(f"M{_format_points(segment)}" for segment in segments)

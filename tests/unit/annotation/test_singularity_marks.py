@@ -174,3 +174,23 @@ def test_drawings_have_the_same_dots_as_pictures():
     assert text.count('<path fill="none" stroke="#ffffff"') == expected.is_visible.sum()
     plain = draw_instances(instances, CAMERA, StrokeStyle(spacing=12.0))
     assert plain.marks is None and "circle" not in svg_text(plain.strokes, CAMERA)
+
+
+@pytest.mark.parametrize("size, width, halo", [(3.0, 1.0, 1.96), (12.0, 2.04, 5.88)])
+def test_lines_of_labels_in_drawings_are_at_least_a_pixel_wide(size, width, halo):
+    instance = view_of(icosphere(2), 4).instances[0]
+    strokes = draw_instances([instance], CAMERA, StrokeStyle(spacing=40.0)).strokes
+    labeled = marks([(80, 50)], [1], size=size, has_labels=True)
+    layer = svg_text(strokes, CAMERA, None, labeled).partition('id="singularities"')[2]
+    widths = re.findall(r'<path [^>]*stroke="(#\w+)" stroke-width="([\d.]+)"', layer)
+    assert widths == [("#ffffff", f"{halo:g}"), ("#141414", f"{width:g}")]
+
+
+@pytest.mark.parametrize("size", [1.0, 3.0, 12.0])
+def test_labels_stay_in_the_frame_with_their_halos(size):
+    reach = max(0.17 * size, 1.0) / 2 + 0.16 * size
+    ends = []
+    for x in np.linspace(80, 160, 801):
+        (label,) = placed_labels(marks([(x, 50)], [1], size=size, has_labels=True))
+        ends.append(label.segments()[..., 0].max())
+    assert 160 - reach - 0.11 < max(ends) < 160 - reach + 1e-9

@@ -35,9 +35,7 @@ from .field import Field
 from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from ..external.matplotlib_figure import ColorBar, Panel, Row
+    from ..external.matplotlib_figure import ColorBar, Figure, Panel, Row
 
 #: What a figure may have, from top to bottom.
 PARTS = ("fields", "differences", "table")

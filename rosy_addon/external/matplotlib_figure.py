@@ -24,7 +24,7 @@ from ..field.singularities import format_index
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 
 #: Sizes of text in points: titles, everything else.
 TITLE_SIZE, TEXT_SIZE = 8.0, 7.0

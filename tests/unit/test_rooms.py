@@ -162,7 +162,9 @@ BLENDER_ROOMS = (
 BLENDER_GPU_FILES = ("device.py",)
 
 #: What the Python package can use where it is installed.
-EXTRA_LIBRARIES = {"distributed", "imageio_ffmpeg", "meshio", "pyvista", "vtkmodules"}
+EXTRA_LIBRARIES = {
+    *("distributed", "imageio_ffmpeg", "matplotlib", "meshio", "pyvista", "vtkmodules"),
+}
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -26,6 +26,9 @@ COLUMN_MASK = 0xFFFF
 #: Largest size of the depth buffer, in pixels. Larger frames are rasterized in bands of rows.
 MAX_BAND_PIXELS = 1 << 22
 
+#: Sum of barycentric coordinates that is not due to rounding: the pixel center is outside.
+MAX_WEIGHT_SUM = 1 + 1e-4
+
 #: Label of all steps.
 STEP_LABEL = "finding visible pixels"
 
@@ -678,7 +681,8 @@ def barycentrics_task(
     Returns
     -------
     weights : (P, 3) float32 ndarray
-        1 / 3 each for triangles that have no area on screen.
+        Of a point of the triangle, also if the pixel center is outside of it. 1 / 3 each for triangles
+        that have no area on screen.
     front_facing : (P,) bool ndarray
         Whether the corners run counter-clockwise on screen.
     """
@@ -711,5 +715,9 @@ def barycentrics_task(
             area *= total
             np.maximum(area, 0, out=area)
             out[:] = area
-        weights[:, block][:, degenerate] = 1 / 3
+        found = weights[:, block]
+        # Pixels with several samples may see a triangle beside their centers.
+        outside = np.flatnonzero(found.sum(axis=0) > MAX_WEIGHT_SUM)
+        found[:, outside] /= found[:, outside].sum(axis=0)
+        found[:, degenerate] = 1 / 3
     return weights.T, front_facing

@@ -113,3 +113,13 @@ def test_entries_are_those_of_pixel_centers():
         np.testing.assert_array_equal(getattr(gbuffer, name)[entry], getattr(single, name))
     assert single.coverage is None
     assert 0 < len(gbuffer.pixel) - len(single.pixel) < 0.1 * len(single.pixel)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_values_do_not_reach_beyond_triangles(scene):
+    """Also where a pixel sees a triangle that its center is outside of."""
+    gbuffer = project(SCENES[scene], CAMERAS["perspective"], samples=3)
+    np.testing.assert_allclose(gbuffer.barycentric.sum(axis=1), 1, atol=2e-4)
+    assert gbuffer.barycentric.min() >= 0
+    largest = max(part.field.magnitude.max() for part in SCENES[scene] if part.field is not None)
+    assert np.abs(gbuffer.representation).max() <= largest * (1 + 3e-4)

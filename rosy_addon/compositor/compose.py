@@ -35,7 +35,7 @@ from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_hatched
 from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain_task
-from .picture import DegreeLayer, Picture
+from .picture import DegreeLayer, Picture, common_color_range
 from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
 from .stages import ComposeStages
@@ -113,7 +113,7 @@ def compose_task(
     map_position = None
     if colors_values(look) and not draws_thresholds:
         map_position = yield from subtask(map_positions_task(gbuffer, look), 0.0, 0.0)
-    layers = []
+    layers, color_tops = [], set()
     visible_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
     degrees = sorted({gbuffer.instance_degrees[instance_id] for instance_id in visible_ids})
     for layer_index, degree in enumerate(degrees):
@@ -139,6 +139,8 @@ def compose_task(
         part_look = (
             with_magnitude_range(field_look, field) if colors_magnitude(look) else field_look
         )
+        if colors_magnitude(look):
+            color_tops.add(part_look.magnitude_range)
         tone = modulation = None
         drawn = stages.drawn(field)
         if is_hatched(look):
@@ -175,11 +177,12 @@ def compose_task(
     frame = camera.width, rows, look.supersampling, gbuffer.coverage
     resolve = _resolve_pixels_task(gbuffer.pixel, color, alpha, *frame)
     rgba = yield from subtask(resolve, 1.0, 1.0)
+    color_range = common_color_range(color_tops)
     if not draws_thresholds:
-        return Picture(rgba, tuple(layers))
+        return Picture(rgba, tuple(layers), color_range=color_range)
     resolve = _resolve_pixels_task(gbuffer.pixel, spread, alpha, *frame)
     spread_rgba = yield from subtask(resolve, 1.0, 1.0)
-    return Picture(rgba, tuple(layers), spread_rgba[..., 0])
+    return Picture(rgba, tuple(layers), spread_rgba[..., 0], color_range)
 
 
 def compose(

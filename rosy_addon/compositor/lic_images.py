@@ -155,4 +155,9 @@ def with_magnitude_range(look: Look, field: PixelField) -> Look:
     largest = look.magnitude_range
     if not largest:
         largest = float(np.abs(field.representation).max(initial=0.0)) or 1.0
-    return replace(look, magnitude_range=max(largest, MIN_COMPONENT))
+    return replace(look, magnitude_range=fixed_magnitude_range(largest))
+
+
+def fixed_magnitude_range(largest: float) -> float:
+    """Return the magnitude with the last color, given the largest one, or a range that a look sets."""
+    return max(largest, MIN_COMPONENT)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..annotation.singularity_marks import SingularityMarks
 from .lic_images import LicImages
 
 
@@ -44,13 +46,25 @@ class Picture:
     spread : (H, W) float32 ndarray or None
         If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
         is the fraction of the pixel in which a field is visible.
+    color_range : (float, float) or None
+        Values of the first and the last color of the color map. None if the look has no color map, or the
+        fields of several degrees have ranges of their own.
+    marks : SingularityMarks or None
+        The singularities that are drawn over it. None if it has no dots.
     """
 
     rgba: np.ndarray
     layers: tuple[DegreeLayer, ...]
     spread: np.ndarray | None = None
+    color_range: tuple[float, float] | None = None
+    marks: SingularityMarks | None = None
 
     @property
     def line_count(self) -> int:
         """The largest number of lines of its fields through a point; 0 without layers."""
         return max((len(layer.images.members) for layer in self.layers), default=0)
+
+
+def common_color_range(tops: Collection[float]) -> tuple[float, float] | None:
+    """Return `Picture.color_range`, given the magnitudes with the last color for each degree."""
+    return (0.0, min(tops)) if len(set(tops)) == 1 else None

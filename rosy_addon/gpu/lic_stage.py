@@ -13,6 +13,7 @@ from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
 from .field_kind import FieldKind
 from .frame import Frame
 from .passes import WORKGROUP_SIZE
+from .resources import GpuResources
 from .screen_box import Box
 from .uniforms import camera_uniforms, covering_uniforms, direction_uniforms, look_uniforms
 
@@ -102,24 +103,29 @@ def _unfold_task(
 
 
 def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look: Look) -> Any:
-    """Return a texture of one texel: the largest magnitude of the fields of a kind.
+    """Return `largest_magnitude` of the fields of a kind.
 
     If the look does not need it, another texture that the shader does not read.
     """
     if not MAGNITUDE_MODES[look.magnitude] or look.magnitude_range:
         return textures["cells"]
-    source = textures["field_values"]
+    return largest_magnitude(frame.resources, textures["field_values"], kind.degree)
+
+
+def largest_magnitude(resources: GpuResources, field_values: Any, degree: int) -> Any:
+    """Return a texture of one texel: the largest magnitude of the visible fields of a degree."""
+    source = field_values
     width, height = source.width, source.height
     level, is_first = 0, 1
     while (width, height) != (1, 1) or is_first:
         width, height = -(-width // REDUCE_BLOCK), -(-height // REDUCE_BLOCK)
-        tiles = frame.resources.image(f"tiles {level}", width, height)
-        frame.resources.device.compute(
+        tiles = resources.image(f"tiles {level}", width, height)
+        resources.device.compute(
             passes.MAX_REDUCE,
             (width, height),
             {"source_values": source},
             {"tiles": tiles},
-            {"degree": kind.degree, "is_first": is_first},
+            {"degree": degree, "is_first": is_first},
         )
         source, level, is_first = tiles, level + 1, 0
     return source

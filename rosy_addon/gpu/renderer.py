@@ -13,9 +13,10 @@ import numpy as np
 
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
-from ..compositor.look import colors_values
+from ..compositor.look import colors_magnitude, colors_values
 from ..compositor.look_units import look_in_pixels
-from ..compositor.picture import Picture
+from ..compositor.picture import Picture, common_color_range
+from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
 from ..errors import RosyError
 from ..progress import Progress, Task, run_to_completion, subtask
@@ -30,7 +31,7 @@ from .device import Device
 from .even_lines_stage import even_lines_task
 from .frame import Frame
 from .gbuffer_stage import render_gbuffer
-from .lic_stage import lic_task
+from .lic_stage import largest_magnitude, lic_task
 from .noise_stage import noise_task
 from .outline_stage import outline_task
 from .resources import DrawItem, GpuResources
@@ -80,7 +81,8 @@ class GpuRenderer:
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
-        return (yield from with_singularities_task(Picture(rgba, ()), view))
+        picture = Picture(rgba, (), color_range=self._color_range(view))
+        return (yield from with_singularities_task(picture, view))
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
         """As `ViewportRenderer.prepare_task`."""
@@ -190,6 +192,21 @@ class GpuRenderer:
             name: self.device.read(self.resources.image(name, *size), *size)
             for name in ("normals", "field_values")
         }
+
+    def _color_range(self, view: ViewInput) -> tuple[float, float] | None:
+        """Return `Picture.color_range` of the last picture."""
+        look, camera = view.look, view.sample_camera
+        if not colors_magnitude(look) or look.magnitude_range:
+            return fixed_color_range(look)
+        field_values = self.resources.image("field_values", camera.width, camera.height)
+        degrees = {
+            instance.field.degree for instance in view.instances if instance.field is not None
+        }
+        tops = set()
+        for degree in sorted(degrees):
+            texture = largest_magnitude(self.resources, field_values, degree)
+            tops.add(float(self.read(texture, 1, 1)[0, 0, 0]))
+        return common_color_range(tops - {0.0})  # 0: no field of this degree is visible
 
     def _downsampled(
         self, fine_picture: Any, camera: Camera, supersampling: int, target_key: Hashable

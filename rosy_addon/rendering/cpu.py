@@ -8,6 +8,7 @@ from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.compose import compose_task
 from ..compositor.picture import Picture
+from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
 from ..errors import RosyError
 from ..progress import Task, subtask
@@ -65,7 +66,7 @@ class CpuRenderer:
         if len(rows) > 1:
             rgba = yield from self._workers.draw_task(view, rows, self._cache)
             if rgba is not None:
-                return Picture(rgba, ())
+                return Picture(rgba, (), color_range=fixed_color_range(view.look))
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
         compose = compose_task(
             gbuffer,

@@ -40,4 +40,4 @@ def with_singularities_task(
     task = singularity_marks_task(view.instances, view.camera, view.look, view.clip_planes, cache)
     marks = yield from subtask(task, 0.0, 0.8)
     rgba = yield from subtask(draw_marks_task(picture.rgba, marks), 0.8, 1.0)
-    return replace(picture, rgba=rgba)
+    return replace(picture, rgba=rgba, marks=marks)

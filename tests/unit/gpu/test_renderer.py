@@ -1501,3 +1501,32 @@ def test_a_skewed_projection(card):
     projection = camera.projection.copy()
     projection[0, 1], projection[1, 0] = 0.3, -0.2
     assert_parity(card, [ball(4)], Camera(camera.view, projection, *SIZE))
+
+
+@pytest.mark.parametrize("supersampling", [1, 2])
+@pytest.mark.parametrize("top", [0.0, 0.7])
+def test_the_range_of_the_colors(card, supersampling, top):
+    """It is numpy's, and a look with this range gives the same picture."""
+    look = replace(LOOK, magnitude="colour", magnitude_range=top, supersampling=supersampling)
+    instances = [ball(4), MeshInstance(BALL, placed(shift=(0, 0, -9)), axis_field(BALL, 2))]
+    drawn, expected = (
+        run_to_completion(renderer.render_task(ViewInput(tuple(instances), view(), look)))
+        for renderer in (card, CpuRenderer())
+    )
+    assert drawn.color_range == pytest.approx(expected.color_range, rel=1e-4)
+    assert (drawn.color_range == (0.0, 0.7)) == bool(top)
+    fixed = replace(look, magnitude_range=drawn.color_range[1])
+    again = run_to_completion(card.render_task(ViewInput(tuple(instances), view(), fixed)))
+    np.testing.assert_allclose(again.rgba, drawn.rgba, atol=1e-6)
+
+
+def test_no_common_range_of_the_colors(card):
+    """Fields of several degrees have ranges of their own."""
+    look = replace(LOOK, magnitude="colour")
+    instances = ball(4), MeshInstance(BALL, placed(shift=(0.7, 0, 0)), axis_field(BALL, 2))
+    for renderer in (card, CpuRenderer()):
+        picture = run_to_completion(renderer.render_task(ViewInput(instances, view(), look)))
+        assert picture.color_range is None
+    look = replace(look, magnitude="length")
+    picture = run_to_completion(card.render_task(ViewInput(instances[:1], view(), look)))
+    assert picture.color_range is None

@@ -1,0 +1,105 @@
+"""What the key of a picture says about it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from .singularity_marks import SingularityMarks
+
+
+@dataclass(frozen=True)
+class ColorScale:
+    """What the color map of a picture shows.
+
+    Attributes
+    ----------
+    title : str
+        Name of the quantity.
+    color_map : str
+        As in `color.map_colors`.
+    low : float
+        Value with the first color.
+    high : float or None
+        Value with the last color. None if there is not one such value: it differs between frames, or
+        between fields.
+    """
+
+    title: str
+    color_map: str
+    low: float
+    high: float | None
+
+
+@dataclass(frozen=True)
+class IndexCount:
+    """A kind of singularities.
+
+    Attributes
+    ----------
+    index : int
+        In units of 1 / N.
+    degree : int
+        N.
+    count : int or None
+        How many are visible. None if that is not known, as for all frames of an animation.
+    """
+
+    index: int
+    degree: int
+    count: int | None
+
+
+@dataclass(frozen=True)
+class PictureKey:
+    """What the key of a picture says about it.
+
+    Attributes
+    ----------
+    color_scale : ColorScale or None
+        None if the picture has no color map.
+    indices : tuple of IndexCount
+        The indices of its singularities, the largest first. Empty if it has no dots.
+    dot_size : float
+        Diameter of a dot of index 1 / N, in pixels of the picture.
+    """
+
+    color_scale: ColorScale | None = None
+    indices: tuple[IndexCount, ...] = ()
+    dot_size: float = 0.0
+
+    def to_json(self) -> str:
+        """Return it as text, for `from_json`."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> PictureKey:
+        """Return what `to_json` has written. An empty key if the text is from another version."""
+        try:
+            values = json.loads(text)
+            scale = values["color_scale"]
+            return cls(
+                None if scale is None else ColorScale(**scale),
+                tuple(IndexCount(**entry) for entry in values["indices"]),
+                values["dot_size"],
+            )
+        except (ValueError, KeyError, TypeError):
+            return cls()
+
+
+def count_indices(marks: SingularityMarks) -> tuple[IndexCount, ...]:
+    """Return the indices that occur among visible singularities, the largest first."""
+    kinds = np.stack([marks.index, marks.degree], axis=1)[marks.is_visible]
+    return sorted_indices(kinds, has_counts=True)
+
+
+def sorted_indices(kinds: np.ndarray, *, has_counts: bool) -> tuple[IndexCount, ...]:
+    """Return the distinct ones of (K, 2) indices and degrees, the largest index first."""
+    distinct, counts = np.unique(kinds.reshape(-1, 2), axis=0, return_counts=True)
+    entries = [
+        IndexCount(index, degree, count if has_counts else None)
+        for (index, degree), count in zip(distinct.tolist(), counts.tolist(), strict=True)
+    ]
+    return tuple(sorted(entries, key=lambda entry: (-entry.index / entry.degree, entry.degree)))

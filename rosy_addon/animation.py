@@ -20,6 +20,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .annotation.key_contents import PictureKey
 from .cache import Cache, content_hash
 from .compositor.look import Look
 from .errors import RosyError
@@ -29,12 +30,14 @@ from .progress import Progress, Task, run_to_completion, subtask
 from .projection.camera import Camera
 from .rendering.band_workers import BandWorkers
 from .rendering.renderer import Renderer
+from .rendering.singularities import sequence_key_task
 from .rendering.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import frame_path, image_data_task, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
+from .scene.keys import update_keys
 from .scene.look_properties import read_look
 from .scene.picture_state import PictureState, read_picture_states
 from .scene.pictures import (
@@ -163,6 +166,11 @@ def bake_animation_task(
             rendered_count += not all(result.up_to_date for result in results)
             if not rendered_count:
                 start_time = time.monotonic()
+        key = PictureKey()
+        if show and scene_data is not None:
+            last_look = read_look(scene.rosy) if look is None else look
+            task = sequence_key_task(scene_data.instances, last_look, cache)
+            key = yield from subtask(task, 1.0, 1.0)
         sequence_results = []
         for index, (name, results) in enumerate(frame_results.items()):
             path = _path_of_frame(settings, name, cameras, frames[0])
@@ -173,6 +181,7 @@ def bake_animation_task(
                     None if cameras is None else cameras[index],
                     {result.frame: result.state for result in results},
                     results[-1].device,
+                    key,
                 )
                 apply_sequence(scene, scene_data, sequence, camera, settings, drawn_from)
             rendered, skipped = (
@@ -184,6 +193,7 @@ def bake_animation_task(
             )
         if show:
             update_backdrops(scene)
+            update_keys(scene)
         return sequence_results
     finally:
         exit_stack.close()

@@ -10,6 +10,7 @@ import bpy
 from .cache import BAKE_CACHE
 from .compositor.ink_thresholds import unlit_look
 from .compositor.look import Look, is_hatched
+from .compositor.picture_key import picture_key
 from .gpu.select import select_renderer
 from .progress import Progress, Task, run_to_completion, subtask
 from .rendering.band_workers import BandWorkers
@@ -17,6 +18,7 @@ from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import image_data_task
 from .scene.cameras import CameraSource, render_camera
+from .scene.keys import update_keys
 from .scene.look_properties import read_look
 from .scene.picture_state import read_picture_states
 from .scene.pictures import (
@@ -106,7 +108,9 @@ def bake_task(
             picture = yield from subtask(renderer.render_task(view), start, stop)
             image_task = image_data_task(picture, as_float=settings.as_float)
             image_data = yield from subtask(image_task, stop, stop)
-            drawn_from = DrawnFrom(source, {None: states[index]}, renderer.device_name)
+            drawn_from = DrawnFrom(
+                source, {None: states[index]}, renderer.device_name, picture_key(look, picture)
+            )
             hatching = Hatching(look, picture.line_count) if draws_thresholds else None
             rendered_views.append(
                 RenderedView(picture, image_data, view.camera, drawn_from, hatching)
@@ -118,6 +122,7 @@ def bake_task(
         for rendered_view in rendered_views
     ]
     update_backdrops(scene)
+    update_keys(scene)
     return results
 
 

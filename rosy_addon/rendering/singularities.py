@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ..annotation.draw_marks import draw_marks_task
-from ..annotation.singularity_marks import singularity_marks_task
+from ..annotation.key_contents import PictureKey, sorted_indices
+from ..annotation.singularity_marks import cached_singularities_task, singularity_marks_task
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
+from ..compositor.look import Look
 from ..compositor.picture import Picture
+from ..compositor.picture_key import color_scale_of, fixed_color_range
 from ..progress import Task, subtask
+from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
 
@@ -41,3 +48,43 @@ def with_singularities_task(
     marks = yield from subtask(task, 0.0, 0.8)
     rgba = yield from subtask(draw_marks_task(picture.rgba, marks), 0.8, 1.0)
     return replace(picture, rgba=rgba, marks=marks)
+
+
+def sequence_key_task(
+    instances: Sequence[MeshInstance], look: Look, cache: Cache | None = None
+) -> Task[PictureKey]:
+    """Find what the key of an animation says.
+
+    It is true of all frames: the range of the colors is known only if the look sets it, and the
+    singularities are those of the fields, visible or not.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        Of one of the frames.
+    look : Look
+    cache : Cache, optional
+        Stores the singularities of fields.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    PictureKey
+    """
+    kinds = [np.empty((0, 2), dtype=np.int64)]
+    if shows_singularities(look):
+        cache = Cache() if cache is None else cache
+        for number, instance in enumerate(instances):
+            if instance.field is not None:
+                task = cached_singularities_task(instance, cache)
+                start, stop = number / len(instances), (number + 1) / len(instances)
+                _, index = yield from subtask(task, start, stop)
+                kinds.append(np.stack([index, np.full(len(index), instance.field.degree)], axis=1))
+    return PictureKey(
+        color_scale_of(look, fixed_color_range(look)),
+        sorted_indices(np.concatenate(kinds), has_counts=False),
+        look.singularity_size,
+    )

@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..projection.camera import Camera
 from .backdrop import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
+from .keys import update_keys
 from .look_properties import read_look
 from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import (
@@ -39,6 +41,10 @@ NAME_PREFIX = "RoSy "
 
 #: `RosyBake.view` of a texture.
 TEXTURE_VIEW = "texture"
+
+
+#: The key of a picture that needs none.
+NO_KEY = PictureKey()
 
 
 @dataclass(frozen=True)
@@ -119,11 +125,14 @@ class DrawnFrom:
     states : dict of int or None to PictureState
         By frame; for a single picture the only key is None.
     device : {"cpu", "gpu"}
+    key : PictureKey
+        What the key of the picture says.
     """
 
     source: CameraSource | TextureSource | None
     states: Mapping[int | None, PictureState]
     device: str
+    key: PictureKey = NO_KEY
 
 
 def store_record(
@@ -156,6 +165,7 @@ def store_record(
     record.frames = frame_range
     record.width, record.height = size
     record.device = drawn_from.device
+    record.key = drawn_from.key.to_json()
     record.state = ""
     record.frame_states.clear()
     for frame, state in drawn_from.states.items():
@@ -450,7 +460,7 @@ def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
 def remove_bakes(
     scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None
 ) -> RemovalCounts:
-    """Remove baked pictures and their backdrops from a scene. Fields and saved files are kept.
+    """Remove baked pictures, their backdrops and their keys from a scene. Fields and saved files are kept.
 
     Parameters
     ----------
@@ -471,6 +481,7 @@ def remove_bakes(
     needed = set() if objects is None else _needed_materials(set(found) - set(targets))
     images, materials = _remove_records(scene, needed)
     update_backdrops(scene)
+    update_keys(scene)
     unused = delete_unused()
     return RemovalCounts(
         len(targets),

@@ -16,6 +16,7 @@ from ..presets.store import DEFAULT_KEY
 from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
+from ..scene.keys import update_keys
 from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
 from ..surface_texture.draw import (
     CONTENTS,
@@ -135,6 +136,7 @@ class RosyBake(bpy.types.PropertyGroup):
         description="Frame range of a sequence, empty for a single picture"
     )
     device: bpy.props.StringProperty(description="Device that drew the picture: cpu or gpu")
+    key: bpy.props.StringProperty(description="What the key of the picture says, as JSON")
     state: bpy.props.StringProperty(
         description="State of the scene when a single picture was drawn, as JSON"
     )
@@ -232,6 +234,10 @@ class RosyStrokes(bpy.types.PropertyGroup):
 
 def _show_backdrops(settings: RosyScene, _context: bpy.types.Context) -> None:
     update_backdrops(settings.id_data)
+
+
+def _show_keys(settings: RosyScene, _context: bpy.types.Context) -> None:
+    update_keys(settings.id_data)
 
 
 class RosyComb(bpy.types.PropertyGroup):
@@ -356,6 +362,57 @@ class RosyScene(bpy.types.PropertyGroup):
         name="Backdrop",
         description="Fill the background of cameras that have pictures with the paper of the hatching",
         update=_show_backdrops,
+    )
+    key: bpy.props.BoolProperty(
+        name="Key",
+        description="Explain the pictures in renders: a color bar, a legend of the singularities, a scale bar "
+        "and a caption, on a plane in front of each camera that has a picture",
+        update=_show_keys,
+    )
+    key_bar: bpy.props.BoolProperty(
+        name="Color Bar",
+        description="Show what the color map of the picture means",
+        default=True,
+        update=_show_keys,
+    )
+    key_title: bpy.props.StringProperty(
+        name="Title",
+        description="Title of the color bar with its unit, such as Curvature (1/m). \\n starts a new line. "
+        "Empty: the name of the quantity",
+        update=_show_keys,
+    )
+    key_legend: bpy.props.BoolProperty(
+        name="Singularities",
+        description="Show the dots of all indices that are visible in the picture",
+        default=True,
+        update=_show_keys,
+    )
+    key_counts: bpy.props.BoolProperty(
+        name="Counts",
+        description="Say how many singularities of each index are visible",
+        update=_show_keys,
+    )
+    key_scale: bpy.props.BoolProperty(
+        name="Scale Bar",
+        description="Show a length in the units of the scene. Only for orthographic cameras: in perspective, "
+        "lengths depend on the depth",
+        default=True,
+        update=_show_keys,
+    )
+    key_caption: bpy.props.StringProperty(
+        name="Caption",
+        description="Text below the picture. \\n starts a new line",
+        update=_show_keys,
+    )
+    key_size: bpy.props.FloatProperty(
+        name="Text Size",
+        description="Size of the text in pixels of the render. 0: 2.2 percent of the smaller side. It is "
+        "smaller where there is not enough room",
+        subtype="PIXEL",
+        min=0,
+        max=1000,
+        soft_max=100,
+        update=_show_keys,
     )
     device: bpy.props.EnumProperty(
         name="Device", description="Device that draws the picture", items=DEVICE_ITEMS

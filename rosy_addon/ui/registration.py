@@ -6,6 +6,7 @@ import bpy
 
 from . import (
     job_status,
+    key_panel,
     live_views,
     look_panels,
     main_panel,
@@ -17,7 +18,7 @@ from . import (
 )
 
 #: Modules with classes to register. Panels are shown in this order.
-MODULES = (preferences, main_panel, look_panels, strokes_panel)
+MODULES = (preferences, main_panel, look_panels, key_panel, strokes_panel)
 
 
 def register() -> None:

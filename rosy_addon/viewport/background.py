@@ -10,7 +10,7 @@ from ..compositor.look import Look, is_hatched
 from ..errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.view_input import Background
-from ..scene.backdrop import frame_corners
+from ..scene.camera_planes import frame_corners
 from ..scene.cameras import camera_of_object
 
 

@@ -52,6 +52,7 @@ MAY_IMPORT = {
     | {
         "field",
         "projection",
+        "annotation",
         "compositor",
         "line_drawing",
         "surface_texture",
@@ -63,7 +64,8 @@ MAY_IMPORT = {
     "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
     "comb_field": BASE_ROOMS | {"field", "scene", "cache"},
     "bake_texture": BASE_ROOMS | {"compositor", "surface_texture", "scene", "image_io", "cache"},
-    "animation": BASE_ROOMS | {"projection", "compositor", "rendering", "scene", "gpu", "cache"},
+    "animation": BASE_ROOMS
+    | {"projection", "annotation", "compositor", "rendering", "scene", "gpu", "cache"},
     "viewport": BASE_ROOMS
     | {"field", "projection", "annotation", "compositor", "rendering", "scene", "gpu"},
     "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "scene", "cache"},

@@ -1,0 +1,226 @@
+"""Keys: what explains a picture, on a plane in front of the camera that it was drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ..annotation.draw_key import DARK_PLATES, LIGHT_PLATES, KeyColors, draw_key
+from ..annotation.key_contents import PictureKey
+from ..annotation.key_layout import KeyParts, lay_out_key
+from ..annotation.round_numbers import format_number, round_below
+from ..color import LUMINANCE_WEIGHTS, from_hex, to_linear
+from ..compositor.look import is_hatched
+from ..compositor.picture import Picture
+from ..errors import RosyError
+from ..progress import run_to_completion
+from ..projection.camera import Camera
+from .blender_images import image_data_task, new_image
+from .camera_planes import (
+    add_camera_plane,
+    frame_corners,
+    pictured_cameras,
+    remove_camera_planes,
+)
+from .cameras import camera_of_object
+from .font_shapes import FontShapes
+from .look_properties import read_look
+from .node_builder import new_empty_material
+from .owned_data import delete_owned, rollback_on_error
+from .read_view import scene_depsgraph
+
+#: Custom property on the objects of keys.
+KEY_TAG = "rosy_key"
+
+#: Distance of a key from the camera, in the starts of the clip range.
+DISTANCE = 1.02
+
+#: Longest side of the image of a key, pixels. For larger renders it is enlarged.
+MAX_SIDE = 4096
+
+#: Largest length of a scale bar, as a fraction of the width of the frame.
+MAX_SCALE = 0.2
+
+#: Meters in a foot and in an inch.
+FOOT, INCH = 0.3048, 0.0254
+
+#: Linear luminance below which a background is dark.
+DARK_BACKGROUND = 0.18
+
+
+def update_keys(scene: bpy.types.Scene) -> None:
+    """Create the keys of a scene anew, and remove those that it should not have.
+
+    If the switch is on, every camera with a picture has a key. For animations, it is the active camera
+    of the scene. A key says what the picture was drawn from when it was baked.
+    """
+    for image in remove_camera_planes(scene, KEY_TAG):
+        delete_owned(image)
+    if not scene.rosy.key:
+        return
+    fonts = FontShapes()
+    for camera, record in pictured_cameras(scene).items():
+        try:
+            _add_key(scene, camera, record, fonts)
+        except RosyError:
+            continue  # the camera has become a panoramic one since then
+
+
+def _add_key(
+    scene: bpy.types.Scene,
+    camera: bpy.types.Object,
+    record: bpy.types.PropertyGroup,
+    fonts: FontShapes,
+) -> None:
+    """Add the plane of a key, parented to a camera, if the key shows anything."""
+    view = camera_of_object(scene, scene_depsgraph(scene), camera)
+    picture = _draw(scene, view, record, fonts)
+    if picture is None:
+        return
+    name = f"RoSy Key {camera.name}"
+    corners = frame_corners(view, DISTANCE * camera.data.clip_start)
+    image_data = run_to_completion(image_data_task(picture, as_float=False))
+    with rollback_on_error() as created:
+        image = new_image(name, image_data)
+        created.append(image)
+        material = _new_material(name, image, scene.rosy.emission or 1.0)
+        created.append(material)
+        obj = add_camera_plane(scene, camera, name, KEY_TAG, corners, material, created)
+    # Views with Solid shading would show the plane, and not what is behind it.
+    obj.display_type = "BOUNDS"
+    for probe in ("hide_probe_volume", "hide_probe_sphere", "hide_probe_plane"):
+        setattr(obj, probe, True)
+
+
+def _draw(
+    scene: bpy.types.Scene,
+    view: Camera,
+    record: bpy.types.PropertyGroup,
+    fonts: FontShapes,
+) -> Picture | None:
+    """Draw a key as a picture of the size of the frame; None if it shows nothing."""
+    settings = scene.rosy
+    shrink = min(1.0, MAX_SIDE / max(view.width, view.height))
+    width, height = (max(round(side * shrink), 1) for side in (view.width, view.height))
+    key = PictureKey.from_json(record.key)
+    scale = key.color_scale if settings.key_bar else None
+    if scale is not None and settings.key_title.strip():
+        scale = replace(scale, title=_lines(settings.key_title))
+    parts = KeyParts(
+        scale,
+        key.indices if settings.key_legend else (),
+        key.dot_size * width / max(record.width, 1),
+        settings.key_counts,
+        _scale_bar(scene, view, width) if settings.key_scale else None,
+        _lines(settings.key_caption),
+    )
+    layout = lay_out_key(parts, (width, height), fonts.width, settings.key_size * shrink)
+    if not layout.plates:
+        return None
+    rgba = np.zeros((height, width, 4), dtype=np.float32)
+    color_map = "" if scale is None else scale.color_map
+    draw_key(rgba, layout, color_map, fonts.triangles, _key_colors(scene))
+    return Picture(rgba, ())
+
+
+def _lines(text: str) -> str:
+    """Return a text that was typed, with line breaks in place of ``\\n``."""
+    return text.replace("\\n", "\n")
+
+
+# --- scale bar -----------------------------------------------------------------------------------
+
+
+def _scale_bar(scene: bpy.types.Scene, view: Camera, width: int) -> tuple[float, str] | None:
+    """Return the length of the scale bar in pixels and its label; None for perspective cameras."""
+    if view.projection[3, 2] != 0:
+        return None
+    frame = 2 / abs(view.projection[0, 0])  # width in Blender units
+    length, label = round_length(MAX_SCALE * frame, scene.unit_settings)
+    return length / frame * width, label
+
+
+def round_length(largest: float, units: bpy.types.UnitSettings) -> tuple[float, str]:
+    """Return the largest round length up to a length, and its label in the units of a scene.
+
+    Round are 1, 2 and 5 times a power of ten: of meters, of feet or inches, or of Blender units.
+
+    Parameters
+    ----------
+    largest : float
+        Blender units.
+    units : bpy.types.UnitSettings
+
+    Returns
+    -------
+    length : float
+        Blender units.
+    label : str
+    """
+    if units.system == "NONE":
+        length = round_below(largest)
+        return length, format_number(length, 1)
+    meters = largest * units.scale_length
+    unit = 1.0 if units.system == "METRIC" else FOOT if meters >= FOOT else INCH
+    length = unit * round_below(meters / unit)
+    label = bpy.utils.units.to_string(units.system, "LENGTH", length, precision=6)
+    return length / units.scale_length, label.strip()
+
+
+# --- colors --------------------------------------------------------------------------------------
+
+
+def _key_colors(scene: bpy.types.Scene) -> KeyColors:
+    """Return the colors of a key: dark plates for a background that is known to be dark."""
+    look = read_look(scene.rosy)
+    if scene.rosy.backdrop and is_hatched(look):
+        background = to_linear(from_hex(look.paper_colour))
+    elif scene.render.film_transparent:
+        return LIGHT_PLATES
+    else:
+        background = _world_color(scene.world)
+    is_dark = background is not None and background @ LUMINANCE_WEIGHTS < DARK_BACKGROUND
+    return DARK_PLATES if is_dark else LIGHT_PLATES
+
+
+def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
+    """Return the (3,) linear color of a world; None if it has more than one."""
+    if world is None:
+        return np.zeros(3, dtype=np.float32)
+    nodes = world.node_tree.nodes if world.node_tree is not None and world.use_nodes else ()
+    node = next((node for node in nodes if node.bl_idname == "ShaderNodeBackground"), None)
+    if node is None:
+        return np.array(world.color, dtype=np.float32)
+    color, strength = node.inputs["Color"], node.inputs["Strength"]
+    if color.is_linked or strength.is_linked:
+        return None
+    return np.array(color.default_value[:3], dtype=np.float32) * strength.default_value
+
+
+def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.types.Material:
+    """Create a material that emits an image, and is transparent where that is, and from behind."""
+    material, build = new_empty_material(name)
+    material.diffuse_color = (1.0, 1.0, 1.0, 0.0)
+    material.use_backface_culling = True
+    material.surface_render_method = "BLENDED"
+    links = build.tree.links
+    image_node = build(
+        "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
+    )
+    # A quad without a UV map: its generated coordinates run from corner to corner.
+    links.new(build("ShaderNodeTexCoord").outputs["Generated"], image_node.inputs["Vector"])
+    emission, transparent = build("ShaderNodeEmission"), build("ShaderNodeBsdfTransparent")
+    emission.inputs["Strength"].default_value = strength
+    links.new(image_node.outputs["Color"], emission.inputs["Color"])
+    backfacing = build("ShaderNodeNewGeometry").outputs["Backfacing"]
+    opacity = build.math(
+        "MULTIPLY", image_node.outputs["Alpha"], build.math("SUBTRACT", 1.0, backfacing)
+    )
+    mix = build("ShaderNodeMixShader")
+    links.new(opacity, mix.inputs[0])
+    links.new(transparent.outputs["BSDF"], mix.inputs[1])
+    links.new(emission.outputs["Emission"], mix.inputs[2])
+    links.new(mix.outputs["Shader"], build("ShaderNodeOutputMaterial").inputs["Surface"])
+    return material

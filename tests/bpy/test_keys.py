@@ -1,0 +1,219 @@
+"""Keys: what explains pictures in renders."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.animation import bake_animation
+from rosy.rosy_addon.annotation.key_contents import PictureKey
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.color import to_linear
+from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.projection.project import project
+from rosy.rosy_addon.scene.bake_records import remove_bakes
+from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.font_shapes import FontShapes
+from rosy.rosy_addon.scene.keys import round_length, update_keys
+from rosy.rosy_addon.scene.look_properties import apply_look
+from rosy.rosy_addon.scene.pictures import OutputSettings
+from rosy.rosy_addon.scene.scene_reader import read_instances
+from scenes import add_camera, aim, contents, pixels, render
+
+LOOK = Look(magnitude="colour", singularity_dots="visible", supersampling=2)
+
+
+def keys():
+    return [obj for obj in bpy.data.objects if obj.get("rosy_key")]
+
+
+def key_image(obj):
+    nodes = obj.active_material.node_tree.nodes
+    return next(node.image for node in nodes if node.bl_idname == "ShaderNodeTexImage")
+
+
+@pytest.fixture
+def colored(monkey, camera, scene):
+    """A scene whose look has colors by magnitude, and dots."""
+    apply_look(scene.rosy, LOOK)
+    scene.render.resolution_x, scene.render.resolution_y = 320, 240
+    return scene
+
+
+# --- text ----------------------------------------------------------------------------------------
+
+
+def test_text_is_read_without_a_trace(scene):
+    before = contents()
+    fonts = FontShapes()
+    triangles = fonts.triangles("Magnitude ≥ ×10⁻⁵")
+    assert len(triangles) > 500 and triangles[..., 0].min() == 0
+    assert fonts.width("Magnitude ≥ ×10⁻⁵") == triangles[..., 0].max()
+    assert fonts.width("HH") > 2 * fonts.width("H") > 1
+    assert fonts.width("") == fonts.width(" ") == 0
+    assert contents() == before
+
+
+def test_letters_have_the_area_of_their_outlines(scene):
+    """An H of Blender's font consists of three bars."""
+    a, b, c = np.moveaxis(FontShapes().triangles("H"), 1, 0)
+    area = np.abs(np.cross(b - a, c - a)).sum() / 2
+    low, high = np.min([a, b, c], axis=(0, 1)), np.max([a, b, c], axis=(0, 1))
+    box = np.prod(high - low)
+    assert 0.2 * box < area < 0.5 * box
+
+
+# --- the plane -----------------------------------------------------------------------------------
+
+
+def test_the_switch_shows_and_hides_the_key(colored):
+    before = contents()
+    bake(colored)
+    baked = contents()
+    assert not keys()
+    colored.rosy.key = True
+    (obj,) = keys()
+    assert obj.parent == colored.camera and obj.hide_select and not obj.visible_shadow
+    image = key_image(obj)
+    assert image.name == "RoSy Key Camera" and image.packed_file and tuple(image.size) == (320, 240)
+    colored.rosy.key_caption = "A head"
+    assert len(keys()) == 1 and len([i for i in bpy.data.images if "Key" in i.name]) == 1
+    colored.rosy.key = False
+    assert contents() == baked
+    colored.rosy.key = True
+    bake(colored)
+    assert len(keys()) == 1
+    remove_bakes(colored)
+    update_keys(colored)
+    assert contents() == before
+
+
+def test_a_key_that_shows_nothing_is_not_made(colored):
+    colored.rosy.key = True
+    for name in ("key_bar", "key_legend"):
+        setattr(colored.rosy, name, False)
+    bake(colored)
+    assert not keys()
+    colored.rosy.key_caption = "A head"
+    assert len(keys()) == 1
+
+
+def test_a_panoramic_camera_has_no_key(colored):
+    colored.rosy.key = True
+    bake(colored)
+    colored.camera.data.type = "PANO"
+    colored.rosy.key_size = 12
+    assert not keys()
+
+
+def test_pictures_do_not_depend_on_the_key(colored):
+    colored.rosy.key_caption = "A head"
+    colored.rosy.key = True
+    (first,) = bake(colored)
+    (second,) = bake(colored)
+    assert len(keys()) == 1
+    np.testing.assert_array_equal(first.picture.rgba, second.picture.rgba)
+    colored.rosy.key = False
+    (third,) = bake(colored)
+    np.testing.assert_array_equal(first.picture.rgba, third.picture.rgba)
+
+
+@pytest.mark.parametrize("supersampling", [1, 2])
+def test_the_range_is_that_of_the_picture(colored, supersampling):
+    colored.rosy.look.supersampling = supersampling
+    (result,) = bake(colored)
+    record = colored.rosy.bakes[0]
+    key = PictureKey.from_json(record.key)
+    assert key.color_scale.high == result.picture.color_range[1]
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    view = camera_of_object(colored, depsgraph, colored.camera)
+    gbuffer = project(read_instances(depsgraph), view, samples=supersampling)
+    largest = float(np.abs(gbuffer.representation).max())
+    assert key.color_scale.high == pytest.approx(largest, rel=1e-6)
+    # The same range, typed, gives the same picture.
+    colored.rosy.look.magnitude_range = largest
+    (again,) = bake(colored)
+    np.testing.assert_allclose(again.picture.rgba, result.picture.rgba, atol=1e-4)
+    counts = {entry.index: entry.count for entry in key.indices}
+    marks = result.picture.marks
+    assert counts == {i: int((marks.index[marks.is_visible] == i).sum()) for i in counts}
+    assert sum(counts.values()) == marks.is_visible.sum() > 0
+
+
+def test_animations_have_numbers_only_with_a_range(colored, tmp_path):
+    colored.rosy.key = True
+    settings = OutputSettings(folder=tmp_path)
+    for top, expected in ((0.0, None), (0.5, 0.5)):
+        colored.rosy.look.magnitude_range = top
+        bake_animation(colored, range(1, 3), settings=settings)
+        key = PictureKey.from_json(colored.rosy.bakes[0].key)
+        assert key.color_scale.high == expected
+        assert key.indices and all(entry.count is None for entry in key.indices)
+        (obj,) = keys()
+        assert obj.parent == colored.camera
+
+
+def test_every_camera_has_its_own(colored):
+    colored.rosy.key = True
+    other = add_camera("Other", (4.0, 0.0, 0.0))
+    bake(colored, cameras=[colored.camera, other])
+    assert {obj.parent for obj in keys()} == {colored.camera, other}
+    assert len({key_image(obj) for obj in keys()}) == 2
+
+
+# --- scale bars ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("system", "scale", "largest", "length", "label"),
+    [
+        ("NONE", 1.0, 3.7, 2.0, "2"),
+        ("METRIC", 1.0, 0.7, 0.5, "50 cm"),
+        ("METRIC", 0.001, 37.0, 20.0, "2 cm"),
+        ("IMPERIAL", 1.0, 1.0, 2 * 0.3048, "2'"),
+        ("IMPERIAL", 1.0, 0.14, 5 * 0.0254, '5"'),
+    ],
+)
+def test_scale_bars_have_round_lengths(scene, system, scale, largest, length, label):
+    scene.unit_settings.system, scene.unit_settings.scale_length = system, scale
+    found = round_length(largest, scene.unit_settings)
+    assert found == (pytest.approx(length), label)
+
+
+def test_only_orthographic_cameras_have_a_scale_bar(colored):
+    colored.rosy.key = True
+    colored.rosy.key_bar = colored.rosy.key_legend = False
+    bake(colored)
+    assert not keys()
+    colored.camera.data.type, colored.camera.data.ortho_scale = "ORTHO", 8.0
+    bake(colored)
+    (obj,) = keys()
+    opaque = pixels(key_image(obj))[..., 3] > 0.99
+    # 1 m is 320 / 8 pixels.
+    assert np.count_nonzero(opaque, axis=1).max() == pytest.approx(40, abs=1)
+
+
+# --- renders -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_renders_show_the_image_in_the_frame(colored, tmp_path, kind):
+    data = colored.camera.data
+    data.type, data.ortho_scale, data.shift_x = kind, 6.0, 0.1
+    colored.camera.scale = (2.0, 0.5, 3.0)
+    aim(colored.camera, (3.0, -9.0, 5.0))
+    colored.rosy.key_caption = "A head with its field"
+    colored.rosy.key_size = 16.0
+    colored.rosy.key = True
+    bake(colored)
+    (obj,) = keys()
+    expected = pixels(key_image(obj))
+    rendered = render(colored, tmp_path / "render.exr")
+    opaque = expected[..., 3] > 0.99
+    for axis in (0, 1):
+        opaque &= np.roll(opaque, 1, axis) & np.roll(opaque, -1, axis)
+    assert opaque.sum() > 500
+    difference = np.abs(rendered[opaque][:, :3] - to_linear(expected[opaque][:, :3]))
+    # Samples at the very edge of a pixel may meet the next one.
+    assert np.quantile(difference, 0.995) < 2e-3 and difference.max() < 0.05
+    np.testing.assert_allclose(rendered[opaque][:, 3], 1, atol=1e-3)

@@ -35,7 +35,7 @@ CAP_HEIGHT, DESCENT, LINE = 0.7, 0.23, 1.3
 PADDING, PLATE_GAP = 0.6, 0.6
 
 #: Width of the color bar, length of its ticks, distance of labels from them, and of the title from the bar.
-BAR_WIDTH, TICK_LENGTH, LABEL_GAP, TITLE_GAP = 0.9, 0.35, 0.35, 0.9
+BAR_WIDTH, TICK_LENGTH, LABEL_GAP, TITLE_GAP = 0.9, 0.35, 0.35, 1.0
 
 #: Largest and smallest length of the color bar, and the largest as a fraction of the height of the frame.
 MAX_BAR, MIN_BAR, MAX_BAR_FRACTION = 20.0, 5.0, 0.5
@@ -44,7 +44,7 @@ MAX_BAR, MIN_BAR, MAX_BAR_FRACTION = 20.0, 5.0, 0.5
 TICK_DISTANCE, TITLE_WIDTH = 2.0, 9.0
 
 #: Distance of the rows of the legend, and of the labels from the dots.
-ROW_GAP, DOT_GAP = 0.4, 0.5
+ROW_GAP, DOT_GAP = 0.6, 0.5
 
 #: Height of the ends of the scale bar, and its distance from the text.
 SCALE_END, SCALE_GAP = 0.5, 0.3

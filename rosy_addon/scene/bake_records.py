@@ -24,13 +24,12 @@ from .keys import update_keys
 from .look_properties import read_look
 from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import (
-    applied_materials,
     has_applied_picture,
     image_of_material,
-    material_of_group,
     projections_of_group,
     remove_applied_picture,
     remove_picture_modifiers,
+    shown_materials,
 )
 from .picture_state import PictureState, SceneState
 from .read_view import scene_depsgraph
@@ -309,9 +308,7 @@ def list_bakes(
         default it is the one that has drawn the picture.
     """
     recorded = [record for record in scene.rosy.bakes if record.image is not None]
-    shown_materials = {
-        material for obj in baked_objects(scene) for material in _shown_materials(obj)
-    }
+    shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
     if for_panel and not recorded:
         SCENE_STATES.clear()
     reasons = _PresentReasons(scene, for_panel, automatic_device) if recorded else None
@@ -323,12 +320,12 @@ def list_bakes(
             record.height,
             record.image,
             "",
-            record.material in shown_materials,
+            record.material in shown,
             record.frames,
             is_texture=record.view == TEXTURE_VIEW,
         )
         infos.append(replace(info, **reasons.find(record)))
-    for material in shown_materials - {record.material for record in scene.rosy.bakes}:
+    for material in shown - {record.material for record in scene.rosy.bakes}:
         image = image_of_material(material)
         if image is not None:
             name = material.name.removeprefix(NAME_PREFIX)
@@ -409,13 +406,6 @@ class _PresentReasons:
             return _view_from_json(record.view)
         camera = record.camera
         return camera if camera is not None and camera.users_collection else None
-
-
-def _shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
-    """Return the materials of the pictures that an object shows."""
-    modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
-    materials = {material_of_group(modifier.node_group) for modifier in modifiers}
-    return (materials | set(applied_materials(obj.data))) - {None}
 
 
 def has_pictures(scene: bpy.types.Scene) -> bool:
@@ -537,7 +527,7 @@ def _needed_materials(objects: set[bpy.types.Object]) -> set[bpy.types.Material]
     """Return the materials of all pictures that some objects show or can show."""
     needed: set[bpy.types.Material] = set()
     for obj in objects:
-        needed |= _shown_materials(obj)
+        needed |= shown_materials(obj)
         for modifier in obj.modifiers:
             if is_rosy_modifier(modifier):
                 needed |= projections_of_group(modifier.node_group).keys()

@@ -9,6 +9,7 @@ from mathutils import Matrix
 from ..projection.camera import Camera
 from .cameras import FRAME_CAMERAS
 from .owned_data import delete_owned
+from .picture_nodes import shown_materials
 
 #: Visibility to rays; only camera rays meet a plane.
 HIDDEN_FROM = (
@@ -21,14 +22,17 @@ HIDDEN_FROM = (
 
 
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
-    """Return the cameras that have pictures, with the record of the latest.
+    """Return the cameras that have pictures, with a record of each: of a picture that is shown, if any.
 
     For animations, it is the active camera of the scene.
     """
-    cameras = {}
+    shown = set[bpy.types.Material]().union(*(shown_materials(obj) for obj in scene.objects))
+    cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
     for record in scene.rosy.bakes:
         camera = scene.camera if record.view == FRAME_CAMERAS else record.camera
-        if camera is not None and camera.type == "CAMERA":
+        if camera is None or camera.type != "CAMERA":
+            continue
+        if camera not in cameras or record.material in shown:
             cameras[camera] = record
     return cameras
 

@@ -28,11 +28,8 @@ from .cameras import camera_of_object
 from .font_shapes import FontShapes
 from .look_properties import read_look
 from .node_builder import new_empty_material
-from .owned_data import delete_owned, rollback_on_error
+from .owned_data import KEY_TAG, delete_owned, rollback_on_error
 from .read_view import scene_depsgraph
-
-#: Custom property on the objects of keys.
-KEY_TAG = "rosy_key"
 
 #: Distance of a key from the camera, in the starts of the clip range.
 DISTANCE = 1.02
@@ -202,6 +199,7 @@ def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
 def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.types.Material:
     """Create a material that emits an image, and is transparent where that is, and from behind."""
     material, build = new_empty_material(name)
+    material[KEY_TAG] = True
     material.diffuse_color = (1.0, 1.0, 1.0, 0.0)
     material.use_backface_culling = True
     material.surface_render_method = "BLENDED"

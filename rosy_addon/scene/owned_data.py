@@ -13,6 +13,9 @@ OWNED_TAG = "rosy_made"
 #: Custom property on node groups for strokes. Their modifiers go with the strokes.
 STROKES_TAG = "rosy_surface_strokes"
 
+#: Custom property on the objects and materials of keys. They show an image that is not a picture of a field.
+KEY_TAG = "rosy_key"
+
 
 def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
     """Whether RoSy added a modifier that shows a picture."""

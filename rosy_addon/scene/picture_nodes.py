@@ -14,7 +14,7 @@ from .blender_images import NEUTRAL_GRAY
 from .compat import is_editable
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material
-from .owned_data import OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
+from .owned_data import KEY_TAG, OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
 from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.
@@ -280,10 +280,20 @@ def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
     return [material for material in getattr(data, "materials", ()) if _is_picture(material)]
 
 
+def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
+    """Return the materials of the pictures that an object shows."""
+    modifiers = [modifier for modifier in obj.modifiers if is_rosy_modifier(modifier)]
+    materials = {material_of_group(modifier.node_group) for modifier in modifiers}
+    return (materials | set(applied_materials(obj.data))) - {None}
+
+
 def _is_picture(material: bpy.types.Material | None) -> bool:
-    """Whether RoSy created a material for a picture, and not for strokes."""
+    """Whether RoSy created a material for a picture, and not for strokes or a key."""
     return (
-        material is not None and bool(material.get(OWNED_TAG)) and _image_node(material) is not None
+        material is not None
+        and bool(material.get(OWNED_TAG))
+        and not material.get(KEY_TAG)
+        and _image_node(material) is not None
     )
 
 

@@ -35,6 +35,7 @@ from .blender_images import ImageData, load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
 from .hatching_nodes import hatching_group
+from .keys import update_keys
 from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
 from .picture_nodes import (
     new_group,
@@ -385,6 +386,7 @@ def show_bake(scene: bpy.types.Scene, camera: str) -> None:
             node_group = new_group(f"RoSy {obj.name}", record.material, matrix)
             node_group[OWNED_TAG] = True
             set_picture_modifier(obj, node_group, materials)
+    update_keys(scene)
 
 
 def _object_to_clip_matrices(

@@ -11,12 +11,12 @@ from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.color import to_linear
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.projection.project import project
-from rosy.rosy_addon.scene.bake_records import remove_bakes
+from rosy.rosy_addon.scene.bake_records import baked_objects, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.font_shapes import FontShapes
 from rosy.rosy_addon.scene.keys import round_length, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
-from rosy.rosy_addon.scene.pictures import OutputSettings
+from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
 from rosy.rosy_addon.scene.scene_reader import read_instances
 from scenes import add_camera, aim, contents, pixels, render
 
@@ -88,6 +88,16 @@ def test_the_switch_shows_and_hides_the_key(colored):
     assert contents() == before
 
 
+def test_a_key_is_not_listed_among_the_pictures(colored):
+    colored.rosy.key = True
+    bake(colored)
+    assert [info.camera for info in list_bakes(colored)] == ["Camera"]
+    assert baked_objects(colored) == [bpy.data.objects["Suzanne"]]
+    counts = remove_bakes(colored)
+    assert (counts.objects, counts.images, counts.materials) == (1, 1, 1)
+    assert not keys()
+
+
 def test_a_key_that_shows_nothing_is_not_made(colored):
     colored.rosy.key = True
     for name in ("key_bar", "key_legend"):
@@ -151,6 +161,20 @@ def test_animations_have_numbers_only_with_a_range(colored, tmp_path):
         assert key.indices and all(entry.count is None for entry in key.indices)
         (obj,) = keys()
         assert obj.parent == colored.camera
+
+
+def test_the_key_is_that_of_the_picture_that_is_shown(colored, tmp_path):
+    colored.rosy.key = True
+    bake(colored)
+    bake_animation(colored, range(1, 2), settings=OutputSettings(folder=tmp_path))
+    animated = pixels(key_image(keys()[0]))
+    show_bake(colored, "Camera")
+    still = pixels(key_image(keys()[0]))
+    assert (still != animated).any()
+    bake(colored)
+    np.testing.assert_array_equal(pixels(key_image(keys()[0])), still)
+    show_bake(colored, colored.name)
+    np.testing.assert_array_equal(pixels(key_image(keys()[0])), animated)
 
 
 def test_every_camera_has_its_own(colored):

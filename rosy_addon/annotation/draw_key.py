@@ -13,6 +13,10 @@ from .key_layout import Box, KeyLayout
 from .painting import draw_over, window
 from .text_coverage import triangle_coverage
 
+#: Exponent of the transparency of dark text at the edges of letters. Light is mixed, and thin dark letters
+#: would look too light.
+DARK_TEXT_EXPONENT = 2.0
+
 #: Radius of the corners of plates, in text sizes.
 CORNER_RADIUS = 0.35
 
@@ -67,9 +71,10 @@ def draw_key(
         _draw_rectangle(rgba, box, text)
     for dot in layout.dots:
         draw_dot(rgba, np.array((dot.x, dot.y)), dot.radius, dot.outline, dot.index)
+    is_dark = text.sum() < plate.sum()
     for line in layout.texts:
         triangles = text_triangles(line.text) * layout.text_size + (line.left, line.baseline)
-        _draw_triangles(rgba, triangles, text)
+        _draw_triangles(rgba, triangles, text, DARK_TEXT_EXPONENT if is_dark else 1.0)
 
 
 def _draw_plate(
@@ -110,8 +115,10 @@ def _draw_rectangle(rgba: np.ndarray, box: Box, color: np.ndarray) -> None:
     draw_over(part, color, np.clip(across, 0, 1) * np.clip(along, 0, 1))
 
 
-def _draw_triangles(rgba: np.ndarray, triangles: np.ndarray, color: np.ndarray) -> None:
-    """Draw triangles that do not overlap."""
+def _draw_triangles(
+    rgba: np.ndarray, triangles: np.ndarray, color: np.ndarray, exponent: float
+) -> None:
+    """Draw triangles that do not overlap, with an exponent of the transparency."""
     if not len(triangles):
         return
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
@@ -120,4 +127,5 @@ def _draw_triangles(rgba: np.ndarray, triangles: np.ndarray, color: np.ndarray) 
         return
     part = found[0]
     corner = np.floor(np.maximum(low, 0))
-    draw_over(part, color, triangle_coverage(triangles - corner, part.shape[1], part.shape[0]))
+    coverage = triangle_coverage(triangles - corner, part.shape[1], part.shape[0])
+    draw_over(part, color, 1 - (1 - coverage) ** exponent)

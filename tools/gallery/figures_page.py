@@ -1,10 +1,13 @@
-"""The pictures of docs/figures.md: a head with its singularities, and fields side by side."""
+"""The pictures of docs/figures.md: singularities, fields side by side, and a render with a key."""
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from rosy_addon import api
 from rosy_addon.compositor.look import Look
@@ -19,6 +22,9 @@ from .solid import render_view
 IMAGES = ROOT / "docs" / "images"
 
 DEGREE, SIDE, ANGLES = 4, 396, (-26, 8)
+
+#: Width and height of the render with a key.
+RENDER_SIZE = 824, 520
 
 LOOK = Look(supersampling=2, singularity_labels=True)
 
@@ -38,6 +44,7 @@ def write() -> None:
     ):
         panels.append(Panel(display(render_view(head, field, look, ANGLES, SIDE)), text))
     save(sheet([panels]), IMAGES / "figures-singularities.png")
+    save(_render_with_key(), IMAGES / "figures-key.png")
     _write_figures()
 
 
@@ -73,5 +80,49 @@ def _write_figures() -> None:
     api.save_figures(IMAGES / "figures-sheet.pdf", pages)
 
 
-if __name__ == "__main__":
-    write()
+def _render_with_key() -> Image.Image:
+    """Render a head in Blender: its curvature as color, its singularities, and what both mean."""
+    import bpy
+    from mathutils import Matrix
+
+    from rosy_addon.bake import bake
+    from rosy_addon.projection.camera import orbit_basis
+    from rosy_addon.scene.look_properties import apply_look
+    from rosy_addon.scene.meshes import mesh_surface
+    from rosy_addon.scene.write_field import write_mesh_field
+    from rosy_addon.ui.properties import ensure_registered
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    ensure_registered()
+    scene = bpy.context.scene
+    bpy.ops.mesh.primitive_monkey_add()
+    head = bpy.context.object
+    modifier = head.modifiers.new("Subdivision", "SUBSURF")
+    modifier.levels = 2
+    bpy.ops.object.modifier_apply(modifier=modifier.name)
+    head.data.shade_smooth()
+    field = generate(mesh_surface(head.data), "curvature", DEGREE)
+    write_mesh_field(head.data, field)
+    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 4.3
+    axes = orbit_basis(*ANGLES)
+    rows = [[*axis, place] for axis, place in zip(axes.T.tolist(), 6 * axes[2], strict=True)]
+    scene.camera.matrix_world = Matrix([*rows, [0, 0, 0, 1]])
+    scene.render.resolution_x, scene.render.resolution_y = RENDER_SIZE
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (1.0, 1.0, 1.0)
+    scene.view_settings.view_transform = "Standard"
+    look = replace(LOOK, magnitude="colour", singularity_dots="visible", singularity_labels=False)
+    apply_look(scene.rosy, look)
+    settings = scene.rosy
+    settings.key_counts = True
+    settings.key_caption = "The principal curvatures of a head, and their singularities."
+    settings.key = True
+    bake(scene)
+    scene.render.engine, scene.cycles.samples = "CYCLES", 64
+    scene.cycles.use_denoising = False
+    with tempfile.TemporaryDirectory() as folder:
+        scene.render.filepath = str(Path(folder) / "picture.png")
+        bpy.ops.render.render(write_still=True)
+        return Image.open(scene.render.filepath).convert("RGB")

@@ -1513,7 +1513,9 @@ def test_the_range_of_the_colors(card, supersampling, top):
         run_to_completion(renderer.render_task(ViewInput(tuple(instances), view(), look)))
         for renderer in (card, CpuRenderer())
     )
-    assert drawn.color_range == pytest.approx(expected.color_range, rel=1e-4)
+    # Numpy finds the field of several samples at the centers of pixels.
+    tolerance = 1e-4 if supersampling == 1 else 5e-3
+    assert drawn.color_range == pytest.approx(expected.color_range, rel=tolerance)
     assert (drawn.color_range == (0.0, 0.7)) == bool(top)
     fixed = replace(look, magnitude_range=drawn.color_range[1])
     again = run_to_completion(card.render_task(ViewInput(tuple(instances), view(), fixed)))

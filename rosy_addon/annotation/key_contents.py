@@ -20,16 +20,14 @@ class ColorScale:
         Name of the quantity.
     color_map : str
         As in `color.map_colors`.
-    low : float
-        Value with the first color.
-    high : float or None
-        Value with the last color. None if there is not one such value: it differs between frames, or
-        between fields.
+    low, high : float or None
+        Values with the first and with the last color. None if there is not one such value: it differs
+        between frames, or between fields.
     """
 
     title: str
     color_map: str
-    low: float
+    low: float | None
     high: float | None
 
 

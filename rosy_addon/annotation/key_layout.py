@@ -371,8 +371,10 @@ class _Arrangement:
 def _ticks(scale: ColorScale, max_steps: int, gap: float) -> list[tuple[float, str]]:
     """Return the ticks of a color bar: their places from 0 to 1, and their labels."""
     if scale.high is None:
-        return [(0.0, tick_labels(scale.low, scale.low, 1, 0.0)[0][1]), (1.0, "max")]
-    labels = tick_labels(scale.low, scale.high, max(max_steps, 1), gap)
+        low = "min" if scale.low is None else tick_labels(scale.low, scale.low, 1, 0.0)[0][1]
+        return [(0.0, low), (1.0, "max")]
+    # The map may be inverted.
+    labels = tick_labels(*sorted((scale.low, scale.high)), max(max_steps, 1), gap)
     extent = scale.high - scale.low or 1.0
     return [((value - scale.low) / extent, label) for value, label in labels]
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..annotation.round_numbers import round_below
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks_task
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
@@ -357,9 +358,7 @@ def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
 
     Its length is 1, 2 or 5 times a power of ten in units of the coordinates.
     """
-    longest = share * camera.width / camera.pixels_per_unit
-    power = 10.0 ** np.floor(np.log10(longest))
-    length = power * max(factor for factor in (1, 2, 5) if factor * power <= longest * (1 + 1e-9))
+    length = round_below(share * camera.width / camera.pixels_per_unit)
     return length * camera.pixels_per_unit, f"{length:g} {unit}".strip()
 
 

@@ -13,7 +13,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.gbuffer import GBuffer, PixelCoverage
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .band import Band
-from .color_values import map_positions_task
+from .color_values import map_positions_task, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
 from .even_lines import EvenLines, even_line_images_task, has_even_lines
@@ -178,6 +178,8 @@ def compose_task(
     resolve = _resolve_pixels_task(gbuffer.pixel, color, alpha, *frame)
     rgba = yield from subtask(resolve, 1.0, 1.0)
     color_range = common_color_range(color_tops)
+    if map_position is not None:
+        color_range = value_ends(look, value_ranges(gbuffer.instances))
     if not draws_thresholds:
         return Picture(rgba, tuple(layers), color_range=color_range)
     resolve = _resolve_pixels_task(gbuffer.pixel, spread, alpha, *frame)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..annotation.key_contents import ColorScale, PictureKey, count_indices
 from ..annotation.singularity_settings import shows_singularities
+from ..projection.gbuffer import MeshInstance
+from .color_values import value_ends, value_ranges
 from .lic_images import fixed_magnitude_range
-from .look import Look, colors_magnitude
+from .look import Look, colors_magnitude, colors_values
 from .picture import Picture
 
 
@@ -18,18 +22,33 @@ def color_scale_of(look: Look, color_range: tuple[float, float] | None) -> Color
     color_range : (float, float) or None
         Values of the first and the last color: `Picture.color_range`. None if they are not known.
     """
-    if not colors_magnitude(look):
-        return None
-    return ColorScale(
-        "Magnitude", look.colour_map, 0.0, None if color_range is None else color_range[1]
-    )
+    low, high = (None, None) if color_range is None else color_range
+    if colors_magnitude(look):
+        return ColorScale("Magnitude", look.colour_map, 0.0, high)
+    return ColorScale("", look.colour_map, low, high) if colors_values(look) else None
 
 
-def fixed_color_range(look: Look) -> tuple[float, float] | None:
-    """Return the values of the first and the last color of a look that sets them; otherwise None."""
-    if not colors_magnitude(look) or not look.magnitude_range:
+def fixed_color_range(
+    look: Look, instances: Sequence[MeshInstance] = ()
+) -> tuple[float, float] | None:
+    """Return the values of the first and the last color, if they do not depend on what is visible.
+
+    Parameters
+    ----------
+    look : Look
+    instances : sequence of MeshInstance
+        Their numbers are the range of a look that colors numbers and sets none. Without, such a range is
+        not known.
+    """
+    if colors_magnitude(look):
+        top = look.magnitude_range
+        return (0.0, fixed_magnitude_range(top)) if top else None
+    if not colors_values(look):
         return None
-    return 0.0, fixed_magnitude_range(look.magnitude_range)
+    is_automatic = look.values_low == look.values_high == 0
+    if is_automatic and not instances:
+        return None
+    return value_ends(look, value_ranges(instances))
 
 
 def picture_key(look: Look, picture: Picture) -> PictureKey:

@@ -197,7 +197,7 @@ class GpuRenderer:
         """Return `Picture.color_range` of the last picture."""
         look, camera = view.look, view.sample_camera
         if not colors_magnitude(look) or look.magnitude_range:
-            return fixed_color_range(look)
+            return fixed_color_range(look, view.instances)
         field_values = self.resources.image("field_values", camera.width, camera.height)
         degrees = {
             instance.field.degree for instance in view.instances if instance.field is not None

@@ -66,7 +66,7 @@ class CpuRenderer:
         if len(rows) > 1:
             rgba = yield from self._workers.draw_task(view, rows, self._cache)
             if rgba is not None:
-                return Picture(rgba, (), color_range=fixed_color_range(view.look))
+                return Picture(rgba, (), color_range=fixed_color_range(view.look, view.instances))
         gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
         compose = compose_task(
             gbuffer,

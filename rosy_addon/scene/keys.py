@@ -103,8 +103,9 @@ def _draw(
     width, height = (max(round(side * shrink), 1) for side in (view.width, view.height))
     key = PictureKey.from_json(record.key)
     scale = key.color_scale if settings.key_bar else None
-    if scale is not None and settings.key_title.strip():
-        scale = replace(scale, title=_lines(settings.key_title))
+    if scale is not None:
+        title = _lines(settings.key_title) if settings.key_title.strip() else scale.title
+        scale = replace(scale, title=title or settings.color_attribute)
     parts = KeyParts(
         scale,
         key.indices if settings.key_legend else (),

@@ -11,11 +11,11 @@ from PIL import Image
 
 from rosy_addon import api
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.generate import generate
+from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.presets.store import load_preset
 
 from .page import ROOT
-from .shapes import suzanne
+from .shapes import sphere, suzanne
 from .sheet import Panel, display, save, sheet
 from .solid import render_view
 
@@ -45,6 +45,7 @@ def write() -> None:
         panels.append(Panel(display(render_view(head, field, look, ANGLES, SIDE)), text))
     save(sheet([panels]), IMAGES / "figures-singularities.png")
     save(_render_with_key(), IMAGES / "figures-key.png")
+    save(sheet([_oriented_panels()]), IMAGES / "figures-oriented.png")
     _write_figures()
 
 
@@ -78,6 +79,20 @@ def _write_figures() -> None:
         api.figure(fields, parts=all_parts[1:], caption=differences, **shared),
     ]
     api.save_figures(IMAGES / "figures-sheet.pdf", pages)
+
+
+def _oriented_panels() -> list[Panel]:
+    """Draw a vector field and a field of three directions with oriented streaks."""
+    ball = sphere()
+    look = Look(
+        supersampling=2, oriented=True, density=0.04, grain=3.0, length=45, high_pass=0.0, gain=1.6
+    )
+    flow = generate(ball, GeneratorSettings("axis", axis=(0.3, 0.2, 1.0)), 1)
+    three = generate(ball, "smoothest", 3)
+    return [
+        Panel(display(render_view(ball, field, look, ANGLES, SIDE)), text)
+        for field, text in ((flow, "One direction"), (three, "Three directions"))
+    ]
 
 
 def _render_with_key() -> Image.Image:

@@ -23,7 +23,7 @@ from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN
 from rosy_addon.annotation.text_coverage import triangle_coverage
 from rosy_addon.color import from_hex, luminance, map_colors, to_display
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.picture_key import picture_key
+from rosy_addon.compositor.picture_key import fixed_color_range, picture_key
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.progress import run_to_completion
@@ -347,3 +347,34 @@ def test_the_legend_has_the_visible_singularities():
 def test_a_picture_without_dots_has_no_legend():
     picture = run_to_completion(CpuRenderer().render_task(view(Look())))
     assert picture_key(Look(), picture) == PictureKey()
+
+
+@pytest.mark.parametrize("ends", [(0.0, 0.0), (2.0, 5.0), (5.0, 2.0)])
+def test_the_range_of_numbers_as_colors(ends):
+    """That of the look, or else of all numbers, visible or not; also of pictures in bands."""
+    instance = view(Look()).instances[0]
+    heights = instance.surface.vertices[instance.surface.corner_vertex, 2].astype(np.float32)
+    colored = replace(instance, color_values=heights)
+    look = Look(hue="values", values_low=ends[0], values_high=ends[1])
+    view_input = view(look, (colored,))
+    picture = run_to_completion(CpuRenderer().render_task(view_input))
+    expected = ends if any(ends) else (float(heights.min()), float(heights.max()))
+    assert picture.color_range == expected == fixed_color_range(look, (colored,))
+    assert fixed_color_range(look) == (ends if any(ends) else None)
+    scale = picture_key(look, picture).color_scale
+    assert scale == ColorScale("", look.colour_map, *expected)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (2.0, 5.0, ("2", "5")),
+        (5.0, 2.0, ("5", "2")),
+        (None, None, ("min", "max")),
+        (0.0, None, ("0", "max")),
+    ],
+)
+def test_the_ends_of_the_color_bar(low, high, expected):
+    layout = lay_out_key(KeyParts(ColorScale("", "magma", low, high)), (640, 480), text_width)
+    labels = [line.text for line in sorted(layout.texts, key=lambda line: line.baseline)]
+    assert (labels[0], labels[-1]) == expected

@@ -41,7 +41,7 @@ class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
     )
     use_as_color: bpy.props.BoolProperty(
         name="Color Lines",
-        description="Color the lines by the angle, from 0 to 180/N degrees",
+        description="Color the lines by the angle: light where the fields are the same, dark at 180/N degrees",
         default=True,
     )
 
@@ -60,8 +60,9 @@ class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
         if self.use_as_color:
             settings = context.scene.rosy
             settings.color_attribute = DIFFERENCE_ATTRIBUTE
-            settings.look.hue = "values"
-            settings.look.values_low, settings.look.values_high = 0.0, 180.0 / result.degree
+            # Light where the fields are the same, and lines can be seen.
+            settings.look.hue, settings.look.colour_map = "values", "magma"
+            settings.look.values_low, settings.look.values_high = 180.0 / result.degree, 0.0
         statistics = result.statistics
         mean, p95, largest = np.degrees([statistics.mean, statistics.p95, statistics.max])
         self.report(

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..color import from_hex, map_colors, to_linear
+from ..color import from_hex, to_linear
 from .draw_marks import draw_dot
+from .key_contents import ColorScale
 from .key_layout import Box, KeyLayout
 from .painting import draw_over, window
 from .text_coverage import triangle_coverage
@@ -45,7 +46,7 @@ DARK_PLATES = KeyColors("#f5f5f5", "#141414", 0.88)
 def draw_key(
     rgba: np.ndarray,
     layout: KeyLayout,
-    color_map: str,
+    color_scale: ColorScale | None,
     text_triangles: Callable[[str], np.ndarray],
     colors: KeyColors = LIGHT_PLATES,
 ) -> None:
@@ -56,8 +57,8 @@ def draw_key(
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied, rows from the bottom.
     layout : KeyLayout
-    color_map : str
-        Of the color bar; see `color.map_colors`.
+    color_scale : ColorScale or None
+        What the color bar shows, if there is one.
     text_triangles : callable
         Returns the (n, 3, 2) triangles of a line of text, in text sizes from its left end and baseline.
     colors : KeyColors
@@ -66,7 +67,7 @@ def draw_key(
     for box in layout.plates:
         _draw_plate(rgba, box, CORNER_RADIUS * layout.text_size, plate, colors.plate_opacity)
     if layout.color_bar is not None:
-        _draw_color_bar(rgba, layout.color_bar, color_map)
+        _draw_color_bar(rgba, layout.color_bar, color_scale)
     for box in layout.strokes:
         _draw_rectangle(rgba, box, text)
     for dot in layout.dots:
@@ -94,12 +95,11 @@ def _draw_plate(
     draw_over(part, color, opacity * np.clip(radius + 0.5 - np.hypot(*beyond), 0, 1))
 
 
-def _draw_color_bar(rgba: np.ndarray, box: Box, color_map: str) -> None:
+def _draw_color_bar(rgba: np.ndarray, box: Box, color_scale: ColorScale) -> None:
     """Draw a color map from the bottom to the top of a box of whole pixels."""
     left, bottom, right, top = (round(value) for value in box)
-    values = (np.arange(top - bottom) + 0.5) / (top - bottom)
     bar = rgba[bottom:top, left:right]
-    bar[..., :3] = to_linear(map_colors(values, color_map))[:, None]
+    bar[..., :3] = to_linear(color_scale.colors(top - bottom))[:, None]
     bar[..., 3] = 1.0
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from ..color import map_colors
 from .singularity_marks import SingularityMarks
 
 
@@ -21,14 +22,20 @@ class ColorScale:
     color_map : str
         As in `color.map_colors`.
     low, high : float or None
-        Values with the first and with the last color. None if there is not one such value: it differs
-        between frames, or between fields.
+        Values with the first and with the last color; the larger one is at the top of the color bar. None
+        if there is not one such value: it differs between frames, or between fields.
     """
 
     title: str
     color_map: str
     low: float | None
     high: float | None
+
+    def colors(self, count: int) -> np.ndarray:
+        """Return (count, 3) float32 display values of the color bar, from the bottom."""
+        positions = (np.arange(count) + 0.5) / count
+        is_inverted = self.low is not None and self.high is not None and self.low > self.high
+        return map_colors(positions[::-1] if is_inverted else positions, self.color_map)
 
 
 @dataclass(frozen=True)

@@ -373,10 +373,10 @@ def _ticks(scale: ColorScale, max_steps: int, gap: float) -> list[tuple[float, s
     if scale.high is None:
         low = "min" if scale.low is None else tick_labels(scale.low, scale.low, 1, 0.0)[0][1]
         return [(0.0, low), (1.0, "max")]
-    # The map may be inverted.
-    labels = tick_labels(*sorted((scale.low, scale.high)), max(max_steps, 1), gap)
-    extent = scale.high - scale.low or 1.0
-    return [((value - scale.low) / extent, label) for value, label in labels]
+    low, high = sorted((scale.low, scale.high))
+    labels = tick_labels(low, high, max(max_steps, 1), gap)
+    extent = high - low or 1.0
+    return [((value - low) / extent, label) for value, label in labels]
 
 
 def _frame_strokes(box: Box, width: float) -> list[Box]:

@@ -118,8 +118,7 @@ def _draw(
     if not layout.plates:
         return None
     rgba = np.zeros((height, width, 4), dtype=np.float32)
-    color_map = "" if scale is None else scale.color_map
-    draw_key(rgba, layout, color_map, fonts.triangles, _key_colors(scene))
+    draw_key(rgba, layout, scale, fonts.triangles, _key_colors(scene))
     return Picture(rgba, ())
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..compositor.look import colors_magnitude
+from ..compositor.look import colors_magnitude, colors_values
+from ..compositor.picture_key import fixed_color_range
 from .sidebar import SidebarPanel, draw_wrapped, use_property_columns
 
 #: The parts of a key, and the settings of each.
@@ -46,7 +47,8 @@ def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:
     """Whether a scene has an animation whose frames may have ranges of their own."""
     look = settings.look
     is_animated = any(record.frames for record in settings.bakes)
-    return is_animated and colors_magnitude(look) and not look.magnitude_range
+    has_colors = colors_magnitude(look) or colors_values(look)
+    return is_animated and has_colors and fixed_color_range(look) is None
 
 
 CLASSES = (VIEW3D_PT_rosy_look_key,)

@@ -227,7 +227,8 @@ def test_text_is_wrapped_at_spaces():
 def drawn(request):
     layout = lay_out_key(PARTS, (640, 480), text_width)
     rgba = np.zeros((480, 640, 4), dtype=np.float32)
-    draw_key(rgba, layout, "magma", text_triangles, request.param)
+    scale = ColorScale("", "magma", 0.0, 1.0)
+    draw_key(rgba, layout, scale, text_triangles, request.param)
     return rgba, layout
 
 
@@ -369,7 +370,7 @@ def test_the_range_of_numbers_as_colors(ends):
     ("low", "high", "expected"),
     [
         (2.0, 5.0, ("2", "5")),
-        (5.0, 2.0, ("5", "2")),
+        (5.0, 2.0, ("2", "5")),
         (None, None, ("min", "max")),
         (0.0, None, ("0", "max")),
     ],
@@ -378,3 +379,9 @@ def test_the_ends_of_the_color_bar(low, high, expected):
     layout = lay_out_key(KeyParts(ColorScale("", "magma", low, high)), (640, 480), text_width)
     labels = [line.text for line in sorted(layout.texts, key=lambda line: line.baseline)]
     assert (labels[0], labels[-1]) == expected
+
+
+def test_the_larger_number_is_at_the_top_of_the_color_bar():
+    upright, inverted = (ColorScale("", "magma", *ends).colors(9) for ends in ((0, 1), (1, 0)))
+    np.testing.assert_array_equal(upright, inverted[::-1])
+    np.testing.assert_array_equal(upright, map_colors((np.arange(9) + 0.5) / 9, "magma"))

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..rosy_addon.errors import counted
+from ..rosy_addon.field.analysis import format_degrees
 from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.field_difference import (
     DIFFERENCE_ATTRIBUTE,
@@ -64,10 +65,13 @@ class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
             settings.look.hue, settings.look.colour_map = "values", "magma"
             settings.look.values_low, settings.look.values_high = 180.0 / result.degree, 0.0
         statistics = result.statistics
-        mean, p95, largest = np.degrees([statistics.mean, statistics.p95, statistics.max])
+        mean, p95, largest = (
+            format_degrees(np.degrees(angle))
+            for angle in (statistics.mean, statistics.p95, statistics.max)
+        )
         self.report(
             {"INFO"},
-            f"Off by {mean:.3g} degrees on average, {p95:.3g} on 95 % of the area, at most {largest:.3g} on "
+            f"Off by {mean} degrees on average, {p95} on 95 % of the area, at most {largest} on "
             f"face {statistics.worst_face}; {result.matched_count} of "
             f"{counted(result.singularity_count, 'singularity', 'singularities')} match the "
             f"{result.other_count} of '{result.other}'",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any, NamedTuple
@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import RosyError
+from ..field.analysis import format_degrees
 from ..field.singularity_matching import (
     DEFAULT_REACH,
     SingularityMatching,
@@ -29,26 +30,26 @@ _LATEX = {
 
 
 class _Column(NamedTuple):
-    """A column of the table: its title, the key of its values, and their format."""
+    """A column of the table: its title, the key of its values, and what makes them texts."""
 
     title: str
     key: str
-    format: str
+    to_text: Callable[[Any], str] = str
 
 
 _COLUMNS = (
-    _Column("degree", "degree", "{:d}"),
-    _Column("energy", "energy", "{:.4g}"),
-    _Column("singularities", "singularities", "{:d}"),
-    _Column("positive", "positive", "{:d}"),
-    _Column("negative", "negative", "{:d}"),
+    _Column("degree", "degree"),
+    _Column("energy", "energy", "{:.4g}".format),
+    _Column("singularities", "singularities"),
+    _Column("positive", "positive"),
+    _Column("negative", "negative"),
 )
 _DIFFERENCE_COLUMNS = (
-    _Column("matched", "matched", "{:d}"),
-    _Column("mean (deg)", "mean", "{:.3g}"),
-    _Column("95 % (deg)", "p95", "{:.3g}"),
-    _Column("largest (deg)", "max", "{:.3g}"),
-    _Column("on face", "worst_face", "{:d}"),
+    _Column("matched", "matched"),
+    _Column("mean (deg)", "mean", format_degrees),
+    _Column("95 % (deg)", "p95", format_degrees),
+    _Column("largest (deg)", "max", format_degrees),
+    _Column("on face", "worst_face"),
 )
 
 
@@ -128,8 +129,7 @@ class Comparison:
         cells = [["field", *(column.title for column in columns)]]
         for row in self.rows:
             values = [
-                column.format.format(row[column.key]) if column.key in row else "-"
-                for column in columns
+                column.to_text(row[column.key]) if column.key in row else "-" for column in columns
             ]
             cells.append([row["title"], *values])
         return cells

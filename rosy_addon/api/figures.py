@@ -21,6 +21,7 @@ from ..compositor.color_values import value_ends, value_ranges
 from ..compositor.look import Look, colors_magnitude, colors_values
 from ..compositor.look_units import scaled_look
 from ..errors import RosyError, counted
+from ..field.analysis import format_degrees
 from ..field.singularity_matching import DEFAULT_REACH
 from ..file_io import write_bytes
 from ..image_io.png import to_srgb_uint8
@@ -448,8 +449,11 @@ class _Studio:
         ]
         # The pictures cover the same pixels.
         rgba = np.mean(pictures, axis=0)
-        facts = (np.degrees(value) for value in (difference.mean, difference.p95, difference.max))
-        note = "mean {:.3g}\u00b0, 95 % {:.3g}\u00b0, largest {:.3g}\u00b0".format(*facts)
+        mean, p95, largest = (
+            f"{format_degrees(np.degrees(angle))}\u00b0"
+            for angle in (difference.mean, difference.p95, difference.max)
+        )
+        note = f"mean {mean}, 95 % {p95}, largest {largest}"
         shown = shows_singularities(self.look)
         panel: Panel = load_drawing().Panel(
             f"{title} vs. {next(iter(instances))}",

@@ -174,6 +174,11 @@ def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
     )
 
 
+def format_degrees(degrees: float) -> str:
+    """Return an angle with three significant digits, and none below a thousandth of a degree."""
+    return f"{round(degrees, 3):.3g}"
+
+
 def _triangle_areas(surface: Surface) -> np.ndarray:
     """(T,) float64 areas of the triangles, in square Blender units."""
     corner = surface.vertices[surface.triangle_vertex]

@@ -12,10 +12,12 @@ from ..annotation.singularity_marks import SingularityMarks, singularity_marks_t
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..errors import RosyError
+from ..field.directional_field import field_symmetry
 from ..field.frames import dot
 from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from .arrowheads import arrowheads
 from .attachment import SurfacePoints, surface_points
 from .crossings import crossing_gaps_task
 from .directional_spacing import CornerSpacing, spacing_in_picture
@@ -186,16 +188,19 @@ def draw_instances_task(
         strokes = reduce(Strokes.concatenate, outlines, strokes)
         family_counts += [len(lines.names) for lines in outlines]
         drawn = drawn + drawn
+    # Families of different instances are still separate. Each belongs to one instance.
+    instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
+    heads = _arrowheads(strokes, instances, instance_of_family, style) if style.arrows else None
     if style.overshoot:
         task = _overshoot_task(strokes, instances, camera, style, clip_to_frame)
         strokes = yield from subtask(task, 0.95, 1.0)
     if not len(strokes):
         raise _no_visible_stroke(camera)
+    if heads is not None:
+        strokes = Strokes.join([strokes, heads])
     marks = None
     if shows_singularities(style):
         marks = yield from subtask(singularity_marks_task(instances, camera, style), 1.0, 1.0)
-    # Families of different instances are still separate. Each belongs to one instance.
-    instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
     return StrokeDrawing(
         _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden, marks
     )
@@ -272,6 +277,24 @@ def _trace_instance(
     if not style.overshoot:
         strokes = replace(strokes, free_ends=None)
     return strokes
+
+
+def _arrowheads(
+    strokes: Strokes,
+    instances: Sequence[MeshInstance],
+    instance_of_family: np.ndarray,
+    style: StrokeStyle,
+) -> Strokes:
+    """Return the arrowheads of strokes along fields whose opposite directions are none of theirs."""
+    points_one_way = np.array(
+        [
+            instance.field is not None and not field_symmetry(instance.field).has_opposites
+            for instance in instances
+        ]
+    )
+    follows_field = strokes.member[strokes.start[:-1]].any(axis=1)
+    has_direction = follows_field & points_one_way[instance_of_family[strokes.family]]
+    return arrowheads(strokes, style.arrows, has_direction)
 
 
 def _outlines_task(

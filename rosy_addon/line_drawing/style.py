@@ -115,6 +115,17 @@ class StrokeStyle:
         panel="ends",
         panel_before="gaps",
     )
+    arrows: float = number(
+        0.0,
+        0.0,
+        1e3,
+        "Distance between arrowheads along strokes, as a multiple of the spacing; 0: none. Only strokes of "
+        "fields of odd degree have a direction",
+        unit="spacings",
+        label="Arrowheads",
+        panel="ends",
+        panel_before="gaps",
+    )
     outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
     hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")
     singularity_dots: str = singularity_dots_choice(panel="singularities")

@@ -165,6 +165,7 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "curvature": _number(0, 1, (0.5,)),
     "gaps": _number(0, 4, (0.3,)),
     "taper": _number(0, 50, (3.0,)),
+    "arrows": _number(0, 1000, (5.0, 12.0)),
     "overshoot": _number(0, 256, (5.0,)),
     "singularity_size": _number(1, 256, (9.0, 20.0)),
     "width": _number(0.01, 1000, (1.6,)),

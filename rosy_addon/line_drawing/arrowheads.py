@@ -1,0 +1,77 @@
+"""Arrowheads along strokes, for fields whose lines have a direction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..field.frames import dot, normalize
+from .stroke_set import Strokes
+
+#: Length of the barbs of an arrowhead in spacings, and their angle to the stroke in radians.
+BARB_LENGTH, BARB_ANGLE = 0.55, np.radians(27.0)
+
+#: Least length of a stroke with an arrowhead, in lengths of a barb.
+MIN_LENGTH = 3.0
+
+
+def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> Strokes:
+    """Return arrowheads along strokes, in the order of their points: the direction of the field.
+
+    Each is a stroke of three points, from barb to tip to barb, in the tangent plane of the surface.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    distance : float
+        Distance between the arrowheads of a stroke, in spacings. Every stroke that is long enough has at
+        least one.
+    has_direction : (S,) bool ndarray
+        The strokes that get arrowheads.
+
+    Returns
+    -------
+    Strokes
+        With the families of `strokes`.
+    """
+    arc, length = strokes.arc, strokes.length
+    middle = (strokes.start[:-1] + strokes.start[1:]) // 2
+    spacing = strokes.spacing[middle]
+    is_long = has_direction & (length > MIN_LENGTH * BARB_LENGTH * spacing)
+    count = np.zeros(len(strokes), dtype=np.int64)
+    count[is_long] = np.maximum(np.rint((length / distance)[is_long] / spacing[is_long]), 1)
+    stroke = np.repeat(np.arange(len(strokes)), count)
+    rank = np.arange(len(stroke)) - np.repeat(np.cumsum(count) - count, count)
+    # The stroke ends of all strokes are at different sums of arc lengths.
+    offset = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
+    place = offset[stroke] + (rank + 0.5) / count[stroke] * length[stroke]
+    key = offset[strokes.stroke] + arc
+    after = np.clip(
+        np.searchsorted(key, place), strokes.start[stroke] + 1, strokes.start[stroke + 1] - 1
+    )
+    before = after - 1
+    step = key[after] - key[before]
+    share = np.divide(place - key[before], step, out=np.zeros_like(step), where=step > 0)[:, None]
+    points, normals = strokes.points, strokes.normal
+    center = points[before] + share * (points[after] - points[before])
+    normal = normalize(normals[before] + share * (normals[after] - normals[before]))
+    along = points[after] - points[before]
+    along = normalize(along - dot(along, normal)[:, None] * normal)
+    across = np.cross(normal, along)
+    barb = (BARB_LENGTH * strokes.spacing[after])[:, None]
+    tip = center + 0.5 * np.cos(BARB_ANGLE) * barb * along
+    back = tip - np.cos(BARB_ANGLE) * barb * along
+    side = np.sin(BARB_ANGLE) * barb * across
+    point = np.repeat(after, 3)
+    return replace(
+        strokes.reordered(point),
+        points=np.stack([back + side, tip, back - side], axis=1).reshape(-1, 3),
+        start=np.arange(len(stroke) + 1) * 3,
+        family=strokes.family[stroke],
+        normal=np.repeat(normal, 3, axis=0),
+        weights=np.full((len(point), 3), np.nan),
+        width=np.ones(len(point)),
+        closed=np.zeros(len(stroke), dtype=bool),
+        free_ends=None,
+    )

@@ -1,0 +1,80 @@
+"""Arrowheads point along the members of fields of odd degree, evenly spaced along strokes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import icosphere, plane, torus
+
+from rosy_addon.field.directional_field import field_directions
+from rosy_addon.field.frames import normalize
+from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.line_drawing.arrowheads import arrowheads
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+
+
+def drawn(surface, field, **settings):
+    """The strokes of a surface, and its arrowheads: their (n, 3, 3) points, and their faces."""
+    camera = orbit_camera(surface, -25, 30, 400, 400)
+    style = StrokeStyle(**{"spacing": 14.0, "arrows": 5.0} | settings)
+    instance = MeshInstance(surface, np.eye(4), field)
+    with_arrows = draw_instances([instance], camera, style).strokes
+    without = draw_instances([instance], camera, replace(style, arrows=0.0)).strokes
+    heads = with_arrows.select(np.arange(len(without), len(with_arrows)))
+    assert np.array_equal(with_arrows.points[: len(without.points)], without.points)
+    assert (np.diff(heads.start) == 3).all()
+    return without, heads.points.reshape(-1, 3, 3), heads.face[::3]
+
+
+CASES = {
+    "one direction": (1, {}),
+    "three directions": (3, {}),
+    "seven directions": (7, {}),
+    "tone, gaps and outline": (3, {"tone": True, "gaps": 0.3, "outline": True, "overshoot": 6.0}),
+    "with hidden strokes": (1, {"hidden": True, "cross_creases": True}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("shape", [torus(48, 24), icosphere(3)], ids=["torus", "ball"])
+def test_arrowheads_point_along_a_member(shape, case):
+    degree, settings = CASES[case]
+    field = generate(shape, "smoothest", degree)
+    _, heads, face = drawn(shape, field, **settings)
+    direction = normalize(heads[:, 1] - (heads[:, 0] + heads[:, 2]) / 2)
+    members = normalize(field_directions(shape, field)[face])
+    cosine = np.einsum("nk,nmk->nm", direction, members).max(axis=1)
+    # The opposite of a member is pi / N away from the nearest one.
+    is_right = cosine > np.cos(np.pi / degree / 2)
+    assert len(heads) > 10 and is_right.all()
+
+
+def test_lines_without_a_direction_have_no_arrowheads():
+    ball = icosphere(3)
+    assert len(drawn(ball, generate(ball, "smoothest", 4))[1]) == 0
+
+
+def test_arrowheads_are_evenly_spaced():
+    """On straight strokes, in the middles of equal parts that are about as long as asked for."""
+    square = plane(12, 12)
+    strokes, _, _ = drawn(square, axis_field(square, 1, (1.0, 0.0, 0.0)), taper=0.0)
+    heads = arrowheads(strokes, 4.0, np.ones(len(strokes), dtype=bool))
+    center = heads.points.reshape(-1, 3, 3).mean(axis=1)
+    assert np.abs(heads.points[:, 2]).max() < 1e-9
+    for number in range(len(strokes)):
+        part = slice(strokes.start[number], strokes.start[number + 1])
+        points, spacing = strokes.points[part], strokes.spacing[part]
+        length = np.ptp(points[:, 0])
+        x = np.sort(center[np.abs(center[:, 1] - points[0, 1]) < 1e-6, 0])
+        count = len(x)
+        assert abs(length / count - 4 * spacing.mean()) < 2.2 * spacing.mean() * max(4 / count, 1)
+        # The mean of the three points is a little behind the middle of the arrowhead.
+        expected = points[0, 0] + (np.arange(count) + 0.5) / count * length
+        assert np.abs(x - expected).max() < 0.3 * spacing.max()
+    none = arrowheads(strokes, 4.0, np.zeros(len(strokes), dtype=bool))
+    assert len(none) == 0 and none.names == strokes.names

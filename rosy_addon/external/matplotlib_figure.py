@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..annotation.index_labels import placed_labels
+from ..annotation.round_numbers import MINUS
 from ..annotation.singularity_marks import (
     COLOR_BY_SIGN,
     HIDDEN_OPACITY,
@@ -446,7 +447,7 @@ def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) ->
     plate = {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.4}
     for label in placed_labels(marks):
         size = label.height / CAPITAL_HEIGHT * POINTS / dpi
-        text = _with_minus_sign(label.text)
+        text = label.text.replace("-", MINUS)
         axes.text(label.left, label.bottom, text, fontsize=size, color=INK, bbox=plate)
 
 
@@ -484,16 +485,11 @@ def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, f
         ):
             key = index / degree, index
             entries[key] = (
-                f"index {_with_minus_sign(format_index(index, degree))}",
+                f"index {format_index(index, degree)}".replace("-", MINUS),
                 COLOR_BY_SIGN[int(np.sign(index))],
                 2 * radius,
             )
     return [entries[key] for key in sorted(entries, reverse=True)]
-
-
-def _with_minus_sign(text: str) -> str:
-    """Return a number with a minus sign instead of a hyphen."""
-    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def _draw_scale_bar(axes: Axes, length: float, text: str, dpi: int) -> None:

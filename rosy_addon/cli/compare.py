@@ -93,7 +93,10 @@ def add_compare_command(subparsers: Any, extras: Extras) -> None:
         help="lines that are drawn over differences (%(default)s)",
     )
     parser.add_argument(
-        "--columns", type=int_between(1, 100), metavar="N", help="panels side by side; at most 3"
+        "--columns",
+        type=int_between(1, 100),
+        metavar="N",
+        help="panels side by side; by default at most 3",
     )
     parser.add_argument(
         "--width",

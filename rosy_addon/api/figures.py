@@ -54,6 +54,9 @@ MIN_ASPECT, MAX_ASPECT = 0.4, 1.6
 #: Panels side by side, unless the caller says how many; empty border of a panel, as a fraction.
 MAX_COLUMNS, MARGIN = 3, 0.02
 
+#: Largest part of a panel that the dots of singularities cover.
+MAX_DOT_SHARE = 0.06
+
 #: The files of figures.
 FIGURE_SUFFIXES = (".pdf", ".svg", ".png")
 
@@ -388,10 +391,16 @@ class _Studio:
         return run_to_completion(self.renderer.render_task(view)).rgba
 
     def marks(self, instance: MeshInstance) -> SingularityMarks | None:
-        """Return the singularities of an instance in the picture; None if the look shows none."""
+        """Return the singularities of an instance in the picture; None if the look shows none.
+
+        The dots of very many are smaller, so that they do not hide the lines.
+        """
         if not shows_singularities(self.look):
             return None
-        return run_to_completion(singularity_marks_task([instance], self.camera, self.look))
+        marks = run_to_completion(singularity_marks_task([instance], self.camera, self.look))
+        area = float((np.pi * marks.radius**2).sum())
+        limit = MAX_DOT_SHARE * self.camera.width * self.camera.height
+        return marks if area <= limit else replace(marks, size=marks.size * np.sqrt(limit / area))
 
     def difference_row(
         self,

@@ -7,6 +7,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -217,9 +218,23 @@ def draw_page(page: Page, width: float, columns: int, dpi: int) -> Figure:
     dpi : int
         Pixels of pictures in an inch.
     """
+    return _Layout(page, width, columns, dpi, _figure_class()(dpi=dpi)).draw()
+
+
+@lru_cache(maxsize=1)
+def _figure_class() -> type[Figure]:
+    """Return the class of figures, which notebooks show without pyplot."""
     from matplotlib.figure import Figure
 
-    return _Layout(page, width, columns, dpi, Figure(dpi=dpi)).draw()
+    class NotebookFigure(Figure):
+        """A figure that a notebook shows as a picture."""
+
+        def _repr_png_(self) -> bytes:
+            contents = io.BytesIO()
+            self.savefig(contents, format="png")
+            return contents.getvalue()
+
+    return NotebookFigure
 
 
 class _Layout:
@@ -354,7 +369,10 @@ class _Layout:
             )
             axes = self._axes(left, middle - 0.1, 0.2, 0.2)
             axes.axis("off")
-            axes.plot(0.5, 0.5, **_dot_style(diameter / self.dpi * POINTS, color))
+            size, line_width = _marker_size(np.array([diameter / self.dpi * POINTS]), False)
+            axes.scatter(
+                0.5, 0.5, s=size**2, c=color, edgecolors=OUTLINE_COLOR, linewidths=line_width
+            )
             axes.set(xlim=(0, 1), ylim=(0, 1))
             self._text(left + 0.25, line_top, text, TEXT_SIZE)
 
@@ -435,13 +453,18 @@ def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
 
 def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) -> None:
     """Draw dots or rings, and the labels beside visible dots."""
+    from matplotlib.colors import to_rgba_array
+
     marks = marks.in_drawing_order()
-    for number, radius in enumerate(marks.radius.tolist()):
-        color = COLOR_BY_SIGN[int(np.sign(marks.index[number]))]
-        opacity = 1.0 if marks.is_visible[number] else HIDDEN_OPACITY
-        diameter = 2 * radius * POINTS / dpi
-        style = _ring_style(diameter, color) if is_open else _dot_style(diameter, color)
-        axes.plot(*marks.position[number], alpha=opacity, **style)
+    signs = np.sign(marks.index).astype(int)
+    colors = to_rgba_array([COLOR_BY_SIGN[sign] for sign in signs.tolist()])
+    outlines = colors.copy() if is_open else to_rgba_array([OUTLINE_COLOR] * len(colors))
+    colors[:, 3] = 0.0 if is_open else np.where(marks.is_visible, 1.0, HIDDEN_OPACITY)
+    outlines[:, 3] = np.where(marks.is_visible, 1.0, HIDDEN_OPACITY)
+    size, line_width = _marker_size(2 * marks.radius * POINTS / dpi, is_open)
+    axes.scatter(
+        *marks.position.T, s=size**2, facecolors=colors, edgecolors=outlines, linewidths=line_width
+    )
     if is_open:
         return
     plate = {"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 0.4}
@@ -451,29 +474,20 @@ def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) ->
         axes.text(label.left, label.bottom, text, fontsize=size, color=INK, bbox=plate)
 
 
-def _dot_style(diameter: float, color: str) -> dict[str, object]:
-    """Return the style of a filled dot, given its diameter in points without the outline."""
-    outline = 2 * OUTLINE / (1 + 2 * OUTLINE) * diameter
-    return {
-        "marker": "o",
-        "markersize": diameter + outline / 2,
-        "markerfacecolor": color,
-        "markeredgecolor": OUTLINE_COLOR,
-        "markeredgewidth": outline / 2,
-        "linestyle": "none",
-    }
+def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return sizes and line widths of markers, in points.
 
-
-def _ring_style(diameter: float, color: str) -> dict[str, object]:
-    """Return the style of an open circle around a dot of a diameter in points."""
-    return {
-        "marker": "o",
-        "markersize": 1.75 * diameter,
-        "markerfacecolor": "none",
-        "markeredgecolor": color,
-        "markeredgewidth": 0.22 * diameter,
-        "linestyle": "none",
-    }
+    Parameters
+    ----------
+    diameter : ndarray
+        Of dots without their outlines, in points.
+    is_open : bool
+        Whether they are circles around dots.
+    """
+    if is_open:
+        return 1.75 * diameter, 0.22 * diameter
+    outline = OUTLINE / (1 + 2 * OUTLINE) * diameter
+    return diameter + outline, outline
 
 
 def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, float]]:
@@ -484,6 +498,8 @@ def _legend_entries(marks: Sequence[SingularityMarks]) -> list[tuple[str, str, f
             part.index.tolist(), part.degree.tolist(), part.radius.tolist(), strict=True
         ):
             key = index / degree, index
+            if key in entries and entries[key][2] >= 2 * radius:
+                continue
             entries[key] = (
                 f"index {format_index(index, degree)}".replace("-", MINUS),
                 COLOR_BY_SIGN[int(np.sign(index))],

@@ -86,7 +86,7 @@ def test_dots_are_at_the_singularities(fields, surface):
     (axes,) = panels_of(figure)
     height, width = axes.images[0].get_array().shape[:2]
     camera = orbit_camera(surface.vertices, 0, 0, width, height, perspective=False, margin=0.02)
-    drawn = np.array([line.get_xydata()[0] for line in axes.lines])
+    drawn = np.asarray(axes.collections[0].get_offsets())
     points = surface.vertices[fields["Ours"].singularities.vertex]
     place = points[:, [0, 2]] * camera.pixels_per_unit + (width / 2, height / 2)
     is_drawn = np.linalg.norm(drawn[:, None] - place, axis=2).min(axis=0) < 0.5
@@ -94,6 +94,19 @@ def test_dots_are_at_the_singularities(fields, surface):
     assert is_drawn[depth < -0.1].all() and not is_drawn[depth > 0.1].any()
     assert len(drawn) == is_drawn.sum() > 2
     assert "index +1/4" in texts_of(figure)
+
+
+def test_very_many_dots_are_small(surface):
+    """A field of random directions has a singularity at every other vertex."""
+    x, y = surface.face_frames
+    angle = 2 * np.pi * np.random.default_rng(0).random((surface.face_count, 1))
+    noise = rf.from_vectors(surface, np.cos(angle) * x + np.sin(angle) * y, degree=4)
+    figure = rf.figure(noise, singularity_size=40.0, **SMALL)
+    (axes,) = panels_of(figure)
+    dots = axes.collections[0]
+    size = np.sqrt(dots.get_sizes()) * 60 / 72  # pixels
+    height, width = axes.images[0].get_array().shape[:2]
+    assert len(size) > 100 and (np.pi / 4 * size**2).sum() < 0.12 * width * height
 
 
 def test_differences(fields):
@@ -111,9 +124,10 @@ def test_differences(fields):
         expected = np.array(mappable.to_rgba(np.degrees(0.3))[:3]) * 255
         assert np.abs(colors.mean(axis=0) - expected).max() < 3
     assert any(text.startswith("mean 17.2°, 95 % 17.2°") for text in texts_of(figure))
-    markers = [line for line in axes.lines if line.get_marker() == "o"]
-    open_ones = [line for line in markers if line.get_markerfacecolor() == "none"]
-    assert len(open_ones) == len(markers) / 2 > 0
+    rings, dots = axes.collections
+    assert (rings.get_facecolors()[:, 3] == 0).all() and (dots.get_facecolors()[:, 3] == 1).all()
+    assert np.array_equal(rings.get_offsets(), dots.get_offsets()) and len(dots.get_offsets()) > 2
+    assert (rings.get_sizes() > dots.get_sizes()).all()
 
 
 def test_a_table_and_a_caption(fields):
@@ -170,6 +184,12 @@ def test_files(fields, tmp_path):
         rf.save_figures(tmp_path / "a.svg", pages)
     with pytest.raises(rf.RosyError, match=r"\.pdf, \.svg, \.png"):
         rf.save_figures(tmp_path / "a.jpg", pages[0])
+
+
+def test_a_notebook_shows_a_figure(fields):
+    picture = rf.figure(fields["Ours"], **SMALL)._repr_png_()
+    with Image.open(io.BytesIO(picture)) as image:
+        assert image.width == 420
 
 
 def test_formulas(fields, tmp_path, error_of):

@@ -257,9 +257,7 @@ def load_drawing() -> ModuleType:
     try:
         from ..external import matplotlib_figure
     except ImportError:
-        raise RosyError(
-            "figures are drawn by the Python package: pip install rosyfields[figures]"
-        ) from None
+        raise RosyError("figures need the Python package rosyfields, with matplotlib") from None
     matplotlib_figure.check_matplotlib()
     return matplotlib_figure
 

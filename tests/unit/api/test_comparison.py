@@ -142,7 +142,10 @@ def test_figures_need_matplotlib(sphere):
         "s = rf.Surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])\n"
         "try: rf.figure(rf.form(s))\nexcept rf.RosyError as error: print(error)"
     )
-    for module in ("matplotlib", "rosy_addon.external.matplotlib_figure"):
+    for module, advice in (
+        ("matplotlib", "pip install rosyfields[figures]"),
+        ("rosy_addon.external.matplotlib_figure", "the Python package rosyfields"),
+    ):
         words = [sys.executable, "-c", code.format(module)]
         output = subprocess.check_output(words, text=True)
-        assert "pip install rosyfields[figures]" in output and output.count("\n") == 1
+        assert advice in output and output.count("\n") == 1

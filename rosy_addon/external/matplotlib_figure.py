@@ -45,6 +45,9 @@ SCALE_BAR_SHARE = 0.3
 
 INK = "#141414"
 
+#: Marks are drawn over the lines between them, which have the order 2, and a cross over marks.
+MARK_ORDER = 3
+
 
 @dataclass(frozen=True, eq=False)
 class Panel:
@@ -446,9 +449,8 @@ def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
             _draw_marks(axes, marks, dpi, is_open)
     if panel.cross is not None:
         for color, line_width in (("white", 2.4), (INK, 1.2)):
-            axes.plot(
-                *panel.cross, marker="x", color=color, markersize=6, markeredgewidth=line_width
-            )
+            style = {"markersize": 6, "markeredgewidth": line_width, "zorder": MARK_ORDER + 1}
+            axes.plot(*panel.cross, marker="x", color=color, **style)
 
 
 def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) -> None:
@@ -463,7 +465,12 @@ def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) ->
     outlines[:, 3] = np.where(marks.is_visible, 1.0, HIDDEN_OPACITY)
     size, line_width = _marker_size(2 * marks.radius * POINTS / dpi, is_open)
     axes.scatter(
-        *marks.position.T, s=size**2, facecolors=colors, edgecolors=outlines, linewidths=line_width
+        *marks.position.T,
+        s=size**2,
+        facecolors=colors,
+        edgecolors=outlines,
+        linewidths=line_width,
+        zorder=MARK_ORDER,
     )
     if is_open:
         return
@@ -471,7 +478,9 @@ def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) ->
     for label in placed_labels(marks):
         size = label.height / CAPITAL_HEIGHT * POINTS / dpi
         text = label.text.replace("-", MINUS)
-        axes.text(label.left, label.bottom, text, fontsize=size, color=INK, bbox=plate)
+        axes.text(
+            label.left, label.bottom, text, fontsize=size, color=INK, bbox=plate, zorder=MARK_ORDER
+        )
 
 
 def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.ndarray]:

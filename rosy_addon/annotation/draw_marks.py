@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..color import from_hex, to_linear
@@ -88,11 +90,17 @@ def draw_dot(
     distance = np.hypot(x - center[0], y - center[1])
     inner_share = np.clip(radius + 0.5 - distance, 0, 1)[..., None].astype(np.float32)
     fill, line = (
-        to_linear(from_hex(code)) for code in (COLOR_BY_SIGN[int(np.sign(index))], OUTLINE_COLOR)
+        _linear_color(code) for code in (COLOR_BY_SIGN[int(np.sign(index))], OUTLINE_COLOR)
     )
     draw_over(
         part, line + inner_share * (fill - line), opacity * np.clip(outer + 0.5 - distance, 0, 1)
     )
+
+
+@lru_cache(maxsize=8)
+def _linear_color(code: str) -> np.ndarray:
+    """Return the (3,) linear values of a color ``#rrggbb``; not to be changed."""
+    return to_linear(from_hex(code))
 
 
 def _draw_label(

@@ -15,7 +15,7 @@ from ..field.analysis import format_degrees
 from ..field.singularity_matching import (
     DEFAULT_REACH,
     SingularityMatching,
-    match_singularities_task,
+    match_on_surface_task,
 )
 from ..progress import run_to_completion
 from .field import Difference, Field
@@ -211,16 +211,9 @@ def compare(
         if not is_comparable(reference, field):
             continue
         differences[title] = reference.difference(field)
-        points = field.surface.vertices
-        first, second = reference.singularities, field.singularities
+        pair = reference.singularities, field.singularities
         matchings[title] = run_to_completion(
-            match_singularities_task(
-                points[first.vertex],
-                first.index,
-                points[second.vertex],
-                second.index,
-                reach * field.surface.mesh.extent,
-            )
+            match_on_surface_task(field.surface.mesh, *pair, reach)
         )
     return Comparison(titled, differences, matchings)
 

@@ -267,7 +267,8 @@ class Field:
         """Return the angle to another field of the same degree on the same surface.
 
         If the directions of one of them are not rotationally symmetric, it is the mean angle between the
-        directions of their best matching, and may be larger than pi/N. Two smoothest fields of a closed surface may differ by a constant angle, which costs no energy.
+        directions of their best matching, and may be larger than pi/N. Two smoothest fields of a closed
+        surface may differ by a constant angle, which costs no energy.
 
         Raises
         ------

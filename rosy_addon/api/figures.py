@@ -32,7 +32,7 @@ from ..projection.visible_vertices import project_vertices_task
 from ..rendering.band_workers import BandWorkers
 from ..rendering.cpu import CpuRenderer
 from ..rendering.view_input import ViewInput
-from .comparison import Comparison, compare
+from .comparison import Comparison, compare, titled_fields
 from .field import Field
 from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
 
@@ -66,7 +66,7 @@ DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
 
 
 def figure(
-    fields: Field | Sequence[Field] | Mapping[str, Field],
+    fields: Field | Sequence[Field] | Mapping[str, Field] | Comparison,
     *,
     parts: Sequence[str] = ("fields",),
     columns: int | None = None,
@@ -92,8 +92,9 @@ def figure(
 
     Parameters
     ----------
-    fields : Field, sequence of Field, or mapping of str to Field
-        The keys of a mapping are the titles. Fields may be on different surfaces.
+    fields : Field, sequence of Field, mapping of str to Field, or Comparison
+        The keys of a mapping are the titles. Fields may be on different surfaces. A comparison that was made
+        before is not made again.
     parts : sequence of {"fields", "differences", "table"}
         What to draw: the fields; the angle of each field to the first as a color, from 0 to 180/N
         degrees, with a cross at the largest, and the singularities of both; the table of `compare`.
@@ -149,9 +150,8 @@ def figure(
     """
     drawing = load_drawing()
     is_single = isinstance(fields, Field)
-    titled = {fields.surface.name: fields} if isinstance(fields, Field) else fields
-    comparison = compare(titled, reach=reach)
     parts = (parts,) if isinstance(parts, str) else tuple(parts)
+    comparison = _comparison_of(fields, parts, reach)
     _check_parts(comparison, parts, lines)
     name = next(iter(comparison.fields.values())).surface.name
     if not (orthographic or scale_bar is None):
@@ -187,20 +187,34 @@ def figure(
     camera = orbit_camera(points, *view, *size, perspective=not orthographic, margin=MARGIN)
     with BandWorkers(workers) as pool:
         studio = _Studio(camera, look, CpuRenderer(Cache(), keep_gbuffers=False, workers=pool))
-        rows = []
+        rows, marks = [], {}
+        if set(parts) - {"table"}:
+            marks = {title: studio.marks(instance) for title, instance in instances.items()}
         if "fields" in parts:
             panels = [
-                drawing.Panel(
-                    "" if is_single else title, studio.picture(instance), studio.marks(instance)
-                )
+                drawing.Panel("" if is_single else title, studio.picture(instance), marks[title])
                 for title, instance in instances.items()
             ]
             rows.append(drawing.Row(panels, _color_bar(look, color_label)))
         if "differences" in parts:
-            rows.append(studio.difference_row(comparison, instances, lines, largest_angle))
+            rows.append(studio.difference_row(comparison, instances, marks, lines, largest_angle))
     table = comparison.cells() if "table" in parts else []
     bar = None if scale_bar is None else _scale_bar(camera, scale_bar, drawing.SCALE_BAR_SHARE)
     return drawing.draw_page(drawing.Page(rows, table, caption, bar), width, columns, dpi)
+
+
+def _comparison_of(
+    fields: Field | Sequence[Field] | Mapping[str, Field] | Comparison,
+    parts: Sequence[str],
+    reach: float,
+) -> Comparison:
+    """Return the comparison of fields, without differences if no part shows them."""
+    if isinstance(fields, Comparison):
+        return fields
+    titled = {fields.surface.name: fields} if isinstance(fields, Field) else fields
+    if "differences" in parts or "table" in parts:
+        return compare(titled, reach=reach)
+    return Comparison(titled_fields(titled), {}, {})
 
 
 def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure]) -> None:
@@ -404,6 +418,7 @@ class _Studio:
         self,
         comparison: Comparison,
         instances: Mapping[str, MeshInstance],
+        marks: Mapping[str, SingularityMarks | None],
         lines: str,
         largest_angle: float,
     ) -> Row:
@@ -413,7 +428,7 @@ class _Studio:
         degree = comparison.fields[reference].degree
         top = largest_angle or 180.0 / degree
         panels = [
-            self._difference_panel(comparison, instances, title, lines, top)
+            self._difference_panel(comparison, instances, marks, title, lines, top)
             if title in comparison.differences
             else None
             for title in instances
@@ -432,6 +447,7 @@ class _Studio:
         self,
         comparison: Comparison,
         instances: Mapping[str, MeshInstance],
+        marks: Mapping[str, SingularityMarks | None],
         title: str,
         lines: str,
         top: float,
@@ -465,8 +481,8 @@ class _Studio:
         panel: Panel = load_drawing().Panel(
             f"{title} vs. {next(iter(instances))}",
             to_srgb_uint8(rgba[::-1]),
-            self.marks(other),
-            self.marks(first),
+            marks[title],
+            next(iter(marks.values())),
             self._links(comparison, title, first) if shown else None,
             self._worst_place(first, difference.worst_face),
             note,

@@ -118,9 +118,8 @@ def add_compare_command(subparsers: Any, extras: Extras) -> None:
     )
     parser.add_argument(
         "--color-label",
-        default="magnitude",
         metavar="TEXT",
-        help="title of the color bar (%(default)s)",
+        help="title of the color bar; by default the name of what is shown",
     )
     add_direction_options(parser)
     parser.add_argument(
@@ -138,32 +137,30 @@ def run_compare(options: argparse.Namespace) -> None:
         check_output(options)
         picture_look(str(options.mesh), preset, settings, {})
         load_drawing()
-    fields = _load_fields(options)
-    comparison = api.compare(fields, reach=options.match_reach)
+    comparison = api.compare(_load_fields(options), reach=options.match_reach)
     if options.output is not None:
-        _draw(options, fields, comparison, {"preset": preset, **settings})
+        _draw(options, comparison, {"preset": preset, **settings})
     write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
     print_line(write[options.format]())
 
 
 def _draw(
-    options: argparse.Namespace,
-    fields: dict[str, api.Field],
-    comparison: api.Comparison,
-    settings: dict[str, Any],
+    options: argparse.Namespace, comparison: api.Comparison, settings: dict[str, Any]
 ) -> None:
     """Write the figures."""
     names = ("columns", "width", "dpi", "view", "lines", "workers", "scale_bar", "color_label")
     arguments = {name: getattr(options, name) for name in names} | settings
-    arguments |= {"reach": options.match_reach, "orthographic": not options.perspective}
+    arguments["orthographic"] = not options.perspective
     rest = ("differences", "table") if comparison.differences else ("table",)
     if options.output.suffix.lower() == ".pdf":
         pages = [
-            api.figure(fields, caption=options.caption, **arguments),
-            api.figure(fields, parts=rest, **arguments),
+            api.figure(comparison, caption=options.caption, **arguments),
+            api.figure(comparison, parts=rest, **arguments),
         ]
     else:
-        pages = [api.figure(fields, parts=("fields", *rest), caption=options.caption, **arguments)]
+        pages = [
+            api.figure(comparison, parts=("fields", *rest), caption=options.caption, **arguments)
+        ]
     api.save_figures(options.output, pages)
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..progress import Progress, Task
+from .surface import Surface
 
 #: Singularities match if they are nearer than this fraction of the longest side of the mesh.
 DEFAULT_REACH = 0.05
@@ -29,6 +30,32 @@ class SingularityMatching(NamedTuple):
     first: np.ndarray
     second: np.ndarray
     distance: np.ndarray
+
+
+def match_on_surface_task(
+    surface: Surface,
+    singularities: tuple[np.ndarray, np.ndarray],
+    other: tuple[np.ndarray, np.ndarray],
+    reach: float = DEFAULT_REACH,
+) -> Task[SingularityMatching]:
+    """Match the singularities of two fields of the same degree on a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+    singularities, other : (vertex, index)
+        As `singularities.find_singularities` returns them.
+    reach : float
+        Largest distance of a pair, as a fraction of the longest side of the mesh.
+    """
+    (vertex, index), (other_vertex, other_index) = singularities, other
+    return match_singularities_task(
+        surface.vertices[vertex],
+        index,
+        surface.vertices[other_vertex],
+        other_index,
+        reach * surface.extent,
+    )
 
 
 def match_singularities_task(

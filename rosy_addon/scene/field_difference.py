@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import RosyError
 from ..field.analysis import ErrorStatistics, angle_errors, error_statistics
 from ..field.singularities import singularities_task
-from ..field.singularity_matching import DEFAULT_REACH, match_singularities_task
+from ..field.singularity_matching import match_on_surface_task
 from ..progress import Progress, Task, subtask
 from .combed_guides import GUIDE_ATTRIBUTE
 from .field_attributes import (
@@ -108,14 +108,9 @@ def store_difference_task(
     )
     yield Progress(0.6, "comparing the fields")
     angles = angle_errors(surface, field, other_field)
-    vertex, index = yield from subtask(singularities_task(surface, field), 0.6, 0.75)
-    other_vertex, other_index = yield from subtask(
-        singularities_task(surface, other_field), 0.75, 0.9
-    )
-    points, other_points = surface.vertices[vertex], surface.vertices[other_vertex]
-    reach = DEFAULT_REACH * surface.extent
-    task = match_singularities_task(points, index, other_points, other_index, reach)
-    matching = yield from subtask(task, 0.9, 1.0)
+    own = yield from subtask(singularities_task(surface, field), 0.6, 0.75)
+    others = yield from subtask(singularities_task(surface, other_field), 0.75, 0.9)
+    matching = yield from subtask(match_on_surface_task(surface, own, others), 0.9, 1.0)
     attribute = get_or_create_attribute(mesh, name, "FLOAT")
     attribute.data.foreach_set("value", np.degrees(angles).astype(np.float32))
     mesh.update()
@@ -123,7 +118,7 @@ def store_difference_task(
         other,
         field.degree,
         error_statistics(surface, angles),
-        len(vertex),
-        len(other_vertex),
+        len(own[0]),
+        len(others[0]),
         len(matching.distance),
     )

@@ -19,6 +19,7 @@ from .covering import scatter_rows
 from .even_lines import EvenLines, even_line_images_task, has_even_lines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
+from .flow import with_cycle_distance
 from .hatching import (
     LineModulation,
     has_breaks,
@@ -98,7 +99,7 @@ def compose_task(
     camera = gbuffer.camera
     if gbuffer.coverage is not None:
         look = replace(look, supersampling=1)
-    look = look_in_pixels(look, camera, gbuffer.instances)
+    look = with_cycle_distance(look_in_pixels(look, camera, gbuffer.instances))
     pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)
     draws_thresholds = draws_thresholds and is_hatched(look)
     if draws_thresholds:
@@ -227,7 +228,7 @@ def compose_planar(
     field = planar_pixel_field(angles, degree, magnitude)
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
-    look = look_for_symmetry(replace(look, supersampling=1), field.symmetry)
+    look = look_for_symmetry(with_cycle_distance(replace(look, supersampling=1)), field.symmetry)
     images = run_to_completion(lic_task(field, look, noise))
     layer = run_to_completion(layer_task(field, look, images))
     color = colorize(field, layer.images, layer.tone, look)
@@ -281,7 +282,9 @@ def _tone_along_lines_task(
     """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
-    overshoot_look = replace(look, length=overshoot_steps(look), taper=False, oriented=False)
+    overshoot_look = replace(
+        look, length=overshoot_steps(look), taper=False, oriented=False, flow=0.0
+    )
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.

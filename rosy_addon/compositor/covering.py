@@ -30,6 +30,7 @@ from ..deterministic_trig import cos_sin, vector_angle
 from ..field.directional_field import evaluate_harmonics
 from ..progress import Progress, Task, run_to_completion
 from ..projection.pixel_blocks import pixel_blocks
+from .flow import forward_share
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
 
@@ -108,6 +109,8 @@ class Covering:
         Scales of the integers: of the step (pixels), of the noise, and of its derivative.
     seams : SeamTable or None
         Steps across seams, if there are any.
+    has_directions : bool
+        Whether lines point one way only: the field has no opposites.
     """
 
     sheets: int
@@ -118,6 +121,7 @@ class Covering:
     state_table: np.ndarray
     state_scales: tuple[float, float, float]
     seams: SeamTable | None = None
+    has_directions: bool = False
 
     @property
     def line_count(self) -> int:
@@ -166,6 +170,21 @@ class Covering:
         if self.sheets_per_turn == self.sheets:
             return sheet % 2 == 0
         return sheet < self.line_count
+
+    def forward_share(self, state: np.ndarray) -> np.ndarray:
+        """(n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
+
+        Across seams, as of textures, there is no common angle, and lines without direction drift both ways.
+        """
+        if self.has_directions:
+            return self.is_along_member(state).astype(np.float32)
+        if self.seams is not None:
+            return np.full(len(state), 0.5, dtype=np.float32)
+        sheet, cell = np.divmod(state, np.int32(self.cell_count))
+        angle = (self.packed_phase.take(cell) - np.float32(2) + sheet) * np.float32(
+            2 * np.pi / self.sheets_per_turn
+        )
+        return forward_share(np.cos(angle))
 
     def neighbor_lines(
         self, line: np.ndarray, offsets: Sequence[tuple[int, int]]
@@ -291,6 +310,7 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
             max_slope / INT16_MAX,
         ),
         seams=_seam_table(field.seam_steps, cell_of_pixel, per_turn),
+        has_directions=not field.symmetry.has_opposites,
     )
 
 

@@ -31,9 +31,10 @@ from .covering import (
     scatter_rows,
 )
 from .filter_kernel import full_sample_count
+from .flow import blend_channels, streamline_reach
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images_task, step_limits_task
-from .look import Look, is_hatched
+from .look import Look, has_flow, is_hatched
 from .look_units import AntialiasedLook
 from .pixel_field import PixelField
 from .streamline_batch import StreamlineBatch
@@ -135,7 +136,8 @@ def fast_lic_lengths_task(
     for look in looks:
         step_limits.append((yield from subtask(step_limits_task(field, look), 0.0, 0.0)))
     drawn = drawn_pixels(band, field.pixel, field.width)
-    images = [_NewImages.empty(field, look, drawn, noise.shape[1]) for look in looks]
+    channels = 1 if has_flow(looks[0]) else noise.shape[1]
+    images = [_NewImages.empty(field, look, drawn, channels) for look in looks]
     strips = _strips(field, looks[0], band)
     # The first rows of the strip above, which are blended with the values of this one.
     upper_head, upper_values = slice(0, 0), []
@@ -250,7 +252,7 @@ def strip_count(width: int, height: int, lines: int, margin: int) -> int:
 
 def streamline_margin(look: Look) -> int:
     """Return how many rows streamlines may leave a strip."""
-    return int(look.length * look.step) + 2
+    return int(streamline_reach(look) * look.step) + 2
 
 
 def _strips(field: PixelField, look: Look, band: Band | None) -> list[_Strip]:
@@ -309,6 +311,8 @@ def _strip_values_task(
         slope (see `LicImages`) if it is needed. n is 0 for a strip without pixels.
     """
     channels, extent, averaged = noise.shape[1], strip.extent, strip.averaged
+    has_moving_kernel = has_flow(looks[0])
+    channels = 1 if has_moving_kernel else channels
     is_empty = strip.core.start == strip.core.stop
     shape = field.line_count, 0 if is_empty else averaged.stop - averaged.start
     values = [
@@ -325,8 +329,11 @@ def _strip_values_task(
     tables = []
     for _ in looks:
         yield Progress(0.1, STEP_LABEL)
-        tables.append(_LineAverages(covering, cells))
-        tables[-1].init_undefined(covering.cell_of_pixel[undefined], strip_noise[undefined])
+        tables.append(_LineAverages(covering, cells, channels))
+        own_noise = strip_noise[undefined]
+        if has_moving_kernel:
+            own_noise = blend_channels(own_noise, looks[0])
+        tables[-1].init_undefined(covering.cell_of_pixel[undefined], own_noise)
     cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
     yield from subtask(_cover_all_lines_task(covering, tables, looks, cell_limits), 0.1, 0.9)
     line = member_lines(field)
@@ -431,10 +438,12 @@ class _LineAverages:
     covering : Covering
     cells : (n,) int32 ndarray
         Cells whose lines need averages.
+    channels : int
+        K, of the averages.
     """
 
-    def __init__(self, covering: Covering, cells: np.ndarray) -> None:
-        shape = (covering.line_count, covering.cell_count, covering.noise_channels + 1)
+    def __init__(self, covering: Covering, cells: np.ndarray, channels: int) -> None:
+        shape = (covering.line_count, covering.cell_count, channels + 1)
         state = np.full(covering.cell_count, -1, dtype=np.float32)
         state[cells] = 0
         self._values = np.empty(shape, dtype=np.float32)
@@ -540,7 +549,7 @@ def _cover_all_lines_task(
     max_uncovered = FINE_UNCOVERED_FRACTION if fine else MAX_UNCOVERED_FRACTION
     spacing = max(int(SEED_SPACING_FACTOR * half_window * look.step), 1)
     seeds = _grid_seeds(covering, averages[0], spacing)
-    batch_size = _batch_size(half_window + look.length)
+    batch_size = _batch_size(half_window + streamline_reach(look))
     batch = StreamlineBatch(covering, looks, step_limits, half_window, batch_size, fine)
     for _ in range(MAX_ROUNDS):
         covered_steps = 0
@@ -564,7 +573,7 @@ def _cover_all_lines_task(
         remaining = [table.copy_from(missing, source) for table in averages]
         missing = remaining[0]
     # Lines whose neighbors have no average get streamlines of their own, without a half window.
-    batch_size = min(_batch_size(look.length), len(missing))
+    batch_size = min(_batch_size(streamline_reach(look)), len(missing))
     batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):
         _write_streamlines(averages, batch.trace(batch_seeds))

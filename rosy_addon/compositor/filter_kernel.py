@@ -40,6 +40,16 @@ def kernel_of(look: Look) -> Kernel:
     return "taper" if look.taper else "box"
 
 
+def sample_weights(position: np.ndarray, length: float, kernel: Kernel) -> np.ndarray:
+    """Return the weights of the samples at whole numbers of steps from the center, forward if positive.
+
+    Those further away than `length` steps are 0.
+    """
+    forward, backward = WEIGHT_SLOPES[kernel]
+    slope = np.where(position > 0, forward, backward) / (1 + length)
+    return np.where(np.abs(position) <= length, 1 - slope * np.abs(position), 0.0)
+
+
 class KernelWeights(NamedTuple):
     """Sums over the weights w of the samples of streamlines.
 

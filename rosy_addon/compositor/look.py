@@ -51,6 +51,15 @@ def _has_streaks(look: Any) -> bool:
     return not (is_hatched(look) and look.lines == "even" and not (look.breaks or look.wobble))
 
 
+def has_flow(look: Any) -> bool:
+    """Return whether streaks drift along the field; see `flow`."""
+    return look.flow > 0 and _can_flow(look)
+
+
+def _can_flow(look: Any) -> bool:
+    return _has_streaks(look) and look.method == "sheets" and look.noise == "grey"
+
+
 def _is_lit(look: Any) -> bool:
     return look.shading > 0 and (look.tone == "light" or look.tone_lit)
 
@@ -170,6 +179,34 @@ class Look:
         "sparse streaks, of low density, show it best",
         panel="streaks",
         applies=_has_streaks,
+    )
+    flow: float = number(
+        0.0,
+        0.0,
+        256.0,
+        "Pixels that streaks drift along the field per frame, in animations and live views. Lines of fields "
+        "of even degree drift toward the guiding angle, or both ways if they are perpendicular to it. 0: no "
+        "drift",
+        is_pixel_length=True,
+        panel="streaks",
+        applies=_can_flow,
+    )
+    flow_distance: float = number(
+        0.0,
+        0.0,
+        8000.0,
+        "Pixels that a streak drifts while it appears and fades again. 0: half its length",
+        is_pixel_length=True,
+        panel="streaks",
+        applies=has_flow,
+    )
+    flow_phase: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Position in the cycle in which streaks drift and fade. Animations and live views set it",
+        panel="streaks",
+        applies=has_flow,
     )
     step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
     grain: float = number(

@@ -8,8 +8,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
+from .drifting_averages import DriftingAverages
 from .filter_kernel import kernel_of, kernel_weights
-from .look import Look
+from .flow import MAX_LEVELS, moving_kernel, streamline_reach
+from .look import Look, has_flow
 
 #: Steps between compactions, which remove streamlines that have ended.
 COMPACT_INTERVAL = 8
@@ -76,7 +78,14 @@ class StreamlineBatch:
         self._covering = covering
         look = looks[0]
         self._lengths, self._kernel = [look.length for look in looks], kernel_of(look)
-        self._half_window, self._max_steps = half_window, half_window + max(self._lengths)
+        self._half_window = half_window
+        self._max_steps = half_window + max(map(streamline_reach, looks))
+        self._moving_kernels = []
+        if has_flow(look):
+            self._moving_kernels = [
+                moving_kernel(each, 1 if limit is None else min(each.length + 1, MAX_LEVELS))
+                for each, limit in zip(looks, step_limits, strict=True)
+            ]
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
         lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
@@ -89,10 +98,12 @@ class StreamlineBatch:
         ]
         self._min_loop_steps = math.ceil(MIN_LOOP_PIXELS / look.step)
         lanes, channels = 2 * max_streamlines, covering.noise_channels
+        self._has_second_sums = self._kernel != "box" or bool(self._moving_kernels)
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
         self._totals = np.empty((lanes, channels), dtype=np.complex64)
         self._states = np.empty((half_window + 1, lanes), dtype=np.int32)
         self._lateral_offset = np.empty((half_window + 1, lanes), dtype=np.float32)
+        self._axial_offset = np.empty_like(self._lateral_offset) if self._moving_kernels else None
         #: Steps of the last traced streamlines before their end, within the half window.
         self.covered_steps = 0
 
@@ -114,8 +125,13 @@ class StreamlineBatch:
         centered : (m,) intp ndarray
             Indices of the streamlines that pass close to the center of the pixel.
         """
+        if self._moving_kernels:
+            seeds = self._along_members(seeds)
         step_counts, last_step = self._trace_steps(seeds)
         self.covered_steps = int(np.minimum(step_counts, self._half_window).sum())
+        if self._moving_kernels:
+            yield from self._drifting_averages(len(seeds), step_counts, last_step)
+            return
         lanes, channels = 2 * len(seeds), self._covering.noise_channels
         step_counts = step_counts.astype(np.float32)
         opposite_counts = np.roll(step_counts, lanes // 2)
@@ -156,6 +172,69 @@ class StreamlineBatch:
                 out[:, -1] = weights.effective_samples
             yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
 
+    def _along_members(self, seeds: np.ndarray) -> np.ndarray:
+        """Replace lines by states whose sheets are members, if the lines have directions."""
+        covering = self._covering
+        if not covering.has_directions:
+            return seeds
+        opposite = seeds + covering.line_count * covering.cell_count
+        return np.where(covering.is_along_member(seeds), seeds, opposite)
+
+    def _drifting_averages(
+        self, count: int, step_counts: np.ndarray, last_step: int
+    ) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
+        """Yield what `trace` does, for kernels that move. The average is that of a single channel."""
+        lanes, covering = 2 * count, self._covering
+        second_sums = self._whole_second_sums(count)
+        averages = [DriftingAverages(kernel, second_sums) for kernel in self._moving_kernels]
+        ends = step_counts[:count].astype(np.intp), step_counts[count:].astype(np.intp)
+        values = [np.empty((lanes, 2), dtype=np.float32) for _ in averages]
+        for step in range(min(last_step, self._half_window) + 1):
+            state = self._states[step, :lanes]
+            share = covering.forward_share(state)
+            line = covering.fold_to_line(state)
+            lateral = self._lateral_offset[step, :lanes]
+            correction = lateral * self._lateral_gain
+            axial = self._axial_offset[step, :lanes]
+            # The quantities of the backward half are turned to the direction of the forward half.
+            for sign, lane in ((1, slice(0, count)), (-1, slice(count, lanes))):
+                forward = share[lane] if sign > 0 else 1 - share[lane]
+                ahead, behind = (np.maximum(ends[0] - sign * step, 0), ends[1] + sign * step)
+                for average, limit, out in zip(averages, self._step_limits, values, strict=True):
+                    length = None if limit is None else limit.take(line[lane])
+                    sums, samples = average.at(
+                        sign * step,
+                        sign * axial[lane],
+                        length,
+                        forward,
+                        np.maximum(behind, 0),
+                        ahead,
+                    )
+                    lane_out = out[lane]
+                    np.multiply(sums.real, self._noise_scale, out=lane_out[:, 0])
+                    lane_out[:, 0] -= correction[lane] * (np.float32(sign) * sums.imag)
+                    lane_out[:, 1] = samples
+            yield line, values, np.flatnonzero(np.abs(lateral) < self._max_lateral)
+
+    def _whole_second_sums(self, count: int) -> np.ndarray:
+        """Join the sums of prefix sums of both halves of streamlines, in the order of the forward half.
+
+        Returns
+        -------
+        (K, 2 R + 3, n) complex64 ndarray
+            Row i + R + 2 is the sum of prefix sums up to step i, with R the number of steps.
+        """
+        steps, channels = self._max_steps, self._covering.noise_channels
+        result = np.empty((channels, 2 * steps + 3, count), dtype=np.complex64)
+        for channel, rows in enumerate(result):
+            rows[steps + 2 :] = self._sums[:, :count, channel]
+            rows[steps + 1] = 0
+            # As `_second_prefix_sums`.
+            np.conjugate(self._sums[::-1, count : 2 * count, channel], out=rows[: steps + 1])
+            factor = np.arange(-steps - 1, 0, dtype=np.float32)
+            rows[: steps + 1] += factor[:, None] * self._sums[0, :count, channel]
+        return result
+
     def _trace_steps(self, seeds: np.ndarray) -> tuple[np.ndarray, int]:
         """Trace the streamlines and fill the buffers. Row i of a buffer is step i.
 
@@ -193,6 +272,7 @@ class StreamlineBatch:
         active, step_counts = None, np.full(lanes, self._max_steps)
         active_counts = step_counts
         loops = _LoopFinder(self._min_loop_steps)
+        step_scale = self._step_scale / np.float32(1.5)
         for step in range(self._max_steps + 1):
             state = sheet_offset.take(sheet, mode="clip")
             state += cell
@@ -208,6 +288,10 @@ class StreamlineBatch:
                 lateral = _lateral_offset(position, direction)
             total += record[:, 1:]
             self._record_step(step, active, lanes, state, lateral, total)
+            if self._axial_offset is not None and step <= self._half_window:
+                self._axial_offset[step, :lanes] = 0
+                axial = _axial_steps(position, direction, step_scale)
+                self._axial_offset[step, slice(lanes) if active is None else active] = axial
             if step == self._max_steps:
                 break
             # Two-step Adams-Bashforth method, 3/2 d - 1/2 d_previous.
@@ -310,7 +394,7 @@ class StreamlineBatch:
         """Write row `step` of the buffers, for all lanes or the active ones."""
         self._totals[slice(lanes) if active is None else active] = total
         self._sums[step, :lanes] = self._totals[:lanes]
-        if self._kernel != "box" and step:
+        if self._has_second_sums and step:
             self._sums[step, :lanes] += self._sums[step - 1, :lanes]
         if step > self._half_window:
             return
@@ -325,7 +409,7 @@ class StreamlineBatch:
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
         """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""
-        if self._kernel != "box":
+        if self._has_second_sums:
             for step in range(last_step, self._max_steps):
                 np.add(
                     self._sums[step, :lanes], self._totals[:lanes], out=self._sums[step + 1, :lanes]
@@ -453,6 +537,13 @@ def _lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
     lateral = position.imag * direction.real
     lateral -= position.real * direction.imag
     return lateral
+
+
+def _axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
+    """(n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
+    square = direction.real * direction.real + direction.imag * direction.imag
+    along = position.real * direction.real + position.imag * direction.imag
+    return along / np.minimum(-step_scale * square, np.float32(-1))
 
 
 def _r2_offsets(count: int) -> np.ndarray:

@@ -25,13 +25,14 @@ from ..compositor.fast_lic import (
     streamline_margin,
     strip_count,
 )
+from ..compositor.flow import streamline_reach
 from ..compositor.hatching import (
     has_breaks,
     has_outline,
     has_overshoot,
     has_paper_grain,
 )
-from ..compositor.look import Look, colors_values, is_hatched, uses_color_map
+from ..compositor.look import Look, colors_values, has_flow, is_hatched, uses_color_map
 from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..field.directional_field import ratio_harmonics
 from ..field.symmetry import FieldSymmetry
@@ -331,10 +332,12 @@ def _sheets_bytes(
         # The values of the strip, and copies of the fields of pixels.
         line_bytes, cell_bytes = line_bytes + 4 + 4 * noise_channels, cell_bytes + 38
     strip = (line_bytes * lines + cell_bytes) * columns * rows
-    half_length = max(HALF_WINDOW_STEPS, look.length // 2) + look.length
+    half_length = max(HALF_WINDOW_STEPS, look.length // 2) + streamline_reach(look)
     steps = min(BATCH_SIZE * half_length, MAX_BATCH_STEPS)
+    # Sums along whole streamlines, of each channel.
+    step_bytes = STEP_BYTES + (16 * noise_channels if has_flow(look) else 0)
     images = (8 * noise_channels + 4 * lines * noise_channels + 4) * visible
-    return images + strip + STEP_BYTES * steps
+    return images + strip + step_bytes * steps
 
 
 def _color_bytes(look: Look, lines: int, noise_channels: int) -> float:

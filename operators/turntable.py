@@ -20,7 +20,9 @@ from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.read_view import read_turntable_task
 from ..rosy_addon.scene.video import encode_video_task
 from ..rosy_addon.turntable_video import (
+    check_still,
     check_video_path,
+    evicting,
     turntable_task,
     turntable_views,
 )
@@ -29,7 +31,7 @@ from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_idle, selected_mesh_objects, sync_suffix
 
 #: Properties that are passed on from the file browser to the operator that does the work.
-VIDEO_SETTINGS = ("filepath", "film", "pictures", "rate", "width", "height", "elevation")
+VIDEO_SETTINGS = ("filepath", "film", "pictures", "rate", "width", "height", "elevation", "still")
 
 
 class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
@@ -79,6 +81,10 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         min=-1.5,
         max=1.5,
     )
+    still: bpy.props.BoolProperty(
+        name="Still Camera",
+        description="Leave the camera where it is, so that only streaks drift: a look with Flow",
+    )
     skip_browser: bpy.props.BoolProperty(
         name="Skip Browser",
         description="Start without a file browser",
@@ -123,17 +129,21 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         look = read_look(scene.rosy)
         look = replace(look, supersampling=max(look.supersampling, 2))
         obj = selected_mesh_objects(context)[0]
+        check_still(look, self.still, obj.name)
         depsgraph = context.evaluated_depsgraph_get()
         reading = read_turntable_task(scene, depsgraph, obj, look)
         instance, lights = yield from subtask(reading, 0.0, 0.0)
         size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
-        views = turntable_views(instance, look, self.pictures, size, view_angles, lights=lights)
+        views = turntable_views(
+            instance, look, self.pictures, size, view_angles, lights=lights, still=self.still
+        )
+        cache = Cache()
         with BandWorkers(worker_count(context)) as pool:
             renderer = select_renderer(
-                scene.rosy.device.lower(), look, Cache(), keep_gbuffers=False, workers=pool
+                scene.rosy.device.lower(), look, cache, keep_gbuffers=self.still, workers=pool
             )
             task = turntable_task(
-                renderer, views, self.pictures, path, self.rate, encode_video_task
+                renderer, evicting(views, cache), self.pictures, path, self.rate, encode_video_task
             )
             return (yield from task)
 

@@ -38,7 +38,7 @@ from .scene.blender_images import frame_path, image_data_task, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
 from .scene.keys import update_keys
-from .scene.look_properties import read_look
+from .scene.look_properties import look_at_frame, read_look
 from .scene.picture_state import PictureState, read_picture_states
 from .scene.pictures import (
     ImageSequence,
@@ -247,7 +247,7 @@ def _frame_task(
     pool: BandWorkers,
 ) -> Task[tuple[SceneData, list[_FrameResult]]]:
     """Draw one frame from all cameras."""
-    look = read_look(scene.rosy) if look is None else look
+    look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)
     # The look may be animated, and its method decides which renderer can draw it.
     renderer = cache.get_or_create(
         ("renderer", settings.device, look.method),

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .cache import Cache
 from .color import to_display
-from .compositor.look import Look
+from .compositor.flow import flow_at
+from .compositor.look import Look, has_flow
 from .compositor.shading import Light
 from .errors import RosyError
 from .file_io import write_bytes
@@ -51,8 +53,11 @@ def turntable_views(
     *,
     perspective: bool = True,
     lights: Sequence[Light] = (),
+    still: bool = False,
 ) -> Iterator[ViewInput]:
     """Yield the views of a camera that orbits a mesh once, counter-clockwise.
+
+    Streaks that drift do so by whole cycles, so that the video is a loop.
 
     Parameters
     ----------
@@ -68,17 +73,35 @@ def turntable_views(
     perspective : bool
     lights : sequence of Light
         World space. The camera moves, the lights do not.
+    still : bool
+        Whether the camera stays at the first view, so that only streaks drift.
 
     Yields
     ------
     ViewInput
     """
-    hull = _swept_hull(instance.face_points())
+    points = instance.face_points() if still else _swept_hull(instance.face_points())
     for index in range(count):
-        azimuth = view_angles[0] + 360 * index / count
-        camera = orbit_camera(hull, azimuth, view_angles[1], *size, perspective=perspective)
+        azimuth = view_angles[0] + (0 if still else 360 * index / count)
+        camera = orbit_camera(points, azimuth, view_angles[1], *size, perspective=perspective)
         camera_lights = tuple(light.transformed(camera.view) for light in lights)
-        yield ViewInput((instance,), camera, look, camera_lights)
+        yield ViewInput((instance,), camera, flow_at(look, index, count), camera_lights)
+
+
+def evicting(views: Iterator[ViewInput], cache: Cache) -> Iterator[ViewInput]:
+    """Yield the same views. After each is drawn, evict what it has not used."""
+    for view in views:
+        yield view
+        cache.evict_unused()
+
+
+def check_still(look: Look, still: bool, name: str) -> None:
+    """Raise a `RosyError` if neither the camera nor the streaks of a turntable move."""
+    if still and not has_flow(look):
+        raise RosyError(
+            f"{name}: nothing moves: a still camera needs a look whose flow is above 0, with the method "
+            "sheets and gray streaks"
+        )
 
 
 def turntable_task(

@@ -28,7 +28,14 @@ from ..rendering.band_workers import BandWorkers
 from ..rendering.cpu import CpuRenderer
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.view_input import ViewInput
-from ..turntable_video import Encoder, check_video_path, turntable_task, turntable_views
+from ..turntable_video import (
+    Encoder,
+    check_still,
+    check_video_path,
+    evicting,
+    turntable_task,
+    turntable_views,
+)
 from .field import Field, check_same_surface
 from .generators import form, uv_map
 from .surface import Surface
@@ -244,6 +251,7 @@ def turntable(
     path: str | os.PathLike[str],
     pictures: int = 72,
     rate: float = 24.0,
+    still: bool = False,
     view: tuple[float, float] = DEFAULT_VIEW,
     size: tuple[int, int] = DEFAULT_VIDEO_SIZE,
     orthographic: bool = False,
@@ -268,6 +276,8 @@ def turntable(
         Number of pictures in a full turn, 2 or more.
     rate : float
         Pictures per second.
+    still : bool
+        Whether the camera stays at the first view. The look then needs `flow`, so that streaks drift.
     view : (float, float)
         Azimuth of the first picture, and elevation, in degrees.
     encode : function, optional
@@ -291,6 +301,12 @@ def turntable(
     >>> torus = rf.Surface("torus.obj")
     >>> rf.turntable(torus, path="torus.gif", pictures=2, size=(32, 32)).name
     'torus.gif'
+
+    A loop in which the streaks of a vector field drift:
+
+    >>> field = rf.along_axis(torus, (0, 0, 1), degree=1)
+    >>> rf.turntable(torus, field, path="flow.gif", pictures=2, size=(32, 32), still=True, flow=2).name
+    'flow.gif'
     """
     path = Path(path)
     check_video_path(path)
@@ -300,15 +316,18 @@ def turntable(
         encode = find_ffmpeg()
     sources = {"attribute": tone_values, "image": tone_image}
     look = picture_look(surface.name, preset, settings, sources, color_values is not None)
+    check_still(look, still, surface.name)
     tone = _surface_tone(surface, tone_values, tone_image)
     instance = upright_instance(surface, field, tone, corner_numbers(surface, color_values))
     views = turntable_views(
-        instance, look, pictures, check_size(*size), view, perspective=not orthographic
+        instance, look, pictures, check_size(*size), view, perspective=not orthographic, still=still
     )
     if on_picture is not None:
         views = _announced(views, on_picture)
+    cache = Cache()
     with BandWorkers(workers) as pool:
-        renderer = CpuRenderer(Cache(), keep_gbuffers=False, workers=pool)
+        renderer = CpuRenderer(cache, keep_gbuffers=still, workers=pool)
+        views = evicting(views, cache)
         return run_to_completion(turntable_task(renderer, views, pictures, path, rate, encode))
 
 

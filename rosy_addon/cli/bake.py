@@ -15,7 +15,7 @@ from ..gpu.select import RENDER_DEVICES
 from ..progress import Task
 from .bake_workers import run_workers, uses_workers
 from .extras import Extras
-from .look import add_look_options, requested_look
+from .look import add_flow_option, add_look_options, requested_look
 from .options import add_object_option, add_subcommand, add_workers_option, parse_size
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
@@ -38,6 +38,7 @@ def add_bake_command(subparsers: Any, extras: Extras) -> None:
     )
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
     add_look_options(parser)
+    add_flow_option(parser)
     parser.add_argument(
         "--size", type=parse_size, metavar="WxH", help="size in pixels; by default the scene's"
     )

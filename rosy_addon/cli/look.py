@@ -32,6 +32,19 @@ def add_look_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_flow_option(parser: argparse.ArgumentParser) -> None:
+    """Add --flow, which is short for a setting of the look."""
+    parser.add_argument(
+        "--flow",
+        dest="set",
+        action="append",
+        default=[],
+        type="flow={}".format,
+        metavar="PIXELS",
+        help="let streaks drift along the field by this many pixels per picture, as --set flow=PIXELS does",
+    )
+
+
 def add_color_option(parser: argparse.ArgumentParser) -> None:
     """Add --color-values."""
     parser.add_argument(

@@ -12,7 +12,13 @@ from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIDEO_SIZE, find_ffmpeg
 from ..errors import RosyError
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
 from .extras import Extras
-from .look import add_color_option, add_look_options, add_tone_options, picture_arguments
+from .look import (
+    add_color_option,
+    add_flow_option,
+    add_look_options,
+    add_tone_options,
+    picture_arguments,
+)
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import (
     add_subcommand,
@@ -65,6 +71,12 @@ def add_turntable_command(subparsers: Any, extras: Extras) -> None:
         help="pictures in a full turn (%(default)d)",
     )
     add_rate_option(parser)
+    add_flow_option(parser)
+    parser.add_argument(
+        "--still",
+        action="store_true",
+        help="leave the camera where it is: only streaks drift, as --flow says",
+    )
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
     add_workers_option(parser)
     add_look_options(parser)
@@ -98,6 +110,7 @@ def run_turntable(options: argparse.Namespace) -> None:
         path=options.output,
         pictures=options.pictures,
         rate=options.rate,
+        still=options.still,
         encode=encode,
         on_picture=lambda number: print_line(f"picture {number} of {options.pictures}"),
         **arguments,

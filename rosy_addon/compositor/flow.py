@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .filter_kernel import Kernel, kernel_of, kernel_weights, sample_weights
+from .image_noise import NOISE_MEAN
 from .look import Look, has_flow
 
 #: Channels of noise. Three is the least number for which the squares of the weights have a constant sum.
@@ -40,6 +41,13 @@ MAX_LEVELS = 256
 
 #: Steps between a streamline and the center of a pixel that it passes, at most, along the streamline.
 MAX_AXIAL_STEPS = 2
+
+
+def noise_channel_count(look: Look) -> int:
+    """Return the number of noise channels that a look convolves."""
+    if has_flow(look):
+        return FLOW_CHANNELS
+    return 3 if look.noise == "colour" else 1
 
 
 def cycle_distance(look: Look) -> float:
@@ -95,6 +103,14 @@ def channel_shifts(look: Look) -> np.ndarray:
 def blend_channels(noise: np.ndarray, look: Look) -> np.ndarray:
     """Return the (P, 1) float32 blend of (P, 3) noise around 0, with the variance of one channel."""
     return noise @ channel_weights(look.flow_phase).astype(np.float32)[:, None]
+
+
+def unconvolved_noise(noise: np.ndarray, look: Look) -> np.ndarray:
+    """Return (P, K) noise as it is seen where nothing is convolved: with a single channel if there is flow."""
+    if not has_flow(look):
+        return noise
+    mean = np.float32(NOISE_MEAN)
+    return mean + blend_channels(noise - mean, look)
 
 
 def streamline_reach(look: Look) -> int:

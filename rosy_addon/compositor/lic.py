@@ -12,10 +12,10 @@ from ..progress import Task, run_to_completion, subtask
 from .band import Band
 from .brute_force import brute_force_task
 from .fast_lic import fast_lic_lengths_task, fast_lic_task
-from .flow import FLOW_CHANNELS
+from .flow import noise_channel_count
 from .image_noise import image_noise_task
 from .lic_images import LicImages
-from .look import Look, has_flow
+from .look import Look
 from .member_decomposition import member_decomposition_task
 from .pixel_field import PixelField
 
@@ -84,7 +84,7 @@ def noise_args(look: Look) -> dict[str, Any]:
     return {
         "grain": look.grain,
         "seed": look.seed,
-        "channels": FLOW_CHANNELS if has_flow(look) else 3 if look.noise == "colour" else 1,
+        "channels": noise_channel_count(look),
         "density": look.density,
         "high_pass": look.high_pass,
     }

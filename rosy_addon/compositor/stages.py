@@ -13,11 +13,10 @@ from ..projection.feature_curvatures import feature_curvatures_task
 from ..projection.gbuffer import GBuffer
 from .band import Band, drawn_pixels
 from .even_lines import EvenLines, even_lines_task
-from .flow import blend_channels
-from .image_noise import NOISE_MEAN
+from .flow import unconvolved_noise
 from .lic import lic_lengths_task, look_noise_task, noise_args
 from .lic_images import LicImages
-from .look import Look, has_flow, lic_key
+from .look import Look, lic_key
 from .look_units import cell_size_args
 from .outline import OUTLINE_SETTINGS, outline_task
 from .paper_grain import surface_paper_grain_args
@@ -98,9 +97,7 @@ class ComposeStages:
         noise = yield from self._noise_task(field, look)
         if noise is None:
             noise = yield from look_noise_task(field, look)
-        if has_flow(look):
-            mean = np.float32(NOISE_MEAN)
-            noise = mean + blend_channels(noise - mean, look)
+        noise = unconvolved_noise(noise, look)
         return (yield from undirected_texture_task(field, noise, look.grain))
 
     def even_lines_task(self, field: PixelField, look: Look) -> Task[EvenLines]:

@@ -25,7 +25,7 @@ from ..compositor.fast_lic import (
     streamline_margin,
     strip_count,
 )
-from ..compositor.flow import streamline_reach
+from ..compositor.flow import noise_channel_count, streamline_reach
 from ..compositor.hatching import (
     has_breaks,
     has_outline,
@@ -218,7 +218,7 @@ def picture_memory(view: ViewInput, coverage: Coverage) -> int:
         look = replace(look, supersampling=1)
     look = supersampled_look(look_in_pixels(look, camera, view.instances))
     lines, channels = _lines_and_channels(view.instances)
-    noise_channels = 3 if look.noise == "colour" else 1
+    noise_channels = noise_channel_count(look)
     image_bytes = 4 * (lines + 1) * noise_channels + 8
 
     other_samples = _other_samples(view, visible, triangles)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..color import from_hex, to_hex
+from ..compositor.flow import flow_at
 from ..compositor.look import Look
 from ..settings import Color, Number, Setting, settings_of
+
+if TYPE_CHECKING:
+    import bpy
 
 
 def read_look(settings: Any) -> Look:
@@ -27,6 +31,12 @@ def apply_look(settings: Any, look: Look) -> None:
     for name, setting in settings_of(Look).items():
         value = getattr(look, name)
         setattr(group, name, from_hex(value) if isinstance(setting, Color) else value)
+
+
+def look_at_frame(scene: bpy.types.Scene, look: Look, frame: float) -> Look:
+    """Return the look of a frame, whose streaks may drift. The frame range of the scene is a loop."""
+    count = scene.frame_end - scene.frame_start + 1
+    return flow_at(look, frame - scene.frame_start, count)
 
 
 def matches_look(settings: Any, look: Look) -> bool:

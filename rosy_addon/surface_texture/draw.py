@@ -16,6 +16,7 @@ from ..compositor.color_values import (
 )
 from ..compositor.compose import colorize, layer_task
 from ..compositor.filter_kernel import look_for_symmetry
+from ..compositor.flow import noise_channel_count, with_cycle_distance
 from ..compositor.lic import lic_lengths_task
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
@@ -58,6 +59,9 @@ TEXTURE_SETTINGS = (
         "length",
         "taper",
         "oriented",
+        "flow",
+        "flow_distance",
+        "flow_phase",
         "step",
         "grain",
         "density",
@@ -224,7 +228,7 @@ def draw_texture_task(
     field = yield from subtask(field_task, 0.15, 0.3)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    surface_look = look_for_symmetry(surface_look, field.symmetry)
+    surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"
     if is_direction:
         pixels_task, is_data = direction_map_task(on, content, look.guiding_angle), True
@@ -273,7 +277,7 @@ def _check_texture_memory(
     """Check that there is memory for a texture; see `memory.check_memory`."""
     texels = frame.width * frame.height
     used = min(float((mesh.area * np.abs(charts.density)).sum()) * frame.size**2, texels)
-    lines, is_colored = mesh.family_count, look.noise == "colour"
+    lines, is_colored = mesh.family_count, noise_channel_count(look) > 1
     needed = texels * (TEXEL_BYTES + lines * (COLORED_LINE_BYTES if is_colored else LINE_BYTES))
     needed += used * (CHART_TEXEL_BYTES + lines * CHART_LINE_BYTES * (3 if is_colored else 1))
     if is_hatched(look):

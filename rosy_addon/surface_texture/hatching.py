@@ -16,6 +16,7 @@ from ..compositor.even_lines import (
     has_even_lines,
     resolved_share,
 )
+from ..compositor.flow import unconvolved_noise
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_thresholds import (
@@ -226,7 +227,8 @@ def _lines_task(
         # Spots of one size in texels, as wide as lines where the map is as usual.
         grain = look.grain * on.step * float(np.median(texels_per_unit)) * size
         grain = min(grain, size / MIN_SPOTS)
-        undirected = yield from undirected_texture_task(field, noise, grain)
+        seen_noise = unconvolved_noise(noise, look)
+        undirected = yield from undirected_texture_task(field, seen_noise, grain)
     if has_paper_grain(look):
         paper_grain = yield from subtask(_paper_grain_task(on, field, look), 0.8, 1.0)
     return images, LineModulation(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..compositor.flow import noise_channel_count
 from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
 from ..compositor.look import Look
 from ..compositor.surface_noise import instance_hashes, solid_noise
@@ -49,7 +50,7 @@ def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
     surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
     # Blender units of the world in one of object space.
     scale = matrix_scale(on.instance.matrix)
-    channels = 3 if look.noise == "colour" else 1
+    channels = noise_channel_count(look)
     rest = rest_positions(surface).astype(np.float32)
     triangle_vertex = surface.triangle_vertex
     gradient = (charts.gradient / texels.frame.size).astype(np.complex64)

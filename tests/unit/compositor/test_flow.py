@@ -1,0 +1,171 @@
+"""Drifting streaks, against plain convolutions, and by correlation between frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from rosy_addon.compositor.compose import compose_planar
+from rosy_addon.compositor.drifting_averages import DriftingAverages
+from rosy_addon.compositor.filter_kernel import kernel_of, sample_weights
+from rosy_addon.compositor.flow import (
+    channel_shifts,
+    channel_weights,
+    flow_at,
+    forward_share,
+    moving_kernel,
+    streamline_reach,
+)
+from rosy_addon.compositor.look import Look, has_flow
+
+SIZE = 320
+
+#: Pixels at the border that are not compared: streamlines end there.
+MARGIN = 64
+
+KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
+
+
+def member(angle, degree, look):
+    """Return the image of the first member of a uniform field, around 0."""
+    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look).layers[0]
+    return layer.images.members[0, :, 0].reshape(SIZE, SIZE) - 0.5
+
+
+def inner(image):
+    return image[MARGIN:-MARGIN, MARGIN:-MARGIN]
+
+
+def correlation(first, second):
+    return np.corrcoef(inner(first).ravel(), inner(second).ravel())[0, 1]
+
+
+def best_shift(first, second, direction, expected, reach=3.0):
+    """The shift of an image along a direction that makes it most like another one, in pixels."""
+    shifts = np.arange(expected - reach, expected + reach + 0.01, 0.25)
+    likeness = [
+        correlation(ndimage.shift(first, shift * np.asarray(direction)[::-1]), second)
+        for shift in shifts
+    ]
+    return shifts[int(np.argmax(likeness))]
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+@pytest.mark.parametrize("is_short", [False, True])
+def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
+    look = flow_at(Look(flow=1.0, length=12, **KERNELS[kernel]), 4.3)
+    moving = moving_kernel(look, levels=13 if is_short else 1)
+    steps, count = 40, 5
+    reach = streamline_reach(look)
+    rng = np.random.default_rng(1)
+    noise = rng.normal(size=(3, 2 * steps + 1, count))
+    # E(-1) and the prefix sum up to -1 are 0, by the definition of the sums.
+    prefix = np.cumsum(noise, axis=1)
+    prefix -= prefix[:, steps - 1 : steps]
+    second = np.empty((3, 2 * steps + 3, count))
+    second[:, 2:] = np.cumsum(prefix, axis=1)
+    second[:, 2:] -= second[:, steps + 1 : steps + 2].copy()
+    second[:, 1] = second[:, 2] - prefix[:, 0]
+    second[:, 0] = second[:, 1] - (prefix[:, 0] - noise[:, 0])
+    position, axial = 3, rng.uniform(-0.5, 0.5, count).astype(np.float32)
+    length = np.full(count, 7) if is_short else None
+    forward = np.array([1.0, 0.0, 1.0, 0.25, 0.5], dtype=np.float32)
+    ends = np.full(count, reach), np.full(count, reach)
+    averages = DriftingAverages(moving, second.astype(np.complex64))
+    sums, samples = averages.at(position, axial, length, forward, *ends)
+
+    share = 7 / 12 if is_short else 1.0
+    kernel_length = 7.0 if is_short else 12.0
+    offsets = np.arange(-steps, steps + 1) - position
+    expected = np.zeros(count)
+    for column in range(count):
+        for direction, part in ((1, forward[column]), (-1, 1 - forward[column])):
+            for channel in range(3):
+                center = axial[column] - direction * share * channel_shifts(look)[channel]
+                whole = np.floor(center)
+                low, high = (
+                    sample_weights(direction * (offsets - at), kernel_length, kernel_of(look))
+                    for at in (whole, whole + 1)
+                )
+                weights = low + (center - whole) * (high - low)
+                amount = part * channel_weights(look.flow_phase)[channel]
+                expected[column] += amount * weights @ noise[channel, :, column]
+    # The factor depends on nothing but the shares, where streamlines do not end.
+    factor = sums.real / expected
+    np.testing.assert_allclose(factor[[0, 2]], factor[1], rtol=2e-4)
+    level = round(7) if is_short else 0
+    np.testing.assert_allclose(samples[:3], moving.full_samples[level], rtol=1e-5)
+    assert factor.min() > 0
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.13, 0.5, 0.9])
+def test_channels_have_a_constant_contrast(phase):
+    assert np.square(channel_weights(phase)).sum() == pytest.approx(1)
+
+
+def test_frames_of_a_loop_are_whole_cycles():
+    look = Look(flow=1.3, flow_phase=0.2)
+    first, last = flow_at(look, 0, 50), flow_at(look, 50, 50)
+    assert last.flow_phase == pytest.approx(first.flow_phase)
+    assert first.flow_distance <= look.length
+    cycles = 1.3 * 50 / first.flow_distance
+    assert cycles == pytest.approx(round(cycles))
+    second = flow_at(look, 1, 50)
+    assert (second.flow_phase - first.flow_phase) * first.flow_distance == pytest.approx(1.3)
+
+
+def test_looks_without_flow_stay_as_they_are():
+    for look in (Look(), Look(flow=1.0, method="brute"), Look(flow=1.0, noise="colour")):
+        assert not has_flow(look) and flow_at(look, 7) is look
+
+
+@pytest.mark.parametrize("degree", [1, 3])
+def test_streaks_drift_along_directions(degree):
+    look = Look(flow=1.0, length=20)
+    # The first member is the one nearest to the guiding angle.
+    first, second = (member(0.0, degree, flow_at(look, frame)) for frame in (5, 11))
+    directions = [(1.0, 0.0), (0.0, 1.0)]
+    along, across = (
+        best_shift(first, second, direction, expected, reach)
+        for direction, expected, reach in zip(directions, (6, 0), (3, 0), strict=True)
+    )
+    assert along == pytest.approx(6, rel=0.05) and across == 0
+    moved = ndimage.shift(first, (0, 6))
+    for lateral in (-1, 1):
+        assert correlation(np.roll(moved, lateral, axis=0), second) < 0.7
+
+
+def test_lines_drift_toward_the_guiding_angle():
+    look = Look(flow=1.0, length=20, guiding_angle=np.pi)
+    first, second = (member(0.0, 2, flow_at(look, frame)) for frame in (5, 11))
+    assert best_shift(first, second, (1, 0), -6) == pytest.approx(-6, rel=0.05)
+
+
+def test_lines_across_the_guiding_angle_drift_both_ways():
+    look = Look(flow=1.0, length=20)
+    first, second = (member(np.pi / 2, 2, flow_at(look, frame)) for frame in (5, 11))
+    up, down = (correlation(ndimage.shift(first, (shift, 0)), second) for shift in (6, -6))
+    assert abs(up - down) < 0.1
+    assert forward_share(np.array([0.0, 1.0, -1.0])).tolist() == [0.5, 1.0, 0.0]
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+def test_contrast_is_that_of_still_streaks(degree):
+    look = Look(length=20)
+    still = np.std([inner(member(0.3, degree, replace(look, seed=seed))) for seed in range(3)])
+    for frame in (0, 3, 9):
+        moving = [
+            inner(member(0.3, degree, flow_at(replace(look, flow=1.0, seed=seed), frame)))
+            for seed in range(3)
+        ]
+        assert np.std(moving) == pytest.approx(still, rel=0.06)
+
+
+def test_a_loop_closes():
+    look, count = Look(flow=1.0, length=20), 24
+    frames = [member(0.4, 1, flow_at(look, frame, count)) for frame in (0, 1, 12, 13, count - 1)]
+    neighbors = [correlation(frames[0], frames[1]), correlation(frames[2], frames[3])]
+    assert correlation(frames[-1], frames[0]) > min(neighbors) - 0.01

@@ -19,7 +19,7 @@ from .scene.bake_records import DrawnFrom
 from .scene.blender_images import image_data_task
 from .scene.cameras import CameraSource, render_camera
 from .scene.keys import update_keys
-from .scene.look_properties import read_look
+from .scene.look_properties import look_at_frame, read_look
 from .scene.picture_state import read_picture_states
 from .scene.pictures import (
     BakeResult,
@@ -85,7 +85,9 @@ def bake_task(
         If there is nothing to draw or it cannot be drawn; see `read_views_task`, `select_renderer`,
         `Renderer.render_task` and `check_targets`.
     """
-    look = read_look(scene.rosy) if look is None else look
+    look = look_at_frame(
+        scene, read_look(scene.rosy) if look is None else look, scene.frame_current_final
+    )
     settings = read_output_settings(scene) if settings is None else settings
     draws_thresholds = settings.relight and is_hatched(look)
     if draws_thresholds:

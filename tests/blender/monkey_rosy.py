@@ -387,6 +387,7 @@ def turntable(monkey):
     select_mesh(monkey)
     suffix = monkey.pick([".gif", ".gif", ".gif", ".txt", ""])
     settings = {"pictures": monkey.pick([2, 3]), "width": 16, "height": monkey.pick([16, 40])}
+    settings["still"] = monkey.pick([False, False, True])
     path = monkey.folder / f"turn{suffix}"
     monkey.rosy("turntable", filepath=str(path), film=".gif", skip_browser=True, **settings)
 

@@ -77,6 +77,23 @@ def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
     np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
 
 
+def test_streaks_drift_from_frame_to_frame(moving, tmp_path):
+    """A frame shows the same streaks, whether it is drawn with others, alone, or as a still."""
+    moving.rosy.look.flow, moving.frame_end = 2.0, 20
+    settings = OutputSettings(folder=tmp_path)
+    bake_animation(moving, range(5, 10), settings=settings)
+    together = frames_of(tmp_path)
+    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0009.png")))
+    (again,) = bake_animation(moving, [9], settings=settings)
+    assert again.skipped == (9,) and frames_of(tmp_path) == together
+    moving.frame_set(9)
+    (single,) = bake(moving)
+    np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
+    moving.rosy.look.flow = 0.0
+    (again,) = bake_animation(moving, [9], settings=settings)
+    assert again.rendered == (9,) and frames_of(tmp_path) != together
+
+
 def test_the_frame_and_the_camera_are_restored(moving, tmp_path):
     marker = moving.timeline_markers.new("Other", frame=4)
     marker.camera = add_camera("Other")

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from PIL import Image
 from shapes import icosphere, torus
 
+from rosy_addon.cache import Cache
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.errors import RosyError
@@ -26,7 +27,9 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.cpu import CpuRenderer
 from rosy_addon.turntable_video import (
     VideoWriter,
+    check_still,
     check_video_path,
+    evicting,
     turntable_task,
     turntable_views,
 )
@@ -108,6 +111,27 @@ def test_a_video_has_all_frames(tmp_path):
     assert (actual[0][0, 0] == 255).all(), "on white paper"
     with pytest.raises(RosyError, match=r"must end in .mp4 or .gif"):
         check_video_path(tmp_path / "film.avi")
+
+
+def test_streaks_drift_before_a_still_camera_in_whole_cycles():
+    surface = icosphere(2)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 1))
+    look = Look(length=8, flow=1.5)
+    cache = Cache()
+    renderer = CpuRenderer(cache)
+    views = evicting(turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True), cache)
+    pictures = []
+    for view in views:
+        pictures.append(run_to_completion(renderer.render_task(view)).rgba[..., 0])
+    assert len(pictures) == 12 and len(cache) < 12
+    visible = pictures[0] > 0
+    likeness = [
+        np.corrcoef(picture[visible], following[visible])[0, 1]
+        for picture, following in zip(pictures, [*pictures[1:], pictures[0]], strict=True)
+    ]
+    assert max(likeness) < 0.99 and likeness[-1] > min(likeness[:-1]) - 0.02
+    with pytest.raises(RosyError, match="ball: nothing moves"):
+        check_still(Look(), True, "ball")
 
 
 def test_lights_stay_fixed_while_the_camera_orbits():

@@ -219,6 +219,11 @@ REFUSED = {
         ["turntable", "{mesh}", "-o", "{out}.gif", "--set", "light=scene"],
         "has no lights",
     ),
+    "still without flow": (
+        ["turntable", "{mesh}", "-o", "{out}.gif", "--still"],
+        "nothing moves",
+    ),
+    "flow": (["turntable", "{mesh}", "-o", "{out}.gif", "--flow", "fast"], "expected a number"),
     "value": (
         ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
         "--set length=long: expected a whole",

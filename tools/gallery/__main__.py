@@ -32,6 +32,7 @@ OTHERS = (
     "fields-page",
     "editing-page",
     "figures-page",
+    "motion-page",
     "turntable",
     "listing",
     "simulations-page",

@@ -10,6 +10,7 @@ steps, whatever the length of the streamlines.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -562,11 +563,8 @@ def _cover_all_lines_task(
             break
         # Streamlines that end early cover fewer lines, so the next round needs more seeds.
         lines_per_seed = covered_steps / max(len(seeds), 1) + 1
-        seeds = missing[
-            _low_discrepancy_indices(
-                len(missing), int(RESEED_FACTOR * len(missing) / lines_per_seed) + 1
-            )
-        ]
+        share = RESEED_FACTOR / lines_per_seed
+        seeds = missing[_seed_priority(covering, missing) < share]
     for forward, left in FILL_OFFSETS:
         yield Progress(0.9, STEP_LABEL)
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
@@ -661,9 +659,13 @@ def _even_positions(size: int, spacing: int) -> np.ndarray:
     return ((np.arange(count) + 0.5) * (size / count)).astype(np.intp)
 
 
-def _low_discrepancy_indices(length: int, count: int) -> np.ndarray:
-    """(min(count, length),) intp indices of a list, spread evenly (golden ratio sequence)."""
-    count = min(count, length)
-    index = np.arange(count)
-    position = (index + index * 0.6180339887498949 % 1) * (length / max(count, 1))
-    return np.minimum(position.astype(np.intp), length - 1)
+def _seed_priority(covering: Covering, line: np.ndarray) -> np.ndarray:
+    """(n,) float64 numbers from 0 to 1, of low discrepancy over rows and columns: the seeds are those below a share.
+
+    They depend on nothing but the place of a line. If seeds were counted out of a list, a field that changes a
+    little would get other streamlines everywhere, and its pixels other averages: pictures of a series
+    would flicker.
+    """
+    line_index, cell = np.divmod(line, covering.cell_count)
+    row, column = np.divmod(cell, covering.width)
+    return (math.sqrt(2) * column + math.sqrt(3) * row + math.sqrt(5) * line_index) % 1

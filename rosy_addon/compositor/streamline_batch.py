@@ -34,6 +34,12 @@ MIN_LOOP_STEPS = 256
 #: Pixels within which a state may still be that of the same passage, not a return.
 MIN_LOOP_PIXELS = 4.0
 
+#: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
+PLASTIC_NUMBER = 1.3247179572447460
+
+#: Columns by which the offsets of the seeds of a sheet are shifted against those of the sheet before.
+SHEET_SHIFT = 17
+
 #: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
 MAX_SEAM_OFFSET = np.float32(1.5)
 
@@ -264,7 +270,7 @@ class StreamlineBatch:
         )
         packed_phase = covering.packed_phase.take(cell)
         target_phase = packed_phase + sheet.astype(np.float32)
-        seed_offsets = _r2_offsets(len(seeds))
+        seed_offsets = _r2_offsets(covering, seeds)
         position = np.concatenate([seed_offsets, seed_offsets])
         previous_direction = None
         total = np.zeros((lanes, covering.noise_channels), dtype=np.complex64)
@@ -546,12 +552,17 @@ def _axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.flo
     return along / np.minimum(-step_scale * square, np.float32(-1))
 
 
-def _r2_offsets(count: int) -> np.ndarray:
-    """(count,) complex64 offsets from the center of a pixel, spread evenly (R2 sequence, Roberts).
+def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
+    """(n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
 
     If all streamlines started at the centers, they would step to the next row of pixels at the same
-    time, which is visible.
+    time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. They
+    depend on nothing but the place of a seed, so that streamlines stay where they are if a field changes
+    a little.
     """
-    index, plastic_number = np.arange(count) + 0.5, 1.3247179572447460
-    position = index / plastic_number % 1 + 1j * (index / plastic_number**2 % 1)
+    sheet, cell = np.divmod(seeds, covering.cell_count)
+    row, column = np.divmod(cell, covering.width)
+    row, column = row + 0.5, column + 0.5 + SHEET_SHIFT * sheet
+    near, far = 1 / PLASTIC_NUMBER, 1 / PLASTIC_NUMBER**2
+    position = (near * column + far * row) % 1 + 1j * ((far * column + near * row) % 1)
     return (position - (0.5 + 0.5j)).astype(np.complex64)

@@ -6,6 +6,7 @@ Angles are in radians, except those of a view, which are in degrees.
     field        `Field`: a field on a surface; fields from arrays and files
     generators   fields that are computed
     pictures     pictures and turntables
+    films        films of fields that change with time
     comparison   how fields differ
     figures      fields side by side, with their keys
     drawings     strokes
@@ -28,6 +29,7 @@ from .field import (
     read_field,
 )
 from .figures import figure, save_figures
+from .films import film
 from .generators import (
     along_axis,
     along_uv,
@@ -60,6 +62,7 @@ __all__ = [
     "curvature",
     "features",
     "figure",
+    "film",
     "form",
     "from_angles",
     "from_array",

@@ -323,7 +323,7 @@ def turntable(
         instance, look, pictures, check_size(*size), view, perspective=not orthographic, still=still
     )
     if on_picture is not None:
-        views = _announced(views, on_picture)
+        views = announced(views, on_picture)
     cache = Cache()
     with BandWorkers(workers) as pool:
         renderer = CpuRenderer(cache, keep_gbuffers=still, workers=pool)
@@ -371,10 +371,8 @@ def picture_look(
     return replace(look, tone=given[0]) if given else look
 
 
-def _announced(
-    views: Iterator[ViewInput], on_picture: Callable[[int], None]
-) -> Iterator[ViewInput]:
-    """Yield the same views, and call a function with the number of each before it is drawn."""
+def announced(views: Iterator[ViewInput], on_picture: Callable[[int], None]) -> Iterator[ViewInput]:
+    """Yield the same views, and call a function with the number of each, from 1, before it is drawn."""
     for number, view in enumerate(views, 1):
         on_picture(number)
         yield view

@@ -208,7 +208,7 @@ def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
     RosyError
         As of `read_simulation`, or if a list of files is empty.
     """
-    steps = [step for path in _in_order([Path(path) for path in paths]) for step in _steps_of(path)]
+    steps = [step for path in in_order([Path(path) for path in paths]) for step in _steps_of(path)]
     for step in steps:
         for path in step.paths:
             check_readable(path)
@@ -236,8 +236,8 @@ def build_surface(mesh: SimulationMesh) -> Surface:
     return run_to_completion(surface_task(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE))
 
 
-def _in_order(paths: list[Path]) -> list[Path]:
-    """Sort paths by the numbers in their names, if nothing else differs."""
+def in_order(paths: list[Path]) -> list[Path]:
+    """Return paths sorted by the numbers in their names, if nothing else differs."""
     parts = [re.split(r"(\d+)", str(path)) for path in paths]
     if len({tuple(part[::2]) for part in parts}) > 1:
         return paths

@@ -1,35 +1,39 @@
-"""The command `film`: the steps of a simulation as a video, under one camera."""
+"""The command `film`: the steps of a simulation, or a series of fields, as a video under one camera."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import api
+from ..api.films import MAX_BETWEEN
+from ..api.mesh_objects import MeshArrays
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
 from ..cli.look import add_look_options, requested_preset, requested_settings
-from ..cli.options import add_subcommand, add_workers_option, check_output
+from ..cli.mesh_field import printed_warnings
+from ..cli.options import (
+    add_subcommand,
+    add_workers_option,
+    check_output,
+    int_between,
+    print_note,
+)
 from ..cli.render import add_rate_option, video_encoder
 from ..cli.streams import print_line
 from ..cli.view import add_view_options, requested_size
-from ..compositor.look import Look
 from ..errors import RosyError
-from ..external.simulation_files import SUFFIXES, SimulationMesh, Step, build_surface, list_steps
+from ..external.simulation_files import SUFFIXES, Step, in_order, list_steps
 from ..field.array_field import SurfaceArrays, array_field
-from ..field.rosy_field import RosyField, check_degree
-from ..field.surface import Surface
-from ..progress import run_to_completion
-from ..projection.camera import framing_points, orbit_camera
-from ..projection.gbuffer import MeshInstance
-from ..rendering.band_workers import BandWorkers
-from ..rendering.cpu import CpuRenderer
-from ..rendering.mesh_view import mesh_instance
-from ..rendering.view_input import ViewInput
-from ..turntable_video import check_video_path, turntable_task
+from ..field.field_io import READ_SUFFIXES, load_field
+from ..field.formats.polygons import Polygons
+from ..field.mesh_io import READERS
+from ..field.rosy_field import check_degree
+from ..file_io import check_readable
+from ..turntable_video import check_video_path
 
 
 def add_film_command(subparsers: Any) -> None:
@@ -43,7 +47,8 @@ def add_film_command(subparsers: Any) -> None:
         nargs="+",
         type=Path,
         metavar="SERIES",
-        help=f"a file with several steps, or a file for each step: {', '.join(SUFFIXES)}",
+        help=f"a file with several steps, or a file for each step: {', '.join(SUFFIXES)}; or a mesh file and a "
+        f"field file for each step: {', '.join(READ_SUFFIXES)}",
     )
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
     parser.add_argument(
@@ -55,10 +60,22 @@ def add_film_command(subparsers: Any) -> None:
         "--degree",
         type=int,
         metavar="N",
-        help="degree of a field of vectors, 1 to 12; by default 1",
+        help="degree of the fields, 1 to 12; by default that of the files, 1 for an array of vectors, or 4",
     )
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
+    )
+    parser.add_argument(
+        "--between",
+        type=int_between(0, MAX_BETWEEN),
+        default=0,
+        metavar="N",
+        help="pictures between two steps, for which fields and vertices are interpolated (%(default)d)",
+    )
+    parser.add_argument(
+        "--loop",
+        action="store_true",
+        help="let the first step follow the last one, for films that are shown in a loop",
     )
     add_rate_option(parser)
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
@@ -67,125 +84,155 @@ def add_film_command(subparsers: Any) -> None:
 
 
 def run_film(options: argparse.Namespace) -> None:
-    """Draw the steps of a simulation under one camera, as a video."""
+    """Draw the steps of a simulation, or a series of fields, under one camera, as a video."""
     check_output(options)
     check_video_path(options.output)
     if options.degree is not None:
         check_degree(options.degree)
+    preset, settings = requested_preset(options), requested_settings(options)
+    # Mistakes are reported before the files are read.
+    picture_look(str(options.series[0]), preset, settings, {})
     encode = video_encoder(options)
-    name = str(options.series[0])
-    look = picture_look(name, requested_preset(options), requested_settings(options), {})
+    fields = requested_fields(options)
+    count, stride = len(fields), options.between + 1
+    pictures = (count - (not options.loop)) * stride + (not options.loop)
+
+    def announce(number: int) -> None:
+        if stride > 1:
+            print_line(f"picture {number} of {pictures}")
+        else:
+            print_line(f"step {number} of {count}{fields.time_text(number - 1)}")
+
+    with printed_warnings():
+        api.film(
+            fields,
+            options.output,
+            between=options.between,
+            loop=options.loop,
+            rate=options.rate,
+            view=options.view,
+            size=requested_size(options),
+            orthographic=options.ortho,
+            preset=preset,
+            workers=options.workers,
+            encode=encode,
+            on_picture=announce,
+            **settings,
+        )
+
+
+def requested_fields(options: argparse.Namespace) -> SimulationFields | FieldFiles:
+    """Return the fields of the files of a series.
+
+    Raises
+    ------
+    RosyError
+        If there is one step only, or a file is missing or of another kind.
+    """
+    name, *others = options.series
+    nonfinite = "zero" if options.undefined else "error"
+    has_mesh = name.suffix.lower() in READERS
+    if has_mesh or any(path.suffix.lower() in READ_SUFFIXES for path in others):
+        if options.array is not None:
+            raise RosyError(f"{name}: --array applies only to files of simulations, such as .vtu")
+        if len(others) < 2:
+            raise RosyError(
+                f"{name}: a film needs 2 or more field files after the mesh, not {len(others)}"
+            )
+        surface = api.Surface(name, up=options.up)
+        return FieldFiles(surface, in_order(others), options.degree, nonfinite)
     steps = list_steps(options.series)
     if len(steps) < 2:
         raise RosyError(f"{name}: has one step only: draw it with the command render")
-    film = Film(
-        steps,
-        look,
-        options.view,
-        requested_size(options),
-        array=options.array,
-        degree=options.degree,
-        nonfinite="zero" if options.undefined else "error",
-        up=options.up or "z",
-        perspective=not options.ortho,
-    )
-    with BandWorkers(options.workers) as pool:
-        task = turntable_task(
-            CpuRenderer(workers=pool),
-            film.views(),
-            len(steps),
-            options.output,
-            options.rate,
-            encode,
-        )
-        run_to_completion(task)
+    return SimulationFields(steps, options.array, options.degree, nonfinite, options.up or "z")
 
 
-class Film:
-    """The views of the steps of a series, under one camera that frames all of them.
+class FieldFiles(Sequence[api.Field]):
+    """The fields of files, on one surface. A file is read each time that its field is asked for.
 
-    The steps are read twice: first for the camera and the range of magnitudes, then to be drawn. One
-    is in memory at a time, with the polygons of the step before it.
+    Parameters
+    ----------
+    surface : Surface
+    paths : sequence of Path
+    degree, nonfinite
+        See `api.read_field`. By default the degree is that of the first field.
+    """
+
+    def __init__(
+        self,
+        surface: api.Surface,
+        paths: Sequence[Path],
+        degree: int | None = None,
+        nonfinite: str = "error",
+    ) -> None:
+        self._surface, self._paths = surface, paths
+        self._degree, self._nonfinite = degree, nonfinite
+        self._noted: set[int] = set()
+        for path in paths:
+            check_readable(path)
+
+    def __len__(self) -> int:
+        return len(self._paths)
+
+    def __getitem__(self, index: Any) -> Any:
+        path = self._paths[index]
+        loaded = load_field(path, self._surface.mesh, self._degree, self._nonfinite)
+        field = loaded.field
+        if self._degree is None:
+            self._degree = field.degree
+        if field.degree != self._degree:
+            raise RosyError(
+                f"{path}: the field has degree {field.degree}, but {self._paths[0]} has {self._degree}"
+            )
+        if index not in self._noted:
+            self._noted.add(index)
+            print_note(loaded.note)
+        return api.Field(self._surface, field)
+
+    def time_text(self, index: int) -> str:
+        """Return the name of the file, for the line that is printed."""
+        return f", {self._paths[index].name}"
+
+
+class SimulationFields(Sequence[api.Field]):
+    """The fields of the steps of a simulation. A step is read each time that its field is asked for.
 
     Parameters
     ----------
     steps : sequence of Step
-    look : Look
-        If it shows magnitudes and has no range of its own, their range is that of all steps.
-    view_angles : (float, float)
-        Azimuth and elevation in degrees, see `orbit_camera`.
-    size : (int, int)
-        Pixels.
     array, degree, nonfinite
         See `field.array_field.array_field_task`.
     up : {"y", "z"}
         The upward axis of the meshes.
-    perspective : bool
     """
 
     def __init__(
         self,
         steps: Sequence[Step],
-        look: Look,
-        view_angles: tuple[float, float],
-        size: tuple[int, int],
-        *,
         array: str | None = None,
         degree: int | None = None,
         nonfinite: str = "error",
         up: str = "z",
-        perspective: bool = True,
     ) -> None:
-        self._steps, self._look, self._up = steps, look, up
-        self._framing = (*view_angles, *size)
-        self._perspective = perspective
+        self._steps, self._up = steps, up
         self._field_options = (array, degree, nonfinite)
-        self._last: tuple[SimulationMesh, Surface] | None = None
+        self._last: tuple[Polygons, api.Surface] | None = None
 
-    def views(self) -> Iterator[ViewInput]:
-        """Yield the view of each step, and print a line before it is drawn.
+    def __len__(self) -> int:
+        return len(self._steps)
 
-        Raises
-        ------
-        RosyError
-            If a step cannot be read, or has no such field. This is found before the first view.
-        """
-        points, look = self._survey()
-        camera = orbit_camera(points, *self._framing, perspective=self._perspective)
-        for number, step in enumerate(self._steps, 1):
-            instance = self._instance(step)
-            time = "" if step.time is None else f", time {step.time:g}"
-            print_line(f"step {number} of {len(self._steps)}{time}")
-            yield ViewInput((instance,), camera, look)
+    def __getitem__(self, index: Any) -> Any:
+        mesh = self._steps[index].read()
+        polygons = mesh.polygons
+        # If the mesh is that of the last step, its surface is used again.
+        if self._last is None or not all(map(np.array_equal, polygons, self._last[0])):
+            arrays = MeshArrays(*polygons)
+            self._last = polygons, api.Surface(arrays, name=mesh.name, up=self._up)
+        surface = self._last[1]
+        arrays = SurfaceArrays(mesh.name, surface.mesh, mesh.point_arrays, mesh.cell_arrays)
+        return api.Field(surface, array_field(arrays, *self._field_options))
 
-    def _survey(self) -> tuple[np.ndarray, Look]:
-        """Return points that determine the camera, and the look with the range of magnitudes."""
-        shows_magnitude = self._look.magnitude != "none" and not self._look.magnitude_range
-        points, top = np.zeros((0, 3)), 0.0
-        for step in self._steps:
-            instance = self._instance(step)
-            top = max(top, float(instance.field.magnitude.max()))
-            points = np.concatenate([points, instance.face_points()])
-            points = framing_points(points, *self._framing, perspective=self._perspective)
-        return points, replace(self._look, magnitude_range=top) if shows_magnitude else self._look
-
-    def _instance(self, step: Step) -> MeshInstance:
-        """Read a step."""
-        surface, field = self._read(step)
-        return mesh_instance(surface, field, self._up)
-
-    def _read(self, step: Step) -> tuple[Surface, RosyField]:
-        """Read a step. If the mesh is that of the last step, the surface is used again."""
-        mesh = step.read()
-        if self._last is not None and _have_same_polygons(mesh, self._last[0]):
-            surface = self._last[1]
-        else:
-            surface = build_surface(mesh)
-        self._last = replace(mesh, point_arrays={}, cell_arrays={}), surface
-        arrays = SurfaceArrays(mesh.name, surface, mesh.point_arrays, mesh.cell_arrays)
-        return surface, array_field(arrays, *self._field_options)
-
-
-def _have_same_polygons(first: SimulationMesh, second: SimulationMesh) -> bool:
-    """Return whether two meshes have the same vertices and faces."""
-    return all(map(np.array_equal, first.polygons, second.polygons))
+    def time_text(self, index: int) -> str:
+        """Return the time of a step, for the line that is printed; empty if the files state none."""
+        time = self._steps[index].time
+        return "" if time is None else f", time {time:g}"

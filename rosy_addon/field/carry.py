@@ -67,6 +67,45 @@ def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.nda
     return result
 
 
+def vectors_on_rest_shape(
+    surface: Surface, rest_vertices: np.ndarray, vectors: np.ndarray
+) -> np.ndarray:
+    """Return the vectors on the faces of a rest shape that renderers transport to given ones.
+
+    The linear map from the corners w of a rest face to the corners u of the deformed face of least squared
+    error, u = a w + b conj(w), has the polar rotation a / |a|. Its inverse is applied.
+
+    Parameters
+    ----------
+    surface : Surface
+        The deformed mesh.
+    rest_vertices : (V, 3) ndarray
+        The positions of its vertices in the rest shape.
+    vectors : (F, 3) ndarray
+        Tangent vectors on the deformed faces.
+
+    Returns
+    -------
+    (F, 3) float64 ndarray
+        Of the same lengths. Zero on faces without area in one of the shapes.
+
+    See Also
+    --------
+    rosy_addon.projection.face_values : The transport.
+    """
+    rest = replace(surface, vertices=rest_vertices, rest_vertices=None)
+    (rest_x, rest_y), w = _planar_corners(rest)
+    (x, y), u = _planar_corners(surface)
+    face, count = surface.corner_face, surface.face_count
+    squared_norm = np.bincount(face, np.abs(w) ** 2, count)
+    ww, uw = (complex_bincount(face, product, count) for product in (w * w, u * w))
+    rotation = squared_norm * complex_bincount(face, u * w.conj(), count) - ww.conj() * uw
+    modulus = np.abs(rotation)
+    rotation = np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
+    z = (dot(vectors, x) + 1j * dot(vectors, y)) * rotation.conj()
+    return z.real[:, None] * rest_x + z.imag[:, None] * rest_y
+
+
 def _planar_corners(surface: Surface) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
     """The tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
     x, y = tangent_frame(surface.face_normal)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from rosy_addon.api.films import Film
 from rosy_addon.cli.parser import main as cli_main
 from rosy_addon.compositor.look import Look
 from rosy_addon.external.simulation_files import (
@@ -20,7 +21,7 @@ from rosy_addon.external.simulation_files import (
     list_steps,
     read_simulation,
 )
-from rosy_addon.extras.film import Film
+from rosy_addon.extras.film import SimulationFields
 from rosy_addon.field.array_field import SurfaceArrays, array_field
 from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.cpu import CpuRenderer
@@ -174,7 +175,7 @@ def test_film_has_one_camera_and_one_range(growing):
     """The largest step fills the frame. The range is the largest magnitude of all steps."""
     look = Look(length=8, magnitude="colour")
     steps = list_steps(growing)[::-1]
-    views = list(Film(steps, look, (30.0, 20.0), (60, 50)).views())
+    views = list(Film(SimulationFields(steps), look, (30.0, 20.0), (60, 50)).views())
     assert len({id(view.camera) for view in views}) == 1
     fields = [view.instances[0].field for view in views]
     assert {view.look.magnitude_range for view in views} == {fields[0].magnitude.max()}
@@ -188,12 +189,12 @@ def test_film_has_one_camera_and_one_range(growing):
     pictures = [run_to_completion(CpuRenderer().render_task(v)) for v in (views[0], expected)]
     assert pictures[0].rgba == pytest.approx(pictures[1].rgba, abs=1e-4)
     given = Look(magnitude="length", magnitude_range=3.0)
-    film = Film(steps[:2], given, (0.0, 0.0), (60, 50))
+    film = Film(SimulationFields(steps[:2]), given, (0.0, 0.0), (60, 50))
     assert {view.look.magnitude_range for view in film.views()} == {3.0}
 
 
 def test_film_keeps_one_step_in_memory(growing):
-    for _ in Film(list_steps(growing), Look(), (0.0, 0.0), (60, 50)).views():
+    for _ in Film(SimulationFields(list_steps(growing)), Look(), (0.0, 0.0), (60, 50)).views():
         meshes = [found for found in gc.get_objects() if isinstance(found, SimulationMesh)]
         assert sum(bool(mesh.point_arrays) for mesh in meshes) <= 1
 

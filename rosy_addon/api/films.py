@@ -1,0 +1,339 @@
+"""Films: the fields of a series under one camera, as a video."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cache import Cache
+from ..compositor.flow import flow_at
+from ..compositor.look import Look
+from ..errors import RosyError, counted
+from ..field.carry import vectors_on_rest_shape
+from ..field.frames import normalize
+from ..field.interpolation import have_same_polygons, interpolate_fields
+from ..field.representation import face_representation
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface as PolygonMesh
+from ..field.surface import face_area_vectors
+from ..progress import run_to_completion
+from ..projection.camera import check_size, framing_points, orbit_camera
+from ..rendering.band_workers import BandWorkers
+from ..rendering.cpu import CpuRenderer
+from ..rendering.mesh_view import mesh_instance
+from ..rendering.view_input import ViewInput
+from ..turntable_video import Encoder, check_video_path, turntable_task
+from .field import Field, warn
+from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, announced, find_ffmpeg, picture_look
+
+#: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
+#: divided by the width of lines. The correlation of the two pictures is then 0.9.
+STEADY_TURN = 0.3
+
+#: Pictures between two fields, at most.
+MAX_BETWEEN = 1000
+
+
+def film(
+    fields: Sequence[Field],
+    path: str | os.PathLike[str],
+    *,
+    between: int = 0,
+    loop: bool = False,
+    rate: float = 24.0,
+    view: tuple[float, float] = DEFAULT_VIEW,
+    size: tuple[int, int] = DEFAULT_VIDEO_SIZE,
+    orthographic: bool = False,
+    preset: str | os.PathLike[str] | None = None,
+    workers: int = 0,
+    encode: Encoder | None = None,
+    on_picture: Callable[[int], None] | None = None,
+    **settings: Any,
+) -> Path:
+    """Draw a field that changes with time as a video, under one camera.
+
+    With the setting `flow`, streaks drift along the field while it changes. If the mesh moves and keeps its
+    polygons, the noise moves with it, unless the setting `anchor` says otherwise.
+
+    Parameters
+    ----------
+    fields : sequence of Field
+        Two or more of the same degree, on one surface or on a surface each. The items are asked for twice:
+        for the camera and the range of magnitudes, and to be drawn. Two are kept at most, so the sequence may
+        read files.
+    path : path-like
+        A ``.gif``, or an ``.mp4`` if there is an encoder.
+    between : int
+        Pictures between two fields, for which the fields and the vertices are interpolated. The surfaces must
+        then have the same polygons. Streaks flicker if the field turns by more than a half degree or so from
+        picture to picture.
+    loop : bool
+        The first field follows the last one again: the film, shown in a loop, has no seam.
+    rate : float
+        Pictures per second.
+    view, size, orthographic, preset, workers, **settings
+        As for `render`.
+    encode, on_picture
+        As for `turntable`.
+
+    Returns
+    -------
+    Path
+        The file. It is written after the last picture.
+
+    Warns
+    -----
+    RosyWarning
+        If the field turns too fast for steady streaks, with the number of pictures between two fields that
+        keeps them steady.
+
+    Raises
+    ------
+    RosyError
+        If there is one field only, they differ in their degrees or, with pictures between them, in their
+        polygons; or as of `turntable`.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> torus = rf.Surface("torus.obj")
+    >>> fields = [rf.smoothest(torus).rotated(0.01 * step) for step in range(2)]
+    >>> rf.film(fields, "film.gif", between=1, size=(32, 32)).name
+    'film.gif'
+    """
+    path = Path(path)
+    check_video_path(path)
+    if not rate > 0:
+        raise RosyError(f"{path}: a film needs a rate above 0")
+    if path.suffix.lower() == ".mp4" and encode is None:
+        encode = find_ffmpeg()
+    look = picture_look(str(path), preset, settings, {})
+    series = Film(
+        fields,
+        look,
+        view,
+        check_size(*size),
+        between=between,
+        loop=loop,
+        perspective=not orthographic,
+        keeps_anchor="anchor" in settings,
+        name=str(path),
+    )
+    views = series.views()
+    if on_picture is not None:
+        views = announced(views, on_picture)
+    with BandWorkers(workers) as pool:
+        renderer = CpuRenderer(Cache(), keep_gbuffers=False, workers=pool)
+        task = turntable_task(renderer, views, series.picture_count, path, rate, encode)
+        result = run_to_completion(task)
+    warn(series.advice)
+    return result
+
+
+class _Survey(NamedTuple):
+    """What a film must know about all of its fields before the first picture.
+
+    Attributes
+    ----------
+    points : (n, 3) float64 ndarray
+        World space; they determine the camera.
+    largest_magnitude : float
+    turn : float
+        Largest mean angle between neighboring fields, in radians.
+    rest_vertices : (V, 3) float64 ndarray or None
+        The vertices of the first surface, if the others have the same polygons and other vertices.
+    """
+
+    points: NDArray[np.float64]
+    largest_magnitude: float
+    turn: float
+    rest_vertices: NDArray[np.float64] | None
+
+
+class Film:
+    """The views of the fields of a series, under one camera that frames all of them.
+
+    Parameters
+    ----------
+    fields : sequence of Field
+        See `film`.
+    look : Look
+        Of the first picture. If it shows magnitudes and has no range of its own, their range is that of all
+        fields.
+    view_angles : (float, float)
+        Azimuth and elevation in degrees, see `orbit_camera`.
+    size : (int, int)
+        Pixels.
+    between : int
+        Pictures between two fields.
+    loop : bool
+        Whether the first field follows the last one.
+    perspective : bool
+    keeps_anchor : bool
+        Whether the noise is anchored as the look says, even if the mesh moves.
+    name : str
+        For messages.
+
+    Raises
+    ------
+    RosyError
+        If there is one field only.
+    """
+
+    def __init__(
+        self,
+        fields: Sequence[Field],
+        look: Look,
+        view_angles: tuple[float, float],
+        size: tuple[int, int],
+        *,
+        between: int = 0,
+        loop: bool = False,
+        perspective: bool = True,
+        keeps_anchor: bool = False,
+        name: str = "film",
+    ) -> None:
+        if len(fields) < 2:
+            raise RosyError(f"{name}: a film needs 2 fields or more")
+        if not 0 <= between <= MAX_BETWEEN:
+            raise RosyError(f"{name}: between must be from 0 to {MAX_BETWEEN}, not {between}")
+        self._fields, self._look, self._between, self._loop = fields, look, between, loop
+        self._framing = (*view_angles, *size)
+        self._perspective, self._keeps_anchor = perspective, keeps_anchor
+        #: What the user should know about the motion after the first view; may be empty.
+        self.advice = ""
+
+    @property
+    def picture_count(self) -> int:
+        """The number of views."""
+        intervals = len(self._fields) - (not self._loop)
+        return intervals * (self._between + 1) + (not self._loop)
+
+    def views(self) -> Iterator[ViewInput]:
+        """Yield the views.
+
+        Raises
+        ------
+        RosyError
+            As of `film`. What is wrong with a field is found before the first view.
+        """
+        survey, look = self._survey(), self._look
+        if look.magnitude != "none" and not look.magnitude_range:
+            look = replace(look, magnitude_range=survey.largest_magnitude)
+        rest = survey.rest_vertices
+        if rest is not None and not self._keeps_anchor:
+            look = replace(look, anchor="surface")
+        rest = rest if look.anchor == "surface" else None
+        self.advice = _advice(survey.turn, self._between, look)
+        camera = orbit_camera(survey.points, *self._framing, perspective=self._perspective)
+        loop_frames = self.picture_count if self._loop else 0
+        for number, (surface, field, up) in enumerate(self._moments()):
+            if rest is not None:
+                vectors = vectors_on_rest_shape(surface, rest, field.vectors)
+                field = replace(field, vectors=vectors, source_directions=None)
+                surface = replace(surface, rest_vertices=rest)
+            frame_look = flow_at(look, number, loop_frames)
+            yield ViewInput((mesh_instance(surface, field, up),), camera, frame_look)
+
+    def _moments(self) -> Iterator[tuple[PolygonMesh, RosyField, str]]:
+        """Yield the meshes and fields of the pictures, with their upward axes."""
+        count, stop = len(self._fields), self._between + 1
+        previous = self._fields[0]
+        for number in range(1, count + self._loop):
+            field = self._fields[number % count]
+            start = previous.surface.mesh, previous.rosy
+            yield *start, previous.surface.up
+            for index in range(1, stop):
+                share, end = index / stop, (field.surface.mesh, field.rosy)
+                mesh = _mesh_between(start[0], end[0], share)
+                yield mesh, interpolate_fields(start, end, share, mesh), previous.surface.up
+            previous = field
+        if not self._loop:
+            yield previous.surface.mesh, previous.rosy, previous.surface.up
+
+    def _survey(self) -> _Survey:
+        """Look at all fields."""
+        points, largest, turn = np.zeros((0, 3)), 0.0, 0.0
+        first = previous = self._fields[0]
+        keeps_polygons, moves = True, False
+        for number in range(len(self._fields)):
+            field = previous if number == 0 else self._fields[number]
+            has_same = self._check(number, field, previous)
+            keeps_polygons &= has_same
+            mesh = field.surface.mesh
+            if keeps_polygons and mesh is not first.surface.mesh:
+                moves |= not np.array_equal(mesh.vertices, first.surface.mesh.vertices)
+            if has_same:
+                turn = max(turn, _mean_turn(previous, field))
+            largest = max(largest, float(field.magnitude.max()))
+            if number == 0 or mesh is not previous.surface.mesh:
+                instance = mesh_instance(mesh, field.rosy, field.surface.up)
+                points = np.concatenate([points, instance.face_points()])
+                points = framing_points(points, *self._framing, perspective=self._perspective)
+            previous = field
+        if self._loop and self._check(0, first, previous):
+            turn = max(turn, _mean_turn(previous, first))
+        rest = first.surface.mesh.vertices if keeps_polygons and moves else None
+        return _Survey(points, largest, turn, rest)
+
+    def _check(self, number: int, field: Field, previous: Field) -> bool:
+        """Return whether a field has the polygons of the one before it.
+
+        Raises
+        ------
+        RosyError
+            If it has another degree, or must have the same polygons and does not.
+        """
+        name = f"{field.surface.name}: field {number + 1} of {len(self._fields)}"
+        if field.degree != previous.degree:
+            raise RosyError(
+                f"{name} has degree {field.degree}, but the one before it {previous.degree}"
+            )
+        mesh, other = field.surface.mesh, previous.surface.mesh
+        has_same = mesh is other or have_same_polygons(mesh, other)
+        if self._between and not has_same:
+            raise RosyError(
+                f"{name} has other polygons than the one before it ({counted(mesh.face_count, 'face')} after "
+                f"{other.face_count:,}): there can be no pictures between them"
+            )
+        return has_same
+
+
+def _mesh_between(first: PolygonMesh, second: PolygonMesh, share: float) -> PolygonMesh:
+    """Return a mesh between two with the same polygons. Fans and triangles are those of the first."""
+    if first is second:
+        return first
+    vertices = (1 - share) * first.vertices + share * second.vertices
+    normal = normalize((1 - share) * first.corner_normal + share * second.corner_normal)
+    return replace(first, vertices=vertices, corner_normal=normal)
+
+
+def _mean_turn(first: Field, second: Field) -> float:
+    """Return the mean angle in radians between two fields on the same polygons, weighted by area."""
+    mesh = second.surface.mesh
+    z, other = (face_representation(field.surface.mesh, field.rosy) for field in (first, second))
+    vectors = face_area_vectors(mesh.vertices, mesh.corner_vertex, mesh.face_start)
+    weight = np.linalg.norm(vectors, axis=1) * ((z != 0) & (other != 0))
+    angle = np.abs(np.angle(z * other.conj())) / first.degree
+    return float((weight * angle).sum() / max(weight.sum(), 1e-300))
+
+
+def _advice(turn: float, between: int, look: Look) -> str:
+    """Return how many pictures between two fields keep streaks steady, if there are too few."""
+    if look.unit != "pixels":
+        return ""
+    steady = STEADY_TURN * look.grain / (look.length * look.step)
+    needed = min(int(np.ceil(turn / steady - 1e-9)) - 1, MAX_BETWEEN)
+    if needed <= between:
+        return ""
+    return (
+        f"the field turns by up to {np.degrees(turn / (between + 1)):.1f} degrees from picture to picture, "
+        f"by which streaks flicker: {needed} pictures between two fields keep them steady, and so do shorter "
+        "streaks"
+    )

@@ -552,6 +552,7 @@ def _cover_all_lines_task(
     seeds = _grid_seeds(covering, averages[0], spacing)
     batch_size = _batch_size(half_window + streamline_reach(look))
     batch = StreamlineBatch(covering, looks, step_limits, half_window, batch_size, fine)
+    threshold = 0.0
     for _ in range(MAX_ROUNDS):
         covered_steps = 0
         for batch_seeds in _batches(seeds, batch_size):
@@ -563,8 +564,10 @@ def _cover_all_lines_task(
             break
         # Streamlines that end early cover fewer lines, so the next round needs more seeds.
         lines_per_seed = covered_steps / max(len(seeds), 1) + 1
-        share = RESEED_FACTOR / lines_per_seed
-        seeds = missing[_seed_priority(covering, missing) < share]
+        # Lines below the threshold were seeds already.
+        last, threshold = threshold, threshold + (1 - threshold) * RESEED_FACTOR / lines_per_seed
+        priority = _seed_priority(covering, missing)
+        seeds = missing[(priority >= last) & (priority < threshold)]
     for forward, left in FILL_OFFSETS:
         yield Progress(0.9, STEP_LABEL)
         (source,) = covering.neighbor_lines(missing, [(forward, left)])

@@ -266,3 +266,15 @@ def test_an_undefined_field_shows_its_noise():
     images = fast_images(field)
     assert (images.effective_samples == 1).all()
     assert np.isfinite(images.blend).all()
+
+
+@pytest.mark.parametrize("degree", [1, 4])
+def test_fields_that_change_a_little_keep_their_streamlines(degree):
+    """Pictures of a series do not flicker: pixels keep the streamline from which they take their average."""
+    x, y = pixel_centers(SIZE)
+    angle = pair_angle(x, y, SIZE, degree)
+    first, second = (
+        fast_images(planar_pixel_field(angle + np.radians(turn), degree)).members.ravel()
+        for turn in (0.0, 0.02)
+    )
+    assert np.corrcoef(first, second)[0, 1] > 0.975

@@ -133,6 +133,10 @@ def requested_fields(options: argparse.Namespace) -> SimulationFields | FieldFil
     nonfinite = "zero" if options.undefined else "error"
     has_mesh = name.suffix.lower() in READERS
     if has_mesh or any(path.suffix.lower() in READ_SUFFIXES for path in others):
+        if not has_mesh and name.suffix.lower() not in SUFFIXES:
+            raise RosyError(
+                f"{name}: is not a mesh file: name the mesh first, then the field files"
+            )
         if options.array is not None:
             raise RosyError(f"{name}: --array applies only to files of simulations, such as .vtu")
         if len(others) < 2:
@@ -167,6 +171,7 @@ class FieldFiles(Sequence[api.Field]):
     ) -> None:
         self._surface, self._paths = surface, paths
         self._degree, self._nonfinite = degree, nonfinite
+        self._first_degree: int | None = None
         self._noted: set[int] = set()
         for path in paths:
             check_readable(path)
@@ -178,11 +183,12 @@ class FieldFiles(Sequence[api.Field]):
         path = self._paths[index]
         loaded = load_field(path, self._surface.mesh, self._degree, self._nonfinite)
         field = loaded.field
-        if self._degree is None:
-            self._degree = field.degree
-        if field.degree != self._degree:
+        if self._first_degree is None:
+            self._first_degree = field.degree
+        if field.degree != self._first_degree:
             raise RosyError(
-                f"{path}: the field has degree {field.degree}, but {self._paths[0]} has {self._degree}"
+                f"{path}: the field has degree {field.degree}, but {self._paths[0]} has "
+                f"{self._first_degree}"
             )
         if index not in self._noted:
             self._noted.add(index)

@@ -97,6 +97,8 @@ def vectors_on_rest_shape(
     (rest_x, rest_y), w = _planar_corners(rest)
     (x, y), u = _planar_corners(surface)
     face, count = surface.corner_face, surface.face_count
+    # Relative to the first corner of the face, as in the transport.
+    w, u = (offset - offset[surface.face_start[:-1]][face] for offset in (w, u))
     squared_norm = np.bincount(face, np.abs(w) ** 2, count)
     ww, uw = (complex_bincount(face, product, count) for product in (w * w, u * w))
     rotation = squared_norm * complex_bincount(face, u * w.conj(), count) - ww.conj() * uw

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from rosy_addon import api as rf
 from rosy_addon.api.films import Film
 from rosy_addon.cli.parser import main as cli_main
 from rosy_addon.compositor.look import Look
@@ -206,3 +207,57 @@ def test_film_errors(rosy, growing, tmp_path):
     assert status == 2 and "must end in .mp4 or .gif" in errors
     status, output, errors = rosy("film", *growing, "-o", tmp_path / "a.gif", "--array", "U")
     assert (status, output) == (2, "") and "step1.vtp: there is no array 'U'" in errors
+
+
+@pytest.fixture
+def turning(tmp_path):
+    """A square and 12 fields on it, each in a file of its own."""
+    surface = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 0, -1], [0, 0, -1]], [[0, 1, 2, 3]], up="y")
+    (tmp_path / "square.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nf 1 2 3 4\n", encoding="utf-8"
+    )
+    field = rf.along_axis(surface, (1, 0, 0), 1)
+    for number in range(1, 13):
+        field.rotated(np.radians(number)).save(tmp_path / f"field{number}.rosy")
+    return tmp_path
+
+
+def test_film_of_fields(rosy, turning):
+    """The mesh, then a field for each step, in the order of the numbers; the last one leads to the first."""
+    files = sorted(turning.glob("field*.rosy"))
+    words = ("film", turning / "square.obj", *files, "--view", "0,90", "--size", "48x48")
+    words += ("--set", "length=8", "--set", "flow=1", "-o", turning / "a.gif", "--workers", 1)
+    status, lines, errors = rosy(*words)
+    assert (status, errors) == (0, "")
+    expected = [f"step {number} of 12, field{number}.rosy" for number in range(1, 13)]
+    assert lines.splitlines() == expected
+    status, lines, errors = rosy(*words, "--between", 1, "--loop")
+    assert status == 0 and lines.splitlines()[-1] == "picture 24 of 24"
+    assert "the field turns by up to 5.5 degrees from picture to picture" in errors
+    with Image.open(turning / "a.gif") as gif:
+        assert gif.n_frames == 24
+
+
+def test_film_of_fields_errors(rosy, turning, monkeypatch):
+    monkeypatch.chdir(turning)
+    Path("short.rosy").write_text("3 1\n1 0 0\n1 0 0\n1 0 0\n", encoding="utf-8")
+    rosy("field", "square.obj", "--generate", "axis", "--axis", "1,0,0", "-o", "cross.rosy")
+    for files, message in (
+        (("square.obj", "field1.rosy"), "square.obj: a film needs 2 or more field files after"),
+        (
+            ("square.obj", "field1.rosy", "short.rosy"),
+            "short.rosy: contains 3 rows, but square.obj",
+        ),
+        (
+            ("square.obj", "field1.rosy", "cross.rosy"),
+            "cross.rosy: the field has degree 4, but field1.rosy has 1",
+        ),
+        (("square.obj", "field1.rosy", "none.rosy"), "none.rosy: cannot be read: no such file"),
+        (("field1.rosy", "field2.rosy"), "field1.rosy: is not a mesh file: name the mesh first"),
+        (
+            ("square.obj", "field1.rosy", "field2.rosy", "--array", "U"),
+            "square.obj: --array applies only to files of simulations",
+        ),
+    ):
+        status, output, errors = rosy("film", *files, "-o", "a.gif")
+        assert (status, output) == (2, "") and message in errors and errors.count("\n") == 1

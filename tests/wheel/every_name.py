@@ -75,7 +75,7 @@ def fields(cube: rf.Surface, folder: Path) -> rf.Field:
 
 
 def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
-    """A picture, strokes and a turntable."""
+    """A picture, strokes, a turntable and a film."""
     presets: dict[str, str] = rf.list_presets()
     picture: rf.Picture = rf.render(
         cube, field, view=(30, 20), size=(48, 32), preset=sorted(presets)[0], workers=1, seed=3
@@ -103,6 +103,10 @@ def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
         cube, field, path=folder / "cube.gif", pictures=2, size=(16, 16), workers=1
     )
     assert file.is_file()
+    film: Path = rf.film(
+        [field, field.rotated(0.001)], folder / "film.gif", between=1, size=(16, 16), workers=1
+    )
+    assert film.is_file()
 
 
 def comparisons(field: rf.Field, folder: Path) -> None:

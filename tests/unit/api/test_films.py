@@ -1,0 +1,131 @@
+"""Films of fields that change with time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+from shapes import plane
+
+import rosy_addon as rf
+from rosy_addon.api.films import Film
+from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.representation import face_representation
+from rosy_addon.projection.face_values import face_values
+
+SQUARE = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
+LOOK = Look(length=8)
+
+
+def surface_of(mesh, vertices=None, **options):
+    """A surface with the quadrilaterals of a mesh of the tests."""
+    points = mesh.vertices if vertices is None else vertices
+    return rf.Surface(points, mesh.corner_vertex.reshape(-1, 4), **options)
+
+
+@pytest.fixture(scope="module")
+def square():
+    return surface_of(plane(), name="square")
+
+
+def series(surface, count, degrees=1.0, degree=4):
+    field = rf.along_axis(surface, (1, 0, 0), degree)
+    return [field.rotated(np.radians(degrees) * step) for step in range(count)]
+
+
+def views_of(fields, look=LOOK, **options):
+    film = Film(fields, look, (0.0, 90.0), (48, 48), **options)
+    views = list(film.views())
+    assert len(views) == film.picture_count
+    return views
+
+
+def turns(views):
+    """Angles in degrees between the fields of the views and that of the first one."""
+    z = [
+        face_representation(view.instances[0].surface, view.instances[0].field)[0] for view in views
+    ]
+    return [np.degrees(np.angle(value / z[0]) / 4) for value in z]
+
+
+def test_pictures_between_fields(square):
+    """The field turns evenly; in a loop, it turns back from the last field to the first."""
+    fields = series(square, 3, degrees=3)
+    assert turns(views_of(fields)) == pytest.approx([0, 3, 6])
+    assert turns(views_of(fields, between=2)) == pytest.approx([0, 1, 2, 3, 4, 5, 6], abs=0.01)
+    looped = turns(views_of(fields, between=1, loop=True))
+    assert looped == pytest.approx([0, 1.5, 3, 4.5, 6, 3], abs=0.01)
+
+
+def test_streaks_drift_and_loops_close(square):
+    look = Look(length=8, flow=1.0)
+    fields = series(square, 3)
+    looks = [view.look for view in views_of(fields, look, between=1)]
+    assert looks == [flow_at(look, number) for number in range(5)]
+    looks = [view.look for view in views_of(fields, look, between=1, loop=True)]
+    assert looks == [flow_at(look, number, 6) for number in range(6)]
+    assert len({each.flow_phase for each in looks}) == 6
+    assert flow_at(look, 6, 6) == looks[0]
+
+
+def test_noise_moves_with_the_mesh(square):
+    """The field is that of the deformed mesh, although the noise is in the first one's rest shape."""
+    bent = square.vertices * (1, 0.8, 1) + np.outer(square.vertices[:, 0] ** 2, (0, 0, 0.5))
+    other = surface_of(square.mesh, bent)
+    fields = [rf.along_axis(each, (1, 0, 0), 4) for each in (square, other)]
+    views = views_of(fields)
+    assert {view.look.anchor for view in views} == {"surface"}
+    (instance,) = views[1].instances
+    assert np.array_equal(instance.surface.rest_vertices, square.vertices)
+    deformed = np.ascontiguousarray(bent.T)
+    drawn, expected = (
+        face_values(mesh, np.eye(3), deformed, field, False).representation
+        for mesh, field in (
+            (instance.surface, instance.field),
+            (other.mesh, fields[1].rosy),
+        )
+    )
+    assert drawn == pytest.approx(expected, abs=1e-5)
+    half = views_of(fields, between=1)[1].instances[0].surface
+    assert half.vertices == pytest.approx((square.vertices + bent) / 2)
+    kept = views_of(fields, keeps_anchor=True)
+    assert {view.look.anchor for view in kept} == {"picture"}
+    assert {view.look.anchor for view in views_of(series(square, 2))} == {"picture"}
+
+
+def test_fast_turns_are_noted(square, tmp_path):
+    """With as many pictures between two fields as the note says, there is no note."""
+    fields = series(square, 2, degrees=10)
+    options = {"size": (32, 32), "workers": 1}
+    with pytest.warns(rf.RosyWarning, match=r"turns by up to 10\.0 degrees .*: 15 pictures"):
+        rf.film(fields, tmp_path / "a.gif", **options)
+    film = Film(fields, Look(), (0.0, 90.0), (32, 32), between=15)
+    next(film.views())
+    assert not film.advice
+    with Image.open(tmp_path / "a.gif") as gif:
+        assert gif.n_frames == 2
+
+
+def test_errors(square, tmp_path):
+    fields, other = series(square, 2), rf.Surface(SQUARE, [[0, 1, 2, 3]], name="other")
+    path = tmp_path / "a.gif"
+    for arguments, options, message in (
+        ((fields[:1], path), {}, "a.gif: a film needs 2 fields or more"),
+        ((fields, tmp_path / "a.avi"), {}, "must end in .mp4 or .gif"),
+        ((fields, path), {"rate": 0}, "a rate above 0"),
+        ((fields, path), {"between": -1}, "between must be from 0 to 1000, not -1"),
+        (
+            ([*fields, rf.form(square, 2)], path),
+            {},
+            "square: field 3 of 3 has degree 2, but the one before it 4",
+        ),
+        (
+            ([*fields, rf.along_axis(other, (1, 0, 0), 4)], path),
+            {"between": 1},
+            "other: field 3 of 3 has other polygons than the one before it (1 face after 16)",
+        ),
+    ):
+        with pytest.raises(rf.RosyError) as caught:
+            rf.film(*arguments, **options)
+        assert message in str(caught.value) and not path.exists()

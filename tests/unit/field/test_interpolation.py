@@ -1,0 +1,121 @@
+"""Fields between two others: they turn the shorter way, and keep families."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import icosphere, plane, torus
+
+from rosy_addon.errors import RosyError
+from rosy_addon.field.carry import vectors_on_rest_shape
+from rosy_addon.field.convert import rotate_field
+from rosy_addon.field.directional_field import field_directions, tensor_field
+from rosy_addon.field.interpolation import have_same_polygons, interpolate_fields
+from rosy_addon.field.representation import (
+    face_frames,
+    face_representation,
+    from_representation,
+)
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.projection.face_values import face_values
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return torus()
+
+
+def random_field(surface, degree, seed=0):
+    rng = np.random.default_rng(seed)
+    z = rng.uniform(0.5, 1.0, surface.face_count) * np.exp(
+        2j * np.pi * rng.random(surface.face_count)
+    )
+    return RosyField(degree, from_representation(z, *face_frames(surface), degree))
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+def test_a_field_turns_the_shorter_way(surface, degree):
+    """It has half of the turn in the middle, and both fields at the ends; magnitudes stay."""
+    field = random_field(surface, degree)
+    turned = rotate_field(surface, field, 0.4 * np.pi / degree + 2 * np.pi / degree)
+    pair = (surface, field), (surface, turned)
+    for share, expected in ((0.0, 0.0), (0.5, 0.2), (1.0, 0.4)):
+        between = interpolate_fields(*pair, share, surface)
+        z = face_representation(surface, rotate_field(surface, field, expected * np.pi / degree))
+        assert face_representation(surface, between) == pytest.approx(z, abs=1e-12)
+
+
+def test_undefined_faces_fade(surface):
+    field = random_field(surface, 4)
+    none = replace(field, vectors=np.zeros_like(field.vectors))
+    between = interpolate_fields((surface, field), (surface, none), 0.75, surface)
+    assert face_representation(surface, between) == pytest.approx(
+        0.25 * face_representation(surface, field)
+    )
+    both = interpolate_fields((surface, none), (surface, none), 0.5, surface)
+    assert not both.vectors.any()
+
+
+def test_moving_singularities_move():
+    """If magnitudes vanish at a singularity, it is on the way from one place to the other."""
+    mesh = plane(16, 16)
+    x, y = face_frames(mesh)
+    center = mesh.face_center[:, 0] + 1j * mesh.face_center[:, 1]
+    turn = (x[:, 0] + 1j * x[:, 1]).conj() ** 4
+
+    def around(place):
+        return RosyField(4, from_representation((center - place) * turn, x, y, 4))
+
+    places = -0.5 + 0.1j, 0.3 + 0.2j
+    pair = [(mesh, around(place)) for place in places]
+    between = interpolate_fields(*pair, 0.25, mesh)
+    expected = around(0.75 * places[0] + 0.25 * places[1])
+    z, other = (face_representation(mesh, field) for field in (between, expected))
+    assert np.angle(z * other.conj()) == pytest.approx(np.zeros(len(z)), abs=1e-9)
+
+
+def test_families_of_tensors_stay(surface):
+    """The major directions stay major, although another of the four is nearer."""
+    x, y = face_frames(surface)
+
+    def tensors(angle):
+        major = np.cos(angle) * x + np.sin(angle) * y
+        return (
+            3 * major[:, :, None] * major[:, None]
+            + np.cross(surface.face_normal, major)[:, :, None]
+            * np.cross(surface.face_normal, major)[:, None]
+        )
+
+    first, second = (tensor_field(surface, tensors(angle)) for angle in (0.0, np.radians(80)))
+    between = interpolate_fields((surface, first), (surface, second), 0.5, surface)
+    assert between.family_count == 2 and between.direction_ratios is not None
+    major = field_directions(surface, between)[:, 0]
+    angle = np.arctan2((major * y).sum(axis=1), (major * x).sum(axis=1))
+    assert np.degrees(angle) % 180 == pytest.approx(np.full(surface.face_count, 40.0))
+    assert np.linalg.norm(major, axis=1) == pytest.approx(np.full(surface.face_count, 3.0))
+
+
+def test_degrees_must_agree(surface):
+    with pytest.raises(RosyError, match="has degree 2, but the one before it 4"):
+        interpolate_fields(
+            (surface, random_field(surface, 4)), (surface, random_field(surface, 2)), 0.5, surface
+        )
+    assert have_same_polygons(surface, torus())
+    assert not have_same_polygons(surface, icosphere(1))
+
+
+def test_vectors_on_a_rest_shape_are_transported_back(surface):
+    """A renderer that knows the rest shape draws the vectors of the deformed faces."""
+    rest = surface.vertices @ np.array([[1, 0.3, 0], [0, 1.5, 0.2], [0.4, 0, 0.7]])
+    field = random_field(surface, 1)
+    vectors = vectors_on_rest_shape(surface, rest, field.vectors)
+    assert np.linalg.norm(vectors, axis=1) == pytest.approx(field.magnitude)
+    moved = replace(surface, rest_vertices=rest)
+    deformed = np.ascontiguousarray(surface.vertices.T)
+    expected, transported = (
+        face_values(mesh, np.eye(3), deformed, a_field, False).representation
+        for mesh, a_field in ((surface, field), (moved, replace(field, vectors=vectors)))
+    )
+    assert transported == pytest.approx(expected, abs=1e-6)

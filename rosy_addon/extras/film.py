@@ -13,7 +13,7 @@ from .. import api
 from ..api.films import MAX_BETWEEN
 from ..api.mesh_objects import MeshArrays
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
-from ..cli.look import add_look_options, requested_preset, requested_settings
+from ..cli.look import add_flow_option, add_look_options, requested_preset, requested_settings
 from ..cli.mesh_field import printed_warnings
 from ..cli.options import (
     add_subcommand,
@@ -78,6 +78,7 @@ def add_film_command(subparsers: Any) -> None:
         help="let the first step follow the last one, for films that are shown in a loop",
     )
     add_rate_option(parser)
+    add_flow_option(parser)
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
     add_workers_option(parser)
     add_look_options(parser)

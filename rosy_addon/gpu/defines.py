@@ -13,8 +13,10 @@ import numpy as np
 from ..color import REC709_LUMINANCE
 from ..compositor.compose import COLOR_CONTRAST
 from ..compositor.covering import ALL_NEIGHBORS
+from ..compositor.drifting_averages import MIN_EFFECTIVE_SAMPLES
 from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOUNT
 from ..compositor.filter_kernel import Kernel
+from ..compositor.flow import ONE_WAY_COSINE
 from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
@@ -51,6 +53,9 @@ from .mesh_buffers import NORMAL_TEXEL, POSITION_TEXEL, ROW_BITS, VALUE_TEXEL
 
 #: The kernels of `filter_kernel`.
 KERNELS: dict[Kernel, int] = {"box": 0, "taper": 1, "ramp": 2}
+
+#: How streaks drift: not, along the directions of a field, or toward the guiding angle.
+FLOW_NONE, FLOW_ALONG, FLOW_TO_ANGLE = range(3)
 
 #: What the magnitude of the field drives: bit 0 is the color, bit 1 the length of streamlines.
 MAGNITUDE_COLOR, MAGNITUDE_LENGTH = 1, 2
@@ -97,6 +102,8 @@ FLOAT_CONSTANTS = {
     "GROWTH_START": GROWTH_OCTAVES[0],
     "GROWTH_STOP": GROWTH_OCTAVES[1],
     "MIN_COVERAGE": MIN_COVERAGE,
+    "MIN_EFFECTIVE_SAMPLES": MIN_EFFECTIVE_SAMPLES,
+    "ONE_WAY_COSINE": ONE_WAY_COSINE,
     "DEPTH_JUMP": DEPTH_JUMP,
     "MIN_STEP": MIN_STEP,
     "STEP_RATIO": STEP_RATIO,
@@ -136,6 +143,9 @@ INT_CONSTANTS = {
     "VALUE_TEXEL": VALUE_TEXEL,
     "KERNEL_TAPER": KERNELS["taper"],
     "KERNEL_RAMP": KERNELS["ramp"],
+    "FLOW_NONE": FLOW_NONE,
+    "FLOW_ALONG": FLOW_ALONG,
+    "FLOW_TO_ANGLE": FLOW_TO_ANGLE,
     "MAGNITUDE_COLOR": MAGNITUDE_COLOR,
     "MAGNITUDE_LENGTH": MAGNITUDE_LENGTH,
     "TONE_LIGHT": TONE_LIGHT,

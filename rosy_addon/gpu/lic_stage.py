@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..compositor.filter_kernel import look_for_symmetry
+from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
 from ..compositor.look import Look
 from ..progress import Progress, Task
@@ -63,7 +64,8 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     yield from frame.resources.device.compile_task([passes.LIC.variant(uniforms)])
     yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
-    row_steps = (right - left) * kind.line_count * 2 * uniforms["half_length"]
+    half_steps = streamline_reach(frame.pixel_look) if uniforms["half_length"] else 0
+    row_steps = (right - left) * kind.line_count * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
     band_rows = groups * WORKGROUP_SIZE[1]

@@ -477,6 +477,9 @@ LIC = ComputePass(
         *_GUIDING,
         *setting_uniforms(LIC_SETTINGS),
         ("kernel", "int"),
+        ("flow_mode", "int"),
+        ("flow_shifts", "vec4"),
+        ("flow_weights", "vec4"),
         ("half_length", "int"),
         ("full_samples", "float"),
         ("step_length", "float"),
@@ -516,7 +519,14 @@ LIC = ComputePass(
     ),
     includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
     switches=(
-        *("kernel", "magnitude_mode", "colors_values", "noise_channels", "family_count"),
+        *(
+            "kernel",
+            "flow_mode",
+            "magnitude_mode",
+            "colors_values",
+            "noise_channels",
+            "family_count",
+        ),
         *("is_hatched", "is_light_ink", "even_lines", "ink_count"),
     ),
 )

@@ -19,6 +19,7 @@ from ..compositor.even_lines import (
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count, kernel_of, look_for_symmetry
+from ..compositor.flow import channel_shifts, channel_weights
 from ..compositor.hatching import (
     ONSET_LEAD,
     ONSET_RANGE,
@@ -29,7 +30,7 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_values, is_hatched
+from ..compositor.look import Look, colors_values, has_flow, is_hatched
 from ..compositor.look_units import (
     cell_size_args,
     instance_line_spacing,
@@ -53,7 +54,16 @@ from ..compositor.target_tone import ReferenceRender, tone_curve
 from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
-from .defines import HEADLIGHT, KERNELS, MAGNITUDE_MODES, POINT_LIGHT, SUN_LIGHT
+from .defines import (
+    FLOW_ALONG,
+    FLOW_NONE,
+    FLOW_TO_ANGLE,
+    HEADLIGHT,
+    KERNELS,
+    MAGNITUDE_MODES,
+    POINT_LIGHT,
+    SUN_LIGHT,
+)
 from .field_kind import FieldKind
 from .passes import LIC_SETTINGS, TONE_SETTINGS
 from .resources import DrawItem
@@ -104,12 +114,14 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     return {
         **setting_values(pixel_look, LIC_SETTINGS),
         "kernel": KERNELS[kernel],
+        **_flow_uniforms(kind, pixel_look),
         "half_length": 0 if has_even_lines(look) else pixel_look.length,
         "full_samples": full_sample_count(pixel_look),
         "step_length": pixel_look.step,
         "crossing_correlation": crossing,
         "gain": look.gain * gain,
-        "noise_channels": noise_args(pixel_look)["channels"],
+        # The streaks that drift have one channel, unlike their noise.
+        "noise_channels": 1 if has_flow(look) else noise_args(pixel_look)["channels"],
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(pixel_look),
@@ -152,6 +164,17 @@ def setting_values(look: Look, names: tuple[str, ...]) -> dict[str, Any]:
     return {
         name: int(value) if value is True or value is False else value
         for name, value in values.items()
+    }
+
+
+def _flow_uniforms(kind: FieldKind, pixel_look: Look) -> dict[str, Any]:
+    """Return the uniforms of streaks that drift: which way, and the shifts and weights of the channels."""
+    if not has_flow(pixel_look):
+        return {"flow_mode": FLOW_NONE, "flow_shifts": (0.0,) * 4, "flow_weights": (0.0,) * 4}
+    return {
+        "flow_mode": FLOW_TO_ANGLE if kind.symmetry.has_opposites else FLOW_ALONG,
+        "flow_shifts": (*channel_shifts(pixel_look), 0.0),
+        "flow_weights": (*channel_weights(pixel_look.flow_phase), 0.0),
     }
 
 

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from .drifting_brute import one_streamline_per_pixel
+
 #: Largest distance between two points that count as equal, in pixels. OpenGL rounds the vertices of
 #: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
 MAX_DISTANCE_PX = 0.1
@@ -125,7 +127,12 @@ def draw_pair(
     card_picture = card.read(texture, width, height)
     images = card.read_gbuffer(camera)
     gbuffer = rosy.project(instances, camera, look.display)
-    numpy_picture = rosy.compose(gbuffer, replace(look, method="brute"), lights, reference).rgba
+    if module_of(rosy.package, "compositor.look").has_flow(look):
+        with one_streamline_per_pixel(rosy.package):
+            numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
+    else:
+        brute_look = replace(look, method="brute")
+        numpy_picture = rosy.compose(gbuffer, brute_look, lights, reference).rgba
     return Pair(
         gbuffer,
         {name: np.array(image) for name, image in images.items()},

@@ -92,8 +92,20 @@ void main()
     break_step_count = int(round(float(break_step_count) * relative_magnitude));
     overshoot_count = int(round(float(overshoot_count) * relative_magnitude));
   }
+  Drift drift, break_drift;
+  drift.half_steps = step_count;
+  break_drift.half_steps = break_step_count;
+  if (flow_mode != FLOW_NONE) {
+    // Relative to the steps of lines of the largest magnitude.
+    int largest_count = max(even_lines != 0 ? break_steps : half_length, 1);
+    drift.shifts = flow_shifts.xyz * (float(step_count) / float(largest_count));
+    break_drift.shifts = flow_shifts.xyz * (float(break_step_count) / float(max(break_steps, 1)));
+  }
   bool is_undirected = value.xy == vec2(0.0);
   vec3 disc_noise = is_hatched != 0 && is_undirected ? disc_mean(pixel) : vec3(0.0);
+  if (flow_mode != FLOW_NONE) {
+    disc_noise = vec3(dot(disc_noise, flow_weights.xyz));
+  }
   // The light that all inks together let through, and the sum of the weights of their lines.
   float target = 1.0, transmittance = 1.0, onset_sum = 1.0;
   vec3 lic_sum = vec3(0.0), hue_sum = vec3(0.0);
@@ -104,12 +116,20 @@ void main()
     float backward_sign = has_opposite_sheet ? 1.0 : -1.0;
     // For odd N, every other sheet is the opposite half of a member.
     float along = has_opposite_sheet && (line & 1) == 1 ? -1.0 : 1.0;
-    Half forward = traced_half(pixel, line, 1.0, cell, step_count, break_step_count,
-                               overshoot_count, weight_slope(along));
-    Half backward = traced_half(pixel, backward_sheet, backward_sign, cell, step_count,
-                                break_step_count, overshoot_count, weight_slope(-along));
-    Sums sums = both_halves(cell.yzw, forward.all, backward.all);
-    vec3 mean = normalized_mean(sums, full_samples);
+    if (flow_mode == FLOW_ALONG) {
+      drift.forward_share = along > 0.0 ? 1.0 : 0.0;
+    }
+    else if (flow_mode == FLOW_TO_ANGLE) {
+      float cosine = cos(line_angle + TAU * float(line) / float(sheet_count));
+      drift.forward_share = smooth_unit_step(0.5 + cosine * (0.5 / ONE_WAY_COSINE));
+    }
+    break_drift.forward_share = drift.forward_share;
+    Half forward = traced_half(pixel, line, 1.0, cell, 1.0, drift, break_drift, overshoot_count,
+                               weight_slope(along));
+    Half backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
+                                overshoot_count, weight_slope(-along));
+    Sums sums = both_halves(cell.yzw, forward.all, backward.all, drift);
+    vec3 mean = normalized_mean(sums, full_samples, drift);
     if (is_hatched != 0) {
       if (line == 0 || overshoot_steps > 0) {
         vec2 tone_sum = vec2(pixel_tone, 1.0) + forward.tones + backward.tones;
@@ -143,8 +163,9 @@ void main()
       }
       float streak = gray(mean) / streak_std, break_streak = 0.0, break_weight = 0.0;
       if (break_steps > 0) {
-        Sums near_sums = both_halves(cell.yzw, forward.near, backward.near);
-        break_streak = gray(normalized_mean(near_sums, break_samples)) / break_std;
+        Sums near_sums = both_halves(cell.yzw, forward.near, backward.near, break_drift);
+        vec3 break_mean = normalized_mean(near_sums, break_samples, break_drift);
+        break_streak = gray(break_mean) / break_std;
         // As `hatching`: breaks are fewer where the ink is dense.
         float min_breaks = WOBBLE_BREAKS * wobble_strength;
         break_weight =
@@ -177,7 +198,7 @@ void main()
       ink_light *= 1.0 - coverage * (1.0 - ink_transmittance);
     }
     lic_sum += mean;
-    sample_sum += effective_samples(sums);
+    sample_sum += effective_samples(sums, drift);
     if (family_count > 1) {
       float weight = exp(hue_sharpness * gray(mean));
       int family = line_family(line, first_angle, family_angle, known_families);

@@ -1,10 +1,21 @@
 // Streamlines on the covering and their filtered noise. Included by lic.comp.glsl.
 
 // Sums over the samples of a streamline: of the weighted noise, of the weights and of their squares.
+// Of kernels that move, the weighted noise is around 0 and in all components. `full_square_sum` is what
+// `square_sum` would be if the streamline did not end early.
 struct Sums {
   vec3 weighted_sum;
   float weight;
   float square_sum;
+  float full_square_sum;
+};
+
+// A kernel that moves, for a line: its steps in each direction, how far the streaks of the channels have
+// drifted, in steps, and the share of the kernel that drifts forward.
+struct Drift {
+  int half_steps;
+  vec3 shifts;
+  float forward_share;
 };
 
 // Sums over half a streamline: `all` over all its steps, `near` over its first steps with weights of
@@ -14,6 +25,52 @@ struct Half {
   Sums near;
   vec2 tones;
 };
+
+// The weights of samples at positions between steps, forward if positive, as `filter_kernel.sample_weights`
+// with linear interpolation.
+vec3 interpolated_weights(vec3 position, int half_steps)
+{
+  float width = float(half_steps + 1);
+  if (kernel == KERNEL_TAPER) {
+    return max(1.0 - abs(position) / width, 0.0);
+  }
+  if (kernel == KERNEL_RAMP) {
+    vec3 rise = (2.0 - 1.0 / width) * max(position + width, 0.0);
+    return min(max(1.0 - position / width, 0.0), rise);
+  }
+  return clamp(width - abs(position), 0.0, 1.0);
+}
+
+// The weights of the channels of a sample, as `flow.MovingKernel`.
+vec3 drifting_weights(float position, Drift drift)
+{
+  if (flow_mode == FLOW_ALONG) {
+    float along = drift.forward_share > 0.0 ? position : -position;
+    return flow_weights.xyz * interpolated_weights(along + drift.shifts, drift.half_steps);
+  }
+  vec3 forward = interpolated_weights(position + drift.shifts, drift.half_steps);
+  vec3 backward = interpolated_weights(drift.shifts - position, drift.half_steps);
+  return flow_weights.xyz * mix(backward, forward, drift.forward_share);
+}
+
+// The number of steps on one side, forward (1) or backward (-1), beyond which all weights are 0.
+int drifting_steps(Drift drift, float side)
+{
+  // Forward, those kernels reach furthest whose streaks have drifted backward, and vice versa.
+  float against = drift.forward_share > 0.0 ? -side : side;
+  vec3 reach = against * drift.shifts;
+  if (flow_mode != FLOW_ALONG && drift.forward_share > 0.0 && drift.forward_share < 1.0) {
+    reach = abs(reach);
+  }
+  return drift.half_steps + int(ceil(max(max(reach.x, reach.y), reach.z)));
+}
+
+void add_drifting(inout Sums sums, vec3 noise_value, vec3 weights)
+{
+  sums.weighted_sum += dot(weights, noise_value - NOISE_MEAN);
+  sums.square_sum += dot(weights, weights);
+  sums.full_square_sum += dot(weights, weights);
+}
 
 void add(inout Sums sums, vec3 noise_value, float weight)
 {
@@ -26,22 +83,43 @@ Sums empty_sums()
 {
   Sums sums;
   sums.weighted_sum = vec3(0.0);
-  sums.weight = sums.square_sum = 0.0;
+  sums.weight = sums.square_sum = sums.full_square_sum = 0.0;
   return sums;
 }
 
-Sums both_halves(vec3 start, Sums forward, Sums backward)
+Sums both_halves(vec3 start, Sums forward, Sums backward, Drift drift)
 {
   Sums sums = forward;
+  if (flow_mode != FLOW_NONE) {
+    sums.weighted_sum += backward.weighted_sum;
+    sums.square_sum += backward.square_sum;
+    sums.full_square_sum += backward.full_square_sum;
+    add_drifting(sums, start, drifting_weights(0.0, drift));
+    return sums;
+  }
   sums.weighted_sum += backward.weighted_sum + start;
   sums.weight += backward.weight + 1.0;
   sums.square_sum += backward.square_sum + 1.0;
   return sums;
 }
 
-// The number of samples of equal weight whose mean has the same variance (`filter_kernel`).
-float effective_samples(Sums sums)
+// The effective samples of a streamline of full length, by a kernel at rest (`filter_kernel`).
+float samples_at_rest(int half_steps)
 {
+  float width = float(half_steps + 1), count = 2.0 * width - 1.0;
+  return kernel == KERNEL_TAPER ? 3.0 * width * width * width / (2.0 * width * width + 1.0) :
+         kernel == KERNEL_RAMP  ? 3.0 * width * count / (4.0 * width - 1.0) :
+                                  count;
+}
+
+// The number of samples of equal weight whose mean has the same variance (`filter_kernel`, and
+// `flow.MovingKernel`).
+float effective_samples(Sums sums, Drift drift)
+{
+  if (flow_mode != FLOW_NONE) {
+    float samples = samples_at_rest(drift.half_steps) * sums.square_sum / sums.full_square_sum;
+    return max(samples, MIN_EFFECTIVE_SAMPLES);
+  }
   return sums.weight * sums.weight / sums.square_sum;
 }
 
@@ -60,18 +138,25 @@ float weight_slope(float along)
 }
 
 // Trace half a streamline from a pixel on a sheet. Its state is a pixel and a sheet of the covering;
-// each step is second-order Adams-Bashforth. The sums do not contain the start. `slope` is that of the
-// weights.
-Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, int step_count,
-                 int near_step_count, int overshoot_count, float slope)
+// each step is second-order Adams-Bashforth. The sums do not contain the start. `side` is 1 forward and
+// -1 backward. `slope` is that of the weights at rest.
+Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float side, Drift drift,
+                 Drift near_drift, int overshoot_count, float slope)
 {
   Half result;
   result.all = result.near = empty_sums();
   result.tones = vec2(0.0);
+  int step_count = drift.half_steps, near_step_count = near_drift.half_steps;
   float weight_step = slope / float(step_count + 1);
   float near_weight_step = slope / float(near_step_count + 1);
+  if (flow_mode != FLOW_NONE) {
+    step_count = drifting_steps(drift, side);
+    near_step_count = break_steps > 0 ? drifting_steps(near_drift, side) : 0;
+    step_count = max(step_count, near_step_count);
+  }
   vec2 offset = vec2(0.0), previous_velocity = vec2(0.0);
-  for (int step_index = 0; step_index < max(step_count, overshoot_count); ++step_index) {
+  int step_index = 0;
+  for (; step_index < max(step_count, overshoot_count); ++step_index) {
     bool opposite = sheet >= line_count;
     int line = opposite ? sheet - line_count : sheet;
     // The direction at the center of the pixel, and the gradient of its angle.
@@ -96,14 +181,34 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, int st
       sheet = wrap_once(sheet + int(round(phase - cell.x)), sheet_count);
     }
     float distance_steps = float(step_index + 1);
-    if (step_index < step_count) {
+    if (flow_mode != FLOW_NONE) {
+      if (step_index < step_count) {
+        add_drifting(result.all, cell.yzw, drifting_weights(side * distance_steps, drift));
+      }
+      if (step_index < near_step_count) {
+        add_drifting(result.near, cell.yzw, drifting_weights(side * distance_steps, near_drift));
+      }
+    }
+    else if (step_index < step_count) {
       add(result.all, cell.yzw, 1.0 - distance_steps * weight_step);
     }
     if (step_index < overshoot_count) {
       result.tones += vec2(tone_at(pixel), 1.0);
     }
-    if (step_index < near_step_count) {
+    if (flow_mode == FLOW_NONE && step_index < near_step_count) {
       add(result.near, cell.yzw, 1.0 - distance_steps * near_weight_step);
+    }
+  }
+  if (flow_mode != FLOW_NONE) {
+    // The samples that are missing.
+    for (; step_index < step_count; ++step_index) {
+      float position = side * float(step_index + 1);
+      vec3 weights = drifting_weights(position, drift);
+      result.all.full_square_sum += dot(weights, weights);
+      if (step_index < near_step_count) {
+        weights = drifting_weights(position, near_drift);
+        result.near.full_square_sum += dot(weights, weights);
+      }
     }
   }
   return result;
@@ -111,10 +216,17 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, int st
 
 // The mean of the noise along a streamline, around 0. Streamlines that end early are scaled to the
 // standard deviation of full ones (`contrast`).
-vec3 normalized_mean(Sums sums, float full_count)
+vec3 normalized_mean(Sums sums, float full_count, Drift drift)
 {
-  float sample_count = effective_samples(sums);
+  float sample_count = effective_samples(sums, drift);
   float cell_count = sample_count * step_length / grain;
-  return (sums.weighted_sum / sums.weight - NOISE_MEAN) * sqrt(sample_count / full_count) *
-         min(0.5 * cell_count, 1.0);
+  vec3 mean;
+  if (flow_mode != FLOW_NONE) {
+    float factor = sqrt(samples_at_rest(drift.half_steps) / sums.full_square_sum);
+    mean = sums.weighted_sum * (factor / sample_count);
+  }
+  else {
+    mean = sums.weighted_sum / sums.weight - NOISE_MEAN;
+  }
+  return mean * sqrt(sample_count / full_count) * min(0.5 * cell_count, 1.0);
 }

@@ -529,6 +529,9 @@ def test_all_degrees(card, degree, perspective):
     assert_parity(card, [ball(degree)], view(perspective=perspective))
 
 
+#: Streaks that drift, at a phase at which the shift of no kernel is 0.
+DRIFTING = {"flow": 2.0, "flow_phase": 0.2}
+
 LOOKS = {
     "default": {},
     "color noise": {"noise": "colour"},
@@ -737,8 +740,24 @@ LOOKS = {
         "paper_grain": 0.5,
         "overshoot": 5.0,
     },
+    "drifting": DRIFTING,
     "the method members": {"method": "members", "weights": "none", "view_plane": False},
+    "drifting, oriented": DRIFTING | {"oriented": True, "degree": 1, "density": 0.03},
+    "drifting lines of streaks, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
+    "drifting, three directions": DRIFTING | {"taper": True, "degree": 3, "flow_distance": 13.0},
+    "drifting on the surface": DRIFTING | {"anchor": "surface"},
+    "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
+    "drifting, short streaks": DRIFTING
+    | {"length": 9, "flow_distance": 40.0, "step": 0.6, "supersampling": 2},
+    "drifting, hatched, with breaks": DRIFTING
+    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
+    "drifting, hatched, breaks and length by magnitude": DRIFTING
+    | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude": "length", "degree": 3}
+    | {"overshoot": 15.0},
+    "drifting breaks of even lines": DRIFTING
+    | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
     "the method brute": {"method": "brute"},
+    "without drift": DRIFTING | {"noise": "colour"},
 }
 
 
@@ -1199,6 +1218,8 @@ UNDEFINED_LOOKS = {
     "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "colour"},
     "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
+    "drifting": DRIFTING,
+    "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "taper": True},
 }
 
 

@@ -13,11 +13,14 @@ import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
 from rosy_addon.progress import run_to_completion
@@ -45,6 +48,9 @@ STAGES = {
     "covering (directions, angle_gradient)": ("directions", "angle_gradient"),
     "streamlines and light (lic)": ("lic",),
 }
+
+#: Degree and settings for the times of streaks that drift.
+FLOW_DEGREE, FLOW = 4, {"flow": 2.0}
 
 #: Number of frames of a median, and the maximum of their total time in seconds.
 FRAMES = 21
@@ -83,9 +89,12 @@ def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, 
 class Frames:
     """Repeated frames of one object at one size."""
 
-    def __init__(self, device: Any, size: tuple[int, int], degree: int) -> None:
+    def __init__(
+        self, device: Any, size: tuple[int, int], degree: int, look: Look = cases.LOOK
+    ) -> None:
         self.device = device
         self.size = size
+        self.look = look
         self.renderer = GpuRenderer(device)
         self.items: list[DrawItem] = self.renderer.upload(
             [cases.instance(TRIANGLES, degree)], "smooth"
@@ -95,11 +104,12 @@ class Frames:
     def draw(self) -> tuple[float, float]:
         """Draw the next frame. Return its time, and the card's own, in seconds."""
         camera = cases.camera(*self.size, azimuth=self.frame_count * AZIMUTH_STEP)
+        look = flow_at(self.look, self.frame_count)
         self.frame_count += 1
         timer = self.device.context.query(time=True)
         start = time.perf_counter()
         with timer:
-            draw_texture(self.renderer, self.items, camera, cases.LOOK)
+            draw_texture(self.renderer, self.items, camera, look)
         self.device.finish()
         return time.perf_counter() - start, timer.elapsed * 1e-9
 
@@ -167,6 +177,18 @@ def measure_rows(
             }
 
 
+def measure_flow(
+    device: Any, sizes: Sequence[tuple[int, int]], frames: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the times of still and of drifting streaks for each size, with the camera moving."""
+    for size in sizes:
+        row: dict[str, Any] = {"width": size[0], "height": size[1], "degree": FLOW_DEGREE}
+        for name, look in (("still", cases.LOOK), ("drifting", replace(cases.LOOK, **FLOW))):
+            times, card_times = Frames(device, size, FLOW_DEGREE, look).times(frames).T
+            row[name], row[f"{name} card"] = float(np.median(times)), float(card_times.min())
+        yield row
+
+
 def measure_stages(device: Any, frame_count: int) -> dict[str, float]:
     """Return the median time of each stage in milliseconds, with a wait after each pass."""
     timed_device = TimedDevice(device)
@@ -206,6 +228,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--no-stages", action="store_true", help="time only whole frames, not stages"
     )
+    parser.add_argument(
+        "--flow",
+        action="store_true",
+        help=f"time only still and drifting streaks, N = {FLOW_DEGREE}",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
     options = parser.parse_args(arguments)
     device = open_device()
@@ -213,6 +240,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     report: dict[str, Any] = {"renderer": device.name, "triangles": TRIANGLES, "rows": []}
     print(device.name)
+    if options.flow:
+        _print_flow(device, options, report)
+    else:
+        _print_all(device, options, report)
+    if options.json:
+        options.json.parent.mkdir(parents=True, exist_ok=True)
+        options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+def _print_flow(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:
+    """Time still and drifting streaks, and print and store the rows."""
+    print(f"N = {FLOW_DEGREE}; milliseconds a frame and the card's own least, still and drifting")
+    for row in measure_flow(device, options.sizes, options.frames):
+        report["rows"].append(row)
+        size = f"{row['width']} x {row['height']}"
+        times = "  ".join(
+            f"{row[name]:9.2f} {row[f'{name} card']:9.2f}" for name in ("still", "drifting")
+        )
+        ratio = row["drifting card"] / row["still card"]
+        print(f"{size:>11}  {times}  ratio {ratio:.2f}", flush=True)
+
+
+def _print_all(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:
+    """Time all degrees and the stages, and print and store the rows."""
     print(
         f"{TRIANGLES // 1000}K triangles, {2 * cases.LOOK.length + 1} samples; milliseconds a frame,"
     )
@@ -229,10 +281,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"of {width} x {height}, N = {STAGES_DEGREE}, waiting after each pass")
         for name, milliseconds in report["stages"].items():
             print(f"  {name:34} {milliseconds:9.2f}", flush=True)
-    if options.json:
-        options.json.parent.mkdir(parents=True, exist_ok=True)
-        options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
-    return 0
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..compositor.look import is_hatched
+from ..compositor.look import has_flow, is_hatched
 from ..errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
@@ -141,6 +141,13 @@ def _draw_picture_section(
     _draw_live_toggle(layout, context)
     if session.is_live(context.space_data):
         layout.prop(context.scene.rosy, "remember_live")
+        if has_flow(context.scene.rosy.look):
+            is_playing = session.is_flow_playing()
+            layout.operator(
+                "rosy.flow_play",
+                text="Pause" if is_playing else "Play",
+                icon="PAUSE" if is_playing else "PLAY",
+            )
     if job_status.current is not None:
         draw_progress(layout)
     else:

@@ -9,6 +9,7 @@ rendered in slices of time, one slice per redraw.
     messages       text in a corner of a view
     references     the reference renders of the tone "picture"
     layers         the meshes of view layers, as they were read last
+    flow_clock     the clock by which streaks drift
     progressive    previews and final pictures, within a time budget
     session        handlers, timers and drawing; `start` and `stop`
 """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from ..compositor.look_units import preview_look
@@ -34,7 +35,8 @@ _MIN_MEGAPIXELS = 0.02
 class ViewState:
     """The picture of one region of a 3D view, and the work on its next one.
 
-    A key identifies everything that a picture depends on.
+    A key identifies everything that a picture depends on. A still key leaves out how far streaks have
+    drifted.
 
     Attributes
     ----------
@@ -42,18 +44,24 @@ class ViewState:
         The picture that is shown; None also if no field is visible.
     texture_key : hashable
         The key of the picture that is shown.
+    texture_still_key : hashable
+        Its still key.
     downscale : int
         View pixels per picture pixel, each way, of the picture that is shown.
-    requested_key : hashable
-        The key of the picture that was requested last.
+    buffer : int
+        Which of the two images for final pictures is shown, or was shown last.
+    requested_key, requested_still_key : hashable
+        The keys of the picture that was requested last.
     requested_time : float
-        Seconds, monotonic: when it was requested first.
+        Seconds, monotonic: when its still key was requested first.
     items : list
         Draw items of the picture that is shown.
     task : generator or None
         The final picture, being rendered.
-    task_key : hashable
-        The key of the picture that is being rendered.
+    task_key, task_still_key : hashable
+        The keys of the picture that is being rendered.
+    task_buffer : int
+        Its image.
     task_time : float
         Seconds, monotonic: when it was worked on last.
     task_seconds : float
@@ -63,16 +71,22 @@ class ViewState:
     error : str or None
         Why the picture of `error_key` could not be rendered.
     error_key : hashable
+        Its still key.
     """
 
     texture: Any = None
     texture_key: Hashable = None
+    texture_still_key: Hashable = None
     downscale: int = 1
+    buffer: int = 0
     requested_key: Hashable = None
+    requested_still_key: Hashable = None
     requested_time: float = 0.0
     items: list[Any] = field(default_factory=list)
     task: Task[Any] | None = None
     task_key: Hashable = None
+    task_still_key: Hashable = None
+    task_buffer: int = 0
     task_time: float = 0.0
     task_seconds: float = 0.0
     progress: Progress | None = None
@@ -92,6 +106,9 @@ class ProgressiveRenderer:
     step before it begins. After that, a picture that fits into the budget is rendered at once.
     Otherwise a preview is rendered while the view changes, and the final picture in slices of time
     once it is at rest. A picture that could not be rendered is not tried again.
+
+    If only streaks drift, there are no previews, which would flicker between the final pictures. These
+    are rendered one after the other, and none is abandoned for the next one.
 
     Parameters
     ----------
@@ -116,6 +133,9 @@ class ProgressiveRenderer:
         self._is_prepared = False
         #: The view whose final picture is being rendered.
         self._refining_view: ViewState | None = None
+        #: A view that waits until that of another view is done, and since when (seconds, monotonic).
+        self._waiting_view: ViewState | None = None
+        self._waiting_time = 0.0
         #: Estimated cost of a final picture; 0 until one is known.
         self._seconds_per_megapixel = 0.0
 
@@ -123,6 +143,11 @@ class ProgressiveRenderer:
     def is_prepared(self) -> bool:
         """Whether the shaders are compiled and the meshes uploaded."""
         return self._is_prepared
+
+    @property
+    def is_rendering(self) -> bool:
+        """Whether the picture of a view is being rendered."""
+        return any(view.is_rendering for view in self.views.values())
 
     def remove_space(self, space_pointer: int) -> None:
         """Drop the pictures of one 3D view."""
@@ -136,7 +161,11 @@ class ProgressiveRenderer:
         self.renderer.release()
 
     def update(
-        self, view_pointers: tuple[int, int], requested_key: Hashable, view_input: ViewInput
+        self,
+        view_pointers: tuple[int, int],
+        requested_key: Hashable,
+        view_input: ViewInput,
+        still_key: Hashable = None,
     ) -> ViewState:
         """Bring the picture of a view up to date, as far as there is time for it.
 
@@ -148,6 +177,8 @@ class ProgressiveRenderer:
             Changes whenever the picture would change.
         view_input : ViewInput
             Its camera has the size of the region.
+        still_key : hashable, optional
+            The key without how far streaks have drifted.
 
         Raises
         ------
@@ -155,9 +186,11 @@ class ProgressiveRenderer:
             If this picture cannot be rendered. In later calls, a RosyError with the same message.
         """
         view = self.views.setdefault(view_pointers, ViewState())
-        if requested_key != view.requested_key:
-            view.requested_key, view.requested_time = requested_key, time.monotonic()
-        if view.error is not None and view.error_key == requested_key:
+        still_key = requested_key if still_key is None else still_key
+        view.requested_key = requested_key
+        if still_key != view.requested_still_key:
+            view.requested_still_key, view.requested_time = still_key, time.monotonic()
+        if view.error is not None and view.error_key == still_key:
             raise RosyError(view.error)
         view.error = None
         try:
@@ -165,8 +198,9 @@ class ProgressiveRenderer:
                 view.items = self.renderer.upload(view_input.instances, view_input.look.display)
                 self._update_picture(view, view_input)
         except Exception as error:
-            view.error, view.error_key = error_text(error), requested_key
-            view.task = view.progress = view.texture = view.texture_key = None
+            view.error, view.error_key = error_text(error), still_key
+            view.task = view.progress = view.texture = None
+            view.texture_key = view.texture_still_key = None
             raise
         return view
 
@@ -199,28 +233,33 @@ class ProgressiveRenderer:
             / (1e6 * full_downscale**2)
         )
 
-        def render_at(downscale: int) -> Task[Any]:
+        def render_at(downscale: int, buffer: int) -> Task[Any]:
             return self.renderer.render_texture_task(
-                items, downscaled(view_input, downscale), (id(view), downscale)
+                items, downscaled(view_input, downscale), (id(view), downscale, buffer)
             )
 
         is_first = not self._seconds_per_megapixel
         if is_first:
-            self._refine(view, lambda: render_at(full_downscale), megapixels)
+            self._refine(view, partial(render_at, full_downscale), megapixels)
         elif self._seconds_per_megapixel * megapixels <= FRAME_BUDGET_SECONDS:
-            self._render_now(view, render_at(full_downscale), full_downscale, megapixels)
-        elif view.texture_key != view.requested_key:
+            self._render_now(
+                view, render_at(full_downscale, view.buffer), full_downscale, megapixels
+            )
+        elif view.texture_still_key != view.requested_still_key:
             self._render_now(
                 view,
-                render_at(preview_downscale),
+                render_at(preview_downscale, 0),
                 preview_downscale,
                 megapixels * PREVIEW_COST_RATIO,
             )
             self._schedule_redraw(IDLE_SECONDS)
-        elif time.monotonic() - view.requested_time < IDLE_SECONDS:
+        elif (
+            view.downscale != full_downscale
+            and time.monotonic() - view.requested_time < IDLE_SECONDS
+        ):
             self._schedule_redraw(IDLE_SECONDS)
         else:
-            self._refine(view, lambda: render_at(full_downscale), megapixels)
+            self._refine(view, partial(render_at, full_downscale), megapixels)
 
     def _render_now(
         self, view: ViewState, task: Task[Any], downscale: int, megapixels: float
@@ -232,6 +271,7 @@ class ProgressiveRenderer:
         self.renderer.finish()
         self._update_estimate(time.monotonic() - start_time, megapixels)
         view.texture_key, view.downscale = view.requested_key, downscale
+        view.texture_still_key = view.requested_still_key
         view.task = view.progress = None
 
     def _update_estimate(self, seconds: float, megapixels: float) -> None:
@@ -245,20 +285,28 @@ class ProgressiveRenderer:
         )
 
     def _refine(
-        self, view: ViewState, start_task: Callable[[], Task[Any]], megapixels: float
+        self, view: ViewState, start_task: Callable[[int], Task[Any]], megapixels: float
     ) -> None:
-        """Continue the final picture of a view for one slice of time.
+        """Continue the final picture of a view, in one of its two images, for one slice of time.
 
         The first picture is completed even if the view has changed: its cost must be known.
         """
-        other = self._refining_view
+        other, full_downscale = self._refining_view, self.renderer.downscale_factors[1]
         if other in self.views.values() and other is not view and other.is_rendering:
             self._schedule_redraw(0.0)  # one at a time: they share the renderer's images
+            self._waiting_view, self._waiting_time = view, time.monotonic()
             return
-        is_outdated = view.task_key != view.requested_key and view.texture is not None
+        is_outdated = view.task_still_key != view.requested_still_key and view.texture is not None
         if other is not view or view.task is None or is_outdated:
-            view.task, view.task_key, view.task_seconds = start_task(), view.requested_key, 0.0
-            self._refining_view = view
+            if self._must_wait(view):
+                self._schedule_redraw(0.0)
+                return
+            # The picture that is shown stays as it is.
+            is_final = view.texture is not None and view.downscale == full_downscale
+            view.task_buffer = 1 - view.buffer if is_final else view.buffer
+            view.task, view.task_seconds = start_task(view.task_buffer), 0.0
+            view.task_key, view.task_still_key = view.requested_key, view.requested_still_key
+            self._refining_view, self._waiting_view = view, None
         start_time = time.monotonic()
         try:
             self._run_slice(view, start_time + SLICE_SECONDS)
@@ -267,7 +315,8 @@ class ProgressiveRenderer:
                 seconds = view.task_seconds + time.monotonic() - start_time
                 self._update_estimate(seconds, megapixels)
             view.texture, view.texture_key = done.value, view.task_key
-            view.downscale = self.renderer.downscale_factors[1]
+            view.texture_still_key, view.buffer = view.task_still_key, view.task_buffer
+            view.downscale = full_downscale
             view.task = view.progress = self._refining_view = None
             if view.texture_key != view.requested_key:
                 self._schedule_redraw(0.0)
@@ -275,6 +324,14 @@ class ProgressiveRenderer:
         view.task_time = time.monotonic()
         view.task_seconds += view.task_time - start_time
         self._schedule_redraw(0.0)
+
+    def _must_wait(self, view: ViewState) -> bool:
+        """Whether another view has waited for the picture of this one, whose turn it then is."""
+        return (
+            self._waiting_view in self.views.values()
+            and self._waiting_view is not view
+            and time.monotonic() < self._waiting_time + ABANDON_SECONDS
+        )
 
     def _run_slice(self, view: ViewState, deadline: float) -> None:
         """Continue the task of a view until a deadline, or a step that the view has not named yet.

@@ -12,6 +12,8 @@ import bpy
 
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
+from ..compositor.flow import flow_at
+from ..compositor.look import Look, has_flow
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
 from ..rendering.view_input import ViewInput
@@ -22,6 +24,7 @@ from ..scene.look_properties import read_look
 from ..scene.scene_cache import InstanceState
 from ..scene.tone_inputs import check_tones, make_tone_request
 from .background import view_background
+from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates
 from .messages import draw_messages
 from .progressive import ProgressiveRenderer
@@ -29,6 +32,7 @@ from .references import ReferenceImages
 from .singularity_dots import SingularityDots, draw_dots, draw_labels, singularity_dots
 from .view3d import (
     clip_planes,
+    is_timeline_playing,
     is_visible,
     open_view3d_spaces,
     redraw,
@@ -55,6 +59,7 @@ TIMER_METHODS = (
     "_resolve_topologies",
     "_load_reference_images",
     "_redraw_sidebars",
+    "_advance_flow",
 )
 
 #: Pointers of a space and of one of its regions.
@@ -76,6 +81,8 @@ class ViewportSession:
         Pointers of the `SpaceView3D` that are live.
     fallback_reason : str or None
         Why the CPU draws instead of the graphics card.
+    flow_clock : FlowClock
+        By which streaks drift in all views, in addition to the frames of the scene.
 
     Raises
     ------
@@ -90,6 +97,9 @@ class ViewportSession:
         self.spaces: set[int] = set()
         self.fallback_reason: str | None = None
         self._fallback_time = 0.0
+        self.flow_clock = FlowClock()
+        #: Whether a view has shown streaks that drift since the clock was advanced.
+        self._has_shown_flow = False
         #: Why a view shows no picture.
         self._problems: dict[ViewPointers, str] = {}
         #: The lines of text in each view.
@@ -149,6 +159,16 @@ class ViewportSession:
         self.progressive.release()
         redraw()
 
+    def play_flow(self, plays: bool) -> None:
+        """Let streaks drift, or stop them."""
+        if plays:
+            self.flow_clock.play(time.monotonic())
+            self._schedule(0.0, "_advance_flow")
+            redraw(self.spaces)
+        else:
+            self.flow_clock.pause()
+        redraw_sidebars()
+
     # --- handlers and timers ---------------------------------------------------------------------
 
     def _on_update(
@@ -191,6 +211,26 @@ class ViewportSession:
     def _redraw_sidebars(self) -> None:
         """Show the text of the views in the sidebars too."""
         redraw_sidebars()
+
+    def _advance_flow(self) -> float | None:
+        """Advance the clock of the streaks by a frame, and redraw. Pictures are not overtaken.
+
+        While the timeline plays, the streaks drift by its frames alone.
+        """
+        if not self.flow_clock.is_playing:
+            return None
+        render, now = bpy.context.scene.render, time.monotonic()
+        rate = render.fps / render.fps_base
+        if is_timeline_playing():
+            self.flow_clock.skip(now)
+        elif (
+            self._has_shown_flow
+            and not self.progressive.is_rendering
+            and self.flow_clock.advance(now, rate)
+        ):
+            self._has_shown_flow = False
+            redraw(self.spaces)
+        return 1 / rate
 
     def _schedule(self, seconds: float, name: str) -> None:
         """Start a timer that calls a method, unless it is running already."""
@@ -250,6 +290,10 @@ class ViewportSession:
             (space.as_pointer(), region.as_pointer()),
             _picture_key(instances, view_input),
             view_input,
+            _picture_key(
+                instances,
+                replace(view_input, look=replace(view_input.look, flow_phase=0.0)),
+            ),
         )
         if self.progressive.is_prepared:
             look, camera = view_input.look, view_input.camera
@@ -331,11 +375,19 @@ class ViewportSession:
         return visible, ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
-            look=look,
+            look=self._drifted(look, context.scene),
             lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
             reference=reference,
             clip_planes=clip_planes(context.region_data),
         )
+
+    def _drifted(self, look: Look, scene: bpy.types.Scene) -> Look:
+        """Return the look with its streaks where they are at the frame of a scene and of the clock."""
+        if not has_flow(look):
+            return look
+        self._has_shown_flow = True
+        frame = scene.frame_current_final - scene.frame_start
+        return flow_at(look, frame + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
         """Show what is being done, and why a field is not drawn."""
@@ -415,6 +467,17 @@ def is_live(space: bpy.types.SpaceView3D) -> bool:
 def messages(area: bpy.types.Area) -> list[str]:
     """Return what the live views of an area say: what is being done, why a field is not drawn."""
     return [] if _session is None else _session.messages(area)
+
+
+def is_flow_playing() -> bool:
+    """Return whether streaks drift in the live views without the timeline."""
+    return _session is not None and _session.flow_clock.is_playing
+
+
+def play_flow(plays: bool) -> None:
+    """Let streaks drift in the live views, if there are any, or stop them where they are."""
+    if _session is not None:
+        _session.play_flow(plays)
 
 
 def start(space: bpy.types.SpaceView3D, device: str = "auto") -> None:

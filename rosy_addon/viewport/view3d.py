@@ -46,6 +46,12 @@ def redraw_sidebars() -> None:
                         region.tag_redraw()
 
 
+def is_timeline_playing() -> bool:
+    """Return whether Blender plays an animation in one of its windows."""
+    windows = bpy.context.window_manager.windows
+    return any(window.screen.is_animation_playing for window in windows)
+
+
 def shows_surfaces(space: bpy.types.SpaceView3D) -> bool:
     """Return whether the shading of a view shows surfaces, unlike wireframe shading."""
     return space.shading.type in {"SOLID", "MATERIAL", "RENDERED"}

@@ -400,6 +400,13 @@ def live_view(monkey):
         yield
 
 
+@action(1, uses_rosy=True)
+def flow_play(monkey):
+    monkey.rosy("flow_play")
+    for _ in range(monkey.pick([0, 3]) if monkey.window else 0):
+        yield
+
+
 # --- strokes, presets --------------------------------------------------------------------
 
 

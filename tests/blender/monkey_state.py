@@ -336,6 +336,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "show_here": (),
     "turntable": (),
     "viewport": (),
+    "flow_play": (),
     "strokes": _STROKES,
     "strokes_remove": _STROKES,
     "preset_apply": ("scenes/SCENE/rosy/look/*", "scenes/SCENE/rosy/preset*"),

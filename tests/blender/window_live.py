@@ -1061,6 +1061,72 @@ def live_views_are_remembered():
     check_nothing_is_left()
 
 
+def shown_phases():
+    """Return how far the streaks in the views have drifted."""
+    views = session_module()._session.progressive.views.values()
+    return [view_state.texture_key[4].flow_phase for view_state in views]
+
+
+def streaks_drift_while_they_are_played():
+    """Streaks drift by the button and with the frames of the scene; nothing runs on afterwards."""
+    yield from fresh_scene(levels=0)
+    scene = bpy.context.scene
+    scene.rosy.look.flow, scene.rosy.look.flow_phase = 1.5, 0.25
+    with in_view():
+        assert not bpy.ops.rosy.flow_play.poll()
+    switch("ON")
+    yield from wait_for_final_pictures()
+    assert shown_phases() == [0.25]
+    session = session_module()._session
+
+    def play_or_pause():
+        with in_view():
+            assert bpy.ops.rosy.flow_play() == {"FINISHED"}
+
+    def has_timers():
+        return any(map(bpy.app.timers.is_registered, session._timers.values()))
+
+    play_or_pause()
+    phases, downscales = [], set()
+
+    def drifts():
+        for view_state in session.progressive.views.values():
+            downscales.add(view_state.downscale)
+        phases.extend(phase for phase in shown_phases() if phase not in phases)
+        return len(phases) > 4
+
+    yield from wait_until(drifts)
+    assert downscales == {session.progressive.renderer.downscale_factors[1]}, "previews flash"
+    play_or_pause()
+    yield from wait_for_final_pictures()
+    paused, frames = shown_phases(), session.flow_clock.frames
+    assert paused != [0.25]
+    yield 0.5
+    view()[1].tag_redraw()
+    yield from wait_for_final_pictures()
+    assert shown_phases() == paused and session.flow_clock.frames == frames
+    scene.frame_set(scene.frame_start + 4)
+    yield from wait_for_final_pictures()
+    cycle = (4 + frames) * 1.5 / (scene.rosy.look.length * scene.rosy.look.step)
+    assert abs((shown_phases()[0] - 0.25 - cycle + 0.5) % 1 - 0.5) < 1e-4
+    play_or_pause()
+    yield 0.3
+    switch("OFF")
+    yield 0.3
+    assert not has_timers()
+    check_nothing_is_left()
+    switch("ON")
+    yield from wait_for_final_pictures()
+    session = session_module()._session
+    assert shown_phases() != paused and not session.flow_clock.is_playing
+    play_or_pause()
+    yield 0.3
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.3
+    assert not has_timers()
+    check_nothing_is_left()
+
+
 def nothing_leaks():
     """After toggles, undo steps and opened files, the textures and the memory are freed."""
     toggles, loads, undos = (500, 200, 100) if MANY else (4, 5, 3)
@@ -1165,6 +1231,7 @@ STEPS = (
     every_long_step_is_named_before_it_begins,
     the_first_field_is_shown,
     live_views_are_remembered,
+    streaks_drift_while_they_are_played,
     nothing_leaks,
     disabled_with_the_extension,
 )

@@ -17,6 +17,10 @@ from ..rendering.view_input import ViewInput
 #: Seconds that a redraw may take to render a picture at once, and seconds of one slice of refinement.
 FRAME_BUDGET_SECONDS, SLICE_SECONDS = 0.06, 0.08
 
+#: Seconds of one slice of a picture in which only streaks have drifted: redraws between slices would
+#: slow the streaks down.
+DRIFT_SLICE_SECONDS = 0.25
+
 #: Seconds without a change after which a view is at rest.
 IDLE_SECONDS = 0.12
 
@@ -292,6 +296,7 @@ class ProgressiveRenderer:
         The first picture is completed even if the view has changed: its cost must be known.
         """
         other, full_downscale = self._refining_view, self.renderer.downscale_factors[1]
+        shows_final = view.texture is not None and view.downscale == full_downscale
         if other in self.views.values() and other is not view and other.is_rendering:
             self._schedule_redraw(0.0)  # one at a time: they share the renderer's images
             self._waiting_view, self._waiting_time = view, time.monotonic()
@@ -302,18 +307,18 @@ class ProgressiveRenderer:
                 self._schedule_redraw(0.0)
                 return
             # The picture that is shown stays as it is.
-            is_final = view.texture is not None and view.downscale == full_downscale
-            view.task_buffer = 1 - view.buffer if is_final else view.buffer
+            view.task_buffer = 1 - view.buffer if shows_final else view.buffer
             view.task, view.task_seconds = start_task(view.task_buffer), 0.0
             view.task_key, view.task_still_key = view.requested_key, view.requested_still_key
             self._refining_view, self._waiting_view = view, None
         start_time = time.monotonic()
         try:
-            self._run_slice(view, start_time + SLICE_SECONDS)
+            seconds = DRIFT_SLICE_SECONDS if shows_final else SLICE_SECONDS
+            self._run_slice(view, start_time + seconds)
         except StopIteration as done:
             if not self._seconds_per_megapixel:
-                seconds = view.task_seconds + time.monotonic() - start_time
-                self._update_estimate(seconds, megapixels)
+                total_seconds = view.task_seconds + time.monotonic() - start_time
+                self._update_estimate(total_seconds, megapixels)
             view.texture, view.texture_key = done.value, view.task_key
             view.texture_still_key, view.buffer = view.task_still_key, view.task_buffer
             view.downscale = full_downscale

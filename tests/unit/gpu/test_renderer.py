@@ -529,9 +529,6 @@ def test_all_degrees(card, degree, perspective):
     assert_parity(card, [ball(degree)], view(perspective=perspective))
 
 
-#: Streaks that drift, at a phase at which the shift of no kernel is 0.
-DRIFTING = {"flow": 2.0, "flow_phase": 0.2}
-
 LOOKS = {
     "default": {},
     "color noise": {"noise": "colour"},
@@ -740,10 +737,16 @@ LOOKS = {
         "paper_grain": 0.5,
         "overshoot": 5.0,
     },
-    "drifting": DRIFTING,
     "the method members": {"method": "members", "weights": "none", "view_plane": False},
+    "the method brute": {"method": "brute"},
+}
+
+#: Streaks that drift, at a phase at which no kernel is where it is at rest.
+DRIFTING = {"flow": 2.0, "flow_phase": 0.2}
+DRIFTING_LOOKS = {
+    "drifting": DRIFTING,
     "drifting, oriented": DRIFTING | {"oriented": True, "degree": 1, "density": 0.03},
-    "drifting lines of streaks, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
+    "drifting, two directions, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
     "drifting, three directions": DRIFTING | {"taper": True, "degree": 3, "flow_distance": 13.0},
     "drifting on the surface": DRIFTING | {"anchor": "surface"},
     "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
@@ -756,14 +759,14 @@ LOOKS = {
     | {"overshoot": 15.0},
     "drifting breaks of even lines": DRIFTING
     | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
-    "the method brute": {"method": "brute"},
-    "without drift": DRIFTING | {"noise": "colour"},
+    "color noise, which does not drift": DRIFTING | {"noise": "colour"},
 }
+ALL_LOOKS = LOOKS | DRIFTING_LOOKS
 
 
-@pytest.mark.parametrize("name", mainly(list(LOOKS)[1::2], LOOKS))
+@pytest.mark.parametrize("name", mainly([*list(LOOKS)[1::2], *DRIFTING_LOOKS], ALL_LOOKS))
 def test_looks(card, name):
-    look_settings = {"degree": 4, **LOOKS[name]}
+    look_settings = {"degree": 4, **ALL_LOOKS[name]}
     degree = look_settings.pop("degree")
     look = LOOK.with_settings(look_settings)
     assert_parity(card, [ball(degree)], view(supersampling=look.supersampling), look)
@@ -1114,6 +1117,13 @@ def test_free_directions(card, name, hue):
     )
 
 
+@pytest.mark.parametrize("name", ["two", "three", "two lines"])
+def test_streaks_of_free_directions_drift(card, name):
+    """Along the directions; those of lines toward the guiding angle."""
+    look = replace(LOOK, hue="families", guiding_angle=0.6, **DRIFTING)
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
+
+
 @pytest.mark.parametrize("degree", [2, 3, 4, 5, 6])
 def test_families_of_rosys(card, degree):
     lines = degree if degree % 2 else degree // 2
@@ -1224,7 +1234,8 @@ UNDEFINED_LOOKS = {
 
 
 @pytest.mark.parametrize(
-    "name", mainly(["soft", "hatched", "hatched, all effects"], UNDEFINED_LOOKS)
+    "name",
+    mainly(["soft", "hatched", "hatched, all effects", "drifting, hatched"], UNDEFINED_LOOKS),
 )
 @pytest.mark.parametrize("degree", [3, 4])
 def test_where_the_field_is_undefined(card, degree, name):

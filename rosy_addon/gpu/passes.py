@@ -519,15 +519,8 @@ LIC = ComputePass(
     ),
     includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
     switches=(
-        *(
-            "kernel",
-            "flow_mode",
-            "magnitude_mode",
-            "colors_values",
-            "noise_channels",
-            "family_count",
-        ),
-        *("is_hatched", "is_light_ink", "even_lines", "ink_count"),
+        *("kernel", "flow_mode", "magnitude_mode", "colors_values", "noise_channels"),
+        *("family_count", "is_hatched", "is_light_ink", "even_lines", "ink_count"),
     ),
 )
 

@@ -12,7 +12,6 @@ import bpy
 
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
-from ..compositor.flow import flow_at
 from ..compositor.look import Look, has_flow
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
@@ -20,7 +19,7 @@ from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.color_inputs import check_colored, color_attribute_of
 from ..scene.lights import read_lights
-from ..scene.look_properties import read_look
+from ..scene.look_properties import look_at_frame, read_look
 from ..scene.scene_cache import InstanceState
 from ..scene.tone_inputs import check_tones, make_tone_request
 from .background import view_background
@@ -386,8 +385,7 @@ class ViewportSession:
         if not has_flow(look):
             return look
         self._has_shown_flow = True
-        frame = scene.frame_current_final - scene.frame_start
-        return flow_at(look, frame + self.flow_clock.frames)
+        return look_at_frame(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
         """Show what is being done, and why a field is not drawn."""

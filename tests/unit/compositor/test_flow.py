@@ -96,7 +96,7 @@ def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
     # The factor depends on nothing but the shares, where streamlines do not end.
     factor = sums.real / expected
     np.testing.assert_allclose(factor[[0, 2]], factor[1], rtol=2e-4)
-    level = round(7) if is_short else 0
+    level = 7 if is_short else 0
     np.testing.assert_allclose(samples[:3], moving.full_samples[level], rtol=1e-5)
     assert factor.min() > 0
 

@@ -288,7 +288,7 @@ def test_family_hues_keep_the_brightness():
     orange_minus_blue = (colored.rgba[..., 0] - colored.rgba[..., 2]).astype(float)
     orange, blue = np.clip(orange_minus_blue, 0, None), np.clip(-orange_minus_blue, 0, None)
     directions = [
-        peaks(orientation_spectrum(image - image.mean()), 2.5) for image in (orange, blue)
+        peaks(orientation_spectrum(image - image.mean()), 4.0) for image in (orange, blue)
     ]
     assert np.abs((np.array(directions[0]) + 90) % 180 - 90).max() < 3
     assert np.abs(np.array(directions[1]) - 90).max() < 3

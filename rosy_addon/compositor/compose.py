@@ -282,8 +282,15 @@ def _tone_along_lines_task(
     """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
+    # Weights that fall exponentially would reach too far.
+    method = "sheets" if look.method == "ibfv" else look.method
     overshoot_look = replace(
-        look, length=overshoot_steps(look), taper=False, oriented=False, flow=0.0
+        look,
+        method=method,
+        length=overshoot_steps(look),
+        taper=False,
+        oriented=False,
+        flow=0.0,
     )
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one

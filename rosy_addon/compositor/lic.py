@@ -13,6 +13,7 @@ from .band import Band
 from .brute_force import brute_force_task
 from .fast_lic import fast_lic_lengths_task, fast_lic_task
 from .flow import noise_channel_count
+from .ibfv import ibfv_lengths_task, ibfv_task
 from .image_noise import image_noise_task
 from .lic_images import LicImages
 from .look import Look
@@ -24,6 +25,7 @@ METHODS: dict[str, Callable[[PixelField, Look, np.ndarray], Task[LicImages]]] = 
     "members": member_decomposition_task,
     "brute": brute_force_task,
     "sheets": fast_lic_task,
+    "ibfv": ibfv_task,
 }
 
 
@@ -63,6 +65,8 @@ def lic_lengths_task(
         noise = yield from subtask(look_noise_task(field, look), 0.0, 0.0)
     if look.method == "sheets":
         return (yield from fast_lic_lengths_task(field, looks, noise, band, name))
+    if look.method == "ibfv":
+        return (yield from ibfv_lengths_task(field, looks, noise))
     images = []
     for each in looks:
         images.append((yield from METHODS[look.method](field, each, noise)))

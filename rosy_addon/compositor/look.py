@@ -57,7 +57,7 @@ def has_flow(look: Any) -> bool:
 
 
 def _can_flow(look: Any) -> bool:
-    return _has_streaks(look) and look.method == "sheets" and look.noise == "grey"
+    return _has_streaks(look) and look.method in ("sheets", "ibfv") and look.noise == "grey"
 
 
 def _is_lit(look: Any) -> bool:
@@ -108,6 +108,8 @@ class Look:
             "members": "Decompose the field into member vector fields with an image of each, as in "
             "the paper",
             "brute": "Follow the best of the N directions at every step: slow, for reference",
+            "ibfv": "Carry noise along the sheets of the covering surface and blend it, as in image based "
+            "flow visualization: soft streaks that fade, whose drift takes little time per frame",
         },
         panel="quality",
     )

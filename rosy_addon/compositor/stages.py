@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from ..projection.gbuffer import GBuffer
 from .band import Band, drawn_pixels
 from .even_lines import EvenLines, even_lines_task
 from .flow import unconvolved_noise
+from .ibfv import StreakWaves, streak_waves_task, wave_images_task
 from .lic import lic_lengths_task, look_noise_task, noise_args
 from .lic_images import LicImages
-from .look import Look, lic_key
+from .look import Look, has_flow, lic_key
 from .look_units import cell_size_args
 from .outline import OUTLINE_SETTINGS, outline_task
 from .paper_grain import surface_paper_grain_args
@@ -76,7 +78,20 @@ class ComposeStages:
         The looks differ in the length of streamlines. The first is the longest.
         """
 
+        def waves_task() -> Task[list[StreakWaves]]:
+            noise = yield from subtask(self._noise_task(field, looks[0]), 0.0, NOISE_SHARE)
+            if noise is None:
+                noise = yield from look_noise_task(field, looks[0])
+            task = streak_waves_task(field, looks, noise)
+            return (yield from subtask(task, NOISE_SHARE, 1.0))
+
         def compute_task() -> Task[list[LicImages]]:
+            if looks[0].method == "ibfv" and has_flow(looks[0]):
+                # They serve all frames.
+                still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
+                key = "streak waves", self._gbuffer, field.degree, *still
+                waves = yield from self._cache.get_or_create_task(key, waves_task)
+                return (yield from wave_images_task(waves, looks))
             noise = yield from subtask(self._noise_task(field, looks[0]), 0.0, NOISE_SHARE)
             task = lic_lengths_task(field, looks, noise, self._band, f"degree {field.degree}")
             return (yield from subtask(task, NOISE_SHARE, 1.0))

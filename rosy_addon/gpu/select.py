@@ -20,6 +20,10 @@ RENDER_DEVICES = {
 }
 
 
+#: LIC methods that the graphics card does not have. In 3D views it traces streamlines instead.
+CPU_METHODS = ("members", "ibfv")
+
+
 def select_renderer(
     device: str,
     look: Look,
@@ -51,9 +55,9 @@ def select_renderer(
     if device == "cpu":
         return CpuRenderer(cache, keep_gbuffers=keep_gbuffers, workers=workers)
     try:
-        if look.method == "members":
+        if look.method in CPU_METHODS:
             raise DeviceError(
-                "the graphics card cannot draw the method 'members': choose another method, or the "
+                f"the graphics card cannot draw the method '{look.method}': choose another method, or the "
                 "processor"
             )
         return GpuRenderer(blender_device())

@@ -1,0 +1,718 @@
+"""Image based flow visualization on the covering surface: noise that is carried along and blended.
+
+Van Wijk (Image based flow visualization, SIGGRAPH 2002) carries the picture a step along a vector field,
+blends it with a little noise, and repeats this frame by frame. The picture is then an average of the noise
+upstream, whose weights q^m fall exponentially with the number m of steps. On the covering (see `covering`)
+an N-RoSy is a vector field as well: each state takes what arrives at it along its own sheet.
+
+After many frames, the picture is the sum over m of q^m A^m n, where n is the noise, and A carries a picture
+one step. Repeating the blend would interpolate between pixels at every step, which blurs streaks. So the
+sum is doubled instead:
+
+    F_2D = F_D + q^D A^D F_D,    A^2D = A^D A^D.
+
+A^D is known by where the streamline of each state comes from, D steps upstream. These points vary slowly
+and are composed by interpolation, as in hierarchical line integration (Hlawatsch, Sadlo and Weiskopf, IEEE
+TVCG 2011). Some doublings replace more than a hundred blends, and values are interpolated once in each.
+
+Noise that varies in time makes the streaks drift. That of `flow` has one frequency, and A does not depend
+on the time. So the picture of any frame is a blend of three images, which serve all frames: the average of
+what is constant in the noise, and the cosine and sine parts of the rest. Frames need no earlier ones, and
+loops close.
+
+Streaks of a field of odd degree are one-sided, along its directions. A line without direction is a pair of
+opposite sheets. Its streaks are those of both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..progress import Progress, Task, subtask
+from ..projection.pixel_blocks import pixel_blocks
+from .contrast import normalize_variance
+from .covering import SINK_CELL, Covering, build_covering_task, member_lines, unpack_neighbor_mask
+from .filter_kernel import full_sample_count, kernel_of, kernel_weights
+from .flow import FLOW_CHANNELS, cycle_distance
+from .image_noise import NOISE_MEAN
+from .lic_images import LicImages, lic_images_task, step_limits_task
+from .look import Look, has_flow
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField
+
+#: Steps whose noise is added one by one, before the first doubling. Their noise is not interpolated.
+FIRST_STEPS = 4
+
+#: The doublings end when the weights of further steps are below this. Averages are divided by the weights
+#: that they have.
+MIN_WEIGHT = 0.01
+
+#: How much the noise of a pixel is raised above that of each of its four neighbors. This restores what
+#: interpolation blurs, on average: streaks across the rows of pixels are not blurred, others are.
+SHARPENING = np.float32(0.125)
+
+#: Factor of the contrast, which gives streaks the standard deviation of those of other methods: of streaks
+#: on one side of a pixel, which are carried further, and of those on both sides.
+ONE_SIDED_MATCH, TWO_SIDED_MATCH = np.float32(1.06), np.float32(1.02)
+
+#: Largest distance in pixels, along each axis, of the points that neighbors come from. Streamlines that are
+#: further apart have parted.
+MAX_PARTING = np.float32(2.5)
+
+#: Weight of the noise at the pixel itself, relative to that of the first step. It is part of both sheets of
+#: a line.
+OWN_WEIGHT = 0.5
+
+#: Label of all steps.
+STEP_LABEL = "carrying noise"
+
+
+@dataclass(frozen=True, eq=False)
+class StreakWaves:
+    """The average noise of each line, for all phases of the flow.
+
+    Attributes
+    ----------
+    constant : (M, P, K) float32 ndarray
+        Averages around 0, scaled to the variance of full streamlines.
+    wave : (M, P) complex64 ndarray or None
+        The real part of its product with exp(2 pi i phase) is added. None without flow.
+    effective_samples : (P,) float32 ndarray
+        As in `LicImages`.
+    """
+
+    constant: np.ndarray
+    wave: np.ndarray | None
+    effective_samples: np.ndarray
+
+    def images_task(self, phase: float) -> Task[LicImages]:
+        """Return the LIC images at a phase of the flow."""
+        members = np.empty_like(self.constant)
+        turn = np.exp(2j * np.pi * phase)
+        real, imaginary = np.float32(turn.real), np.float32(turn.imag)
+        count = members.shape[1]
+        for line, member in enumerate(members):
+            for block in pixel_blocks(count):
+                yield Progress(0.5 * block.start / count, "blending lines")
+                np.add(self.constant[line, block], np.float32(NOISE_MEAN), out=member[block])
+                if self.wave is not None:
+                    wave = self.wave[line, block]
+                    member[block, 0] += wave.real * real - wave.imag * imaginary
+        return (yield from subtask(lic_images_task(members, self.effective_samples), 0.5, 1.0))
+
+
+def ibfv_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+    """Compute one LIC image for each of the M lines.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the frame.
+    noise : (P, K) float32 ndarray
+    """
+    (images,) = yield from ibfv_lengths_task(field, [look], noise)
+    return images
+
+
+def ibfv_lengths_task(
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray
+) -> Task[list[LicImages]]:
+    """Compute LIC images of several lengths; parameters as for `streak_waves_task`."""
+    waves = yield from subtask(streak_waves_task(field, looks, noise), 0.0, 0.95)
+    return (yield from subtask(wave_images_task(waves, looks), 0.95, 1.0))
+
+
+def wave_images_task(waves: Sequence[StreakWaves], looks: Sequence[Look]) -> Task[list[LicImages]]:
+    """Return the LIC images of looks at their phases."""
+    images = []
+    for wave, look in zip(waves, looks, strict=True):
+        images.append((yield from wave.images_task(look.flow_phase)))
+    return images
+
+
+def streak_waves_task(
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray
+) -> Task[list[StreakWaves]]:
+    """Average the noise upstream of every state, for looks that differ in the length of streamlines.
+
+    Parameters
+    ----------
+    field : PixelField
+    looks : sequence of Look
+        In pixels of the frame. The first is the longest.
+    noise : (P, K) float32 ndarray
+        The three channels of `flow`, if the looks have flow.
+
+    Returns
+    -------
+    list of StreakWaves
+        Of each look.
+    """
+    look = looks[0]
+    if not len(field.pixel):
+        return [_empty_waves(field, each, noise) for each in looks]
+    noise = noise - np.float32(NOISE_MEAN)
+    covering = yield from subtask(build_covering_task(field, look, noise[:, :1]), 0.0, 0.1)
+    sheets = _Sheets(covering, is_upstream=not look.oriented)
+    sources = [sheets.sharpened(source) for source in _noise_sources(noise, look)]
+    own = sheets.own_states()
+    sums = []
+    for each in looks:
+        decay = yield from subtask(_decay_task(field, each), 0.1, 0.1)
+        sums.append(_Sums(sheets, sources, decay, _turn(look)))
+        yield from subtask(sums[-1].add_noise_task(0, own), 0.1, 0.1)
+    one_step = origins = yield from subtask(sheets.one_step_task(), 0.1, 0.2)
+    for step in range(1, FIRST_STEPS):
+        start, stop = 0.15 + 0.05 * step, 0.2 + 0.05 * step
+        for total in sums:
+            yield from subtask(total.add_noise_task(step, origins), start, start)
+        origins = yield from subtask(sheets.composed_task(origins, one_step), start, stop)
+    doublings = max(total.doublings() for total in sums)
+    for doubling in range(doublings):
+        start, stop = (0.35 + 0.55 * place / doublings for place in (doubling, doubling + 1))
+        task = sheets.doubled_task(
+            sums, FIRST_STEPS << doubling, origins, doubling == doublings - 1
+        )
+        origins = yield from subtask(task, start, stop)
+    waves = []
+    for each, total in zip(looks, sums, strict=True):
+        task = _line_waves_task(field, covering, each, total)
+        waves.append((yield from subtask(task, 0.9, 1.0)))
+    return waves
+
+
+def _empty_waves(field: PixelField, look: Look, noise: np.ndarray) -> StreakWaves:
+    """The averages of a field without pixels."""
+    shape = field.line_count, 0
+    channels = 1 if has_flow(look) else noise.shape[1]
+    wave = np.empty(shape, dtype=np.complex64) if has_flow(look) else None
+    return StreakWaves(
+        np.empty((*shape, channels), dtype=np.float32), wave, np.empty(0, dtype=np.float32)
+    )
+
+
+def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
+    """What is summed along streamlines, as complex numbers.
+
+    Parameters
+    ----------
+    noise : (P, K) float32 ndarray
+        Around 0.
+
+    Returns
+    -------
+    list of (P,) complex64 ndarray
+        The first has the noise, and 1 as its imaginary part, whose sum is that of the weights. The second
+        has the other two channels of colored noise, or the wave of `StreakWaves`.
+    """
+    if has_flow(look):
+        # The weights of the channels are a constant and a cosine: see `flow.channel_weights`.
+        mean = math.sqrt(8 / 9) / 2
+        third = np.exp(2j * np.pi * np.arange(FLOW_CHANNELS) / FLOW_CHANNELS)
+        constant = noise @ np.full(FLOW_CHANNELS, mean, dtype=np.float32)
+        wave = -mean * third
+        real, imaginary = (noise @ part.astype(np.float32) for part in (wave.real, wave.imag))
+        return [constant + np.complex64(1j), real + np.complex64(1j) * imaginary]
+    sources = [noise[:, 0] + np.complex64(1j)]
+    if noise.shape[1] == 3:
+        sources.append(noise[:, 1] + np.complex64(1j) * noise[:, 2])
+    return sources
+
+
+def _turn(look: Look) -> float:
+    """The angle by which the phase of the noise differs from that of the noise a step nearer."""
+    if not has_flow(look):
+        return 0.0
+    angle = 2 * np.pi * look.step / cycle_distance(look)
+    # What comes from upstream left there earlier. What is downstream will be there later.
+    return angle if look.oriented else -angle
+
+
+def _is_two_sided(field: PixelField, look: Look) -> bool:
+    """Whether streaks are averages over both directions of a line, with equal weights."""
+    return field.symmetry.has_opposites and not has_flow(look)
+
+
+def _decay_task(field: PixelField, look: Look) -> Task[np.ndarray]:
+    """(P,) or () float32 ratios q of the weights of successive steps."""
+    two_sided = _is_two_sided(field, look)
+    limits = yield from step_limits_task(field, look)
+    if limits is None:
+        return np.float32(decay_of_samples(np.float64(full_sample_count(look)), two_sided))
+    length = np.arange(look.length + 1, dtype=np.float64)
+    samples = kernel_weights(length, length, length, kernel_of(look)).effective_samples
+    return decay_of_samples(samples, two_sided).astype(np.float32)[limits]
+
+
+def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarray:
+    """Return the decay of the kernel with given effective samples, by bisection.
+
+    Parameters
+    ----------
+    effective_samples : float64 ndarray
+        At least 1.
+    two_sided : bool
+        Whether the kernel is that of both directions of a line.
+
+    Returns
+    -------
+    float64 ndarray
+        q, the ratio of the weights of successive steps.
+    """
+    low, high = np.zeros_like(effective_samples), np.ones_like(effective_samples)
+    for _ in range(40):
+        middle = (low + high) / 2
+        total = OWN_WEIGHT + middle / (1 - middle)
+        squares = _square_sum(0.0, middle)
+        if two_sided:
+            squares = (squares + OWN_WEIGHT**2) / 2
+        is_low = total**2 < effective_samples * squares
+        low, high = np.where(is_low, middle, low), np.where(is_low, high, middle)
+    return low
+
+
+def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
+    """The sum of the squares of the weights of a sheet up to the step whose weight is `rest`."""
+    return OWN_WEIGHT**2 + decay**2 * (1 - np.square(rest)) / (1 - decay**2)
+
+
+class _Origins(NamedTuple):
+    """The points that (n,) states are reached from: cells, sheets, and offsets from the centers of cells.
+
+    The cell is `SINK_CELL` where the streamline has ended.
+    """
+
+    cell: np.ndarray
+    sheet: np.ndarray
+    offset: np.ndarray
+
+    @classmethod
+    def ended(cls, count: int) -> _Origins:
+        """Return origins of states whose streamlines have ended."""
+        return cls(
+            np.full(count, SINK_CELL, dtype=np.int32),
+            np.zeros(count, dtype=np.int8),
+            np.zeros(count, dtype=np.complex64),
+        )
+
+    def at(self, state: np.ndarray) -> _Origins:
+        """Return those of some states."""
+        return _Origins(*(values.take(state) for values in self))
+
+    def put(self, state: np.ndarray, origins: _Origins) -> None:
+        """Replace those of some states."""
+        for values, new in zip(self, origins, strict=True):
+            values[state] = new
+
+
+class _Surroundings(NamedTuple):
+    """The four pixels around (n,) points: that of the point, the next ones in x and y, and that in both.
+
+    Attributes
+    ----------
+    states : list of (n,) intp ndarray
+        Of these pixels, each with its own sheet. Where streamlines cannot step to a pixel, it is that of
+        the point.
+    unlinked : list of (m,) intp ndarray
+        The points whose streamlines cannot.
+    column, row : (n,) intp ndarray
+        The steps to the next pixels, 1 or -1.
+    x, y : (n,) float32 ndarray
+        Distances from the center of the pixel, from 0 to 1 / 2.
+    """
+
+    states: list[np.ndarray]
+    unlinked: list[np.ndarray]
+    column: np.ndarray
+    row: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+
+    def weights(self) -> list[np.ndarray]:
+        """Return the (n,) float32 weights of bilinear interpolation."""
+        return _bilinear_weights(self.x, self.y)
+
+
+def interpolated(
+    values: np.ndarray, corners: Sequence[np.ndarray], weights: Sequence[np.ndarray]
+) -> np.ndarray:
+    """Return sums of values at (n,) indices, with weights."""
+    total = values.take(corners[0])
+    total *= weights[0]
+    for corner, weight in zip(corners[1:], weights[1:], strict=True):
+        total += values.take(corner) * weight
+    return total
+
+
+def _bilinear_weights(x: np.ndarray, y: np.ndarray) -> list[np.ndarray]:
+    both = x * y
+    return [1 - x - y + both, x - both, y - both, both]
+
+
+class _Sheets:
+    """The sheets that streamlines come from, and the steps between their states.
+
+    Of fields without opposites, only the directions or their opposites are needed. They are numbered from
+    0, and state (c, k) has the index k C + c.
+
+    Parameters
+    ----------
+    covering : Covering
+    is_upstream : bool
+        Whether streamlines come from where lines point away from.
+    """
+
+    def __init__(self, covering: Covering, is_upstream: bool) -> None:
+        self._covering = covering
+        self.cells, self._width = covering.cell_of_pixel, covering.width
+        self.cell_count = covering.cell_count
+        lines, turn = covering.line_count, covering.sheets_per_turn
+        self.count = lines if covering.has_directions else 2 * lines
+        # Every other sheet of a RoSy of odd degree is a direction.
+        self._spacing = turn // self.count
+        sheet = np.arange(self.count) * self._spacing
+        if is_upstream and covering.has_directions:
+            sheet = (sheet + lines) % (2 * lines)
+        self._covering_sheet = sheet
+        self._shift = self._shift_table()
+        # The first state of each sheet, which are counted on after the last.
+        self._first_states = np.tile(np.arange(self.count) * self.cell_count, 2)
+
+    def number(self, covering_sheet: int) -> int:
+        """Return the number of the sheet along, or against, a sheet of the covering."""
+        (numbers,) = np.nonzero(self._covering_sheet == covering_sheet)
+        return int(numbers[0])
+
+    def sharpened(self, values: np.ndarray) -> np.ndarray:
+        """Return (C,) values of cells, 0 outside, from (P,) values of pixels; see `SHARPENING`."""
+        result = np.zeros(self.cell_count, dtype=values.dtype)
+        result[self.cells] = values
+        cells, sharp = self.cells.astype(np.intp), result.copy()
+        for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
+            if abs(column) + abs(row) == 1:
+                linked = self._shift.take(bit * self.cell_count + cells) >= 0
+                neighbor = result.take(cells + (row * self._width + column))
+                sharp[cells] += np.where(linked, SHARPENING * (values - neighbor), 0)
+        return sharp
+
+    def blocks(self) -> Iterator[tuple[float, int, slice, np.ndarray]]:
+        """Yield the share of the blocks before, the sheet, the pixels, and their (n,) intp states."""
+        count = len(self.cells)
+        for sheet in range(self.count):
+            for block in pixel_blocks(count):
+                share = (sheet + block.start / count) / self.count
+                yield (
+                    share,
+                    sheet,
+                    block,
+                    sheet * self.cell_count + self.cells[block].astype(np.intp),
+                )
+
+    def own_states(self) -> _Origins:
+        """Return the origins of states before the first step."""
+        own = _Origins.ended(self.count * self.cell_count)
+        for sheet in range(self.count):
+            state = sheet * self.cell_count + self.cells
+            own.cell[state], own.sheet[state] = self.cells, sheet
+        return own
+
+    def one_step_task(self) -> Task[_Origins]:
+        """Find where each state is reached from in a step, by the midpoint method."""
+        scale = np.float32(self._covering.state_scales[0])
+        table = self._covering.state_table.reshape(
+            -1, self.cell_count, self._covering.state_table.shape[1]
+        )
+        step = np.zeros((self.count, self.cell_count), dtype=np.complex64)
+        for rows, sheet in zip(step, self._covering_sheet, strict=True):
+            yield Progress(0.0, STEP_LABEL)
+            rows.real, rows.imag = table[sheet, :, 0], table[sheet, :, 1]
+            rows *= scale
+        step = step.reshape(-1)
+        result = _Origins.ended(len(step))
+        for share, sheet, block, state in self.blocks():
+            yield Progress(share, STEP_LABEL)
+            cell = self.cells[block]
+            sheets = np.full(len(cell), sheet, dtype=np.int8)
+            own = step.take(state)
+            middle = np.zeros_like(own)
+            around = self.surroundings(_Origins(cell, sheets, np.float32(0.5) * own))
+            for corner, weight in zip(around.states, around.weights(), strict=True):
+                middle += weight * step.take(corner)
+            result.put(state, self._moved(_Origins(cell, sheets, middle)))
+        return result
+
+    def composed_task(self, first: _Origins, second: _Origins) -> Task[_Origins]:
+        """Follow streamlines to the origins `first`, and from there to those of `second`."""
+        result = _Origins.ended(len(first.cell))
+        for share, _, _, state in self.blocks():
+            yield Progress(share, STEP_LABEL)
+            result.put(state, self._interpolated(second, self.surroundings(first.at(state))))
+        return result
+
+    def doubled_task(
+        self, sums: Sequence[_Sums], steps: int, origins: _Origins, is_last: bool
+    ) -> Task[_Origins]:
+        """Add to sums over a number of steps those over as many further steps, from the origins.
+
+        Returns
+        -------
+        _Origins
+            Of twice as many steps. Not if it is the last time.
+        """
+        doubled = [[values.copy() for values in total.values] for total in sums]
+        result = _Origins.ended(0 if is_last else len(origins.cell))
+        for share, _, block, state in self.blocks():
+            yield Progress(share, STEP_LABEL)
+            around = self.surroundings(origins.at(state))
+            weights = around.weights()
+            for total, results in zip(sums, doubled, strict=True):
+                factors = total.factors(steps, block)
+                for values, target, factor in zip(total.values, results, factors, strict=True):
+                    target[state] += interpolated(values, around.states, weights) * factor
+            if not is_last:
+                result.put(state, self._interpolated(origins, around))
+        for total, results in zip(sums, doubled, strict=True):
+            total.values = results
+        return result
+
+    def _interpolated(self, origins: _Origins, around: _Surroundings) -> _Origins:
+        """Interpolate the origins of states to points."""
+        target = origins.at(around.states[0])
+        change = np.zeros_like(target.offset)
+        width, inverse_width = np.float32(self._width), np.float32(1 / self._width)
+        directions = (around.column, 0), (0, around.row), (around.column, around.row)
+        for corner, unlinked, weight, (column, row) in zip(
+            around.states[1:], around.unlinked, around.weights()[1:], directions, strict=True
+        ):
+            cells = origins.cell.take(corner)
+            distance = origins.offset.take(corner)
+            distance -= target.offset
+            between = (cells - target.cell).astype(np.float32)
+            rows = np.rint(between * inverse_width)
+            between -= rows * width
+            distance.real += between
+            distance.imag += rows
+            # Of points that are reached from elsewhere, the distance to the pixel is taken.
+            apart = np.abs(distance.view(np.float32))
+            parted = np.maximum(apart[::2], apart[1::2]) > MAX_PARTING
+            parted |= cells == SINK_CELL
+            parted[unlinked] = True
+            parted = np.flatnonzero(parted)
+            for part, step in ((distance.real, column), (distance.imag, row)):
+                part[parted] = step if np.ndim(step) == 0 else step[parted]
+            distance *= weight
+            change += distance
+        change += target.offset
+        return self._moved(_Origins(target.cell, target.sheet, change))
+
+    def surroundings(self, origins: _Origins) -> _Surroundings:
+        """Return the four pixels around points."""
+        cell, sheet = origins.cell.astype(np.intp), origins.sheet.astype(np.intp)
+        x, y = origins.offset.real.copy(), origins.offset.imag.copy()
+        column, row = np.where(x < 0, -1, 1), np.where(y < 0, -1, 1)
+        own = self._first_states.take(sheet)
+        own += cell
+        states, unlinked = [own], []
+        for step in (column, row * 3, column + 3 * row):
+            neighbor = step + 4
+            neighbor *= self.cell_count
+            neighbor += cell
+            shift = self._shift.take(neighbor)
+            unlinked.append(np.flatnonzero(shift < 0))
+            state = self._first_states.take(sheet + shift, mode="clip")
+            state += cell
+            states.append(state)
+        row_cells = row * self._width
+        states[1] += column
+        states[2] += row_cells
+        states[3] += column
+        states[3] += row_cells
+        for state, points in zip(states[1:], unlinked, strict=True):
+            state[points] = own[points]
+        return _Surroundings(states, unlinked, column, row, np.abs(x, out=x), np.abs(y, out=y))
+
+    def _moved(self, origins: _Origins) -> _Origins:
+        """Assign points to the pixels that they are in, if streamlines can step there."""
+        moved, bit = self._stepped(origins)
+        blocked = np.flatnonzero(moved.cell == SINK_CELL)
+        seams = self._covering.seams
+        if seams is None or not len(blocked):
+            return moved
+        is_crossing, seam = seams.find(origins.cell[blocked], bit[blocked])
+        crossing = blocked[is_crossing]
+        cell, sheet, offset = origins.at(crossing)
+        column, row = np.divmod(bit[crossing], 3)[::-1]
+        offset = offset - (column - 1) - 1j * (row - 1)
+        offset = seams.steps.displaced(seam, offset) + seams.steps.offset.take(seam)
+        offset.real, offset.imag = (np.clip(part, -1.5, 1.5) for part in (offset.real, offset.imag))
+        phase, target = self._covering.packed_phase, seams.target_cell.take(seam)
+        turned = phase.take(cell) - phase.take(target) + seams.sheet_shift.take(seam)
+        matched = (sheet + np.rint(turned / self._spacing).astype(np.int32)) % self.count
+        reached = _Origins(target, matched.astype(np.int8), offset.astype(np.complex64))
+        beside, _ = self._stepped(reached)
+        # Points beyond another border are moved to it.
+        stays = beside.cell == SINK_CELL
+        for values, before in zip(beside, reached, strict=True):
+            values[stays] = before[stays]
+        for part in (beside.offset.real, beside.offset.imag):
+            np.clip(part, -0.5, 0.5, out=part)
+        moved.put(crossing, beside)
+        return moved
+
+    def _stepped(self, origins: _Origins) -> tuple[_Origins, np.ndarray]:
+        """Step to neighboring pixels, and end where that is not possible.
+
+        Returns
+        -------
+        origins : _Origins
+        bit : (n,) intp ndarray
+            The steps, as indices into `NEIGHBOR_OFFSETS`.
+        """
+        cell, sheet, offset = origins
+        column = np.clip(np.rint(offset.real), -1, 1)
+        row = np.clip(np.rint(offset.imag), -1, 1)
+        bit = (column + 3 * row + 4).astype(np.intp)
+        shift = self._shift.take(bit * self.cell_count + cell)
+        target = cell + (row * self._width + column).astype(np.int32)
+        matched = sheet.astype(np.int16) + shift
+        matched -= np.int16(self.count) * (matched >= self.count)
+        rest = offset - (column + np.complex64(1j) * row)
+        blocked = np.flatnonzero(shift < 0)
+        target[blocked], matched[blocked], rest[blocked] = SINK_CELL, 0, 0
+        return _Origins(target, matched.astype(np.int8), rest), bit
+
+    def _shift_table(self) -> np.ndarray:
+        """(9 C,) int8: what a step to a neighbor adds to the sheet, from 0; -1 where there is none."""
+        phase, cells = self._covering.packed_phase, self.cells.astype(np.intp)
+        table = np.full((9, self.cell_count), -1, dtype=np.int8)
+        mask = unpack_neighbor_mask(phase.take(cells))
+        own = phase.take(cells)
+        for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
+            neighbor = phase.take(cells + row * self._width + column)
+            shift = (
+                np.rint((own - neighbor) / np.float32(self._spacing)).astype(np.int32) % self.count
+            )
+            table[bit, cells] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
+        return table.reshape(-1)
+
+
+class _Sums:
+    """Weighted sums of noise along the streamlines of all states.
+
+    Parameters
+    ----------
+    sheets : _Sheets
+    sources : list of (C,) complex64 ndarray
+        What is summed.
+    decay : (P,) or () float32 ndarray
+        q.
+    turn : float
+        Angle by which the second source is turned at each step.
+    """
+
+    def __init__(
+        self, sheets: _Sheets, sources: list[np.ndarray], decay: np.ndarray, turn: float
+    ) -> None:
+        self._sheets = sheets
+        self.sources = sources
+        self.decay = decay
+        self._turns = [0.0, turn][: len(sources)]
+        size = sheets.count * sheets.cell_count
+        self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
+
+    def doublings(self) -> int:
+        """Return how many doublings the sums need after the first steps."""
+        largest = float(np.max(self.decay))
+        steps = math.log(MIN_WEIGHT) / math.log(largest) if largest > 0 else 0
+        return max(math.ceil(math.log2(max(steps, 1) / FIRST_STEPS)), 0)
+
+    def add_noise_task(self, step: int, origins: _Origins) -> Task[None]:
+        """Add the noise at the origins of a step."""
+        for share, _, block, state in self._sheets.blocks():
+            yield Progress(share, STEP_LABEL)
+            around = self._sheets.surroundings(origins.at(state))
+            cells = [corner % self._sheets.cell_count for corner in around.states]
+            for total, source, factor in zip(
+                self.values, self.sources, self.factors(step, block), strict=True
+            ):
+                total[state] += interpolated(source, cells, around.weights()) * factor
+
+    def factors(self, step: int, block: slice) -> list[np.ndarray]:
+        """Return the weights of a step at the pixels of a block, for each of the sources."""
+        decay = self.decay[block] if np.ndim(self.decay) else self.decay
+        weight = decay ** np.float32(step)
+        return [
+            weight if not turn else weight * np.complex64(np.exp(1j * turn * step))
+            for turn in self._turns
+        ]
+
+    def at(
+        self, covering_sheet: int, block: slice
+    ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+        """Return the sums of a sheet at some pixels, their weights, and the sums of squared weights.
+
+        The own noise has the weight `OWN_WEIGHT` in them.
+        """
+        sheets = self._sheets
+        cell = sheets.cells[block].astype(np.intp)
+        state = sheets.number(covering_sheet) * sheets.cell_count + cell
+        values = [
+            total.take(state) - np.float32(1 - OWN_WEIGHT) * source.take(cell)
+            for total, source in zip(self.values, self.sources, strict=True)
+        ]
+        weight = values[0].imag
+        decay = self.decay[block] if np.ndim(self.decay) else self.decay
+        rest = 1 - (weight - np.float32(OWN_WEIGHT)) * (1 - decay) / np.maximum(
+            decay, np.float32(1e-6)
+        )
+        return values, weight, _square_sum(np.clip(rest, 0, 1), decay).astype(np.float32)
+
+
+def _line_waves_task(
+    field: PixelField, covering: Covering, look: Look, sums: _Sums
+) -> Task[StreakWaves]:
+    """Blend the two sheets of each line, and equalize the contrast."""
+    lines, count = field.line_count, len(field.pixel)
+    flows = has_flow(look)
+    match = TWO_SIDED_MATCH if _is_two_sided(field, look) else ONE_SIDED_MATCH
+    channels = 2 * len(sums.sources) - 1
+    constant = np.empty((lines, count, 1 if flows else channels), dtype=np.float32)
+    wave = np.empty((lines, count), dtype=np.complex64) if flows else None
+    effective_samples = np.zeros(count, dtype=np.float32)
+    for line, first_sheet in enumerate(member_lines(field).tolist()):
+        for block in pixel_blocks(count):
+            yield Progress((line + block.start / count) / lines, "blending lines")
+            state = first_sheet * covering.cell_count + covering.cell_of_pixel[block].astype(
+                np.intp
+            )
+            if covering.has_directions:
+                is_along = bool(covering.is_along_member(state[:1])[0])
+                opposite = first_sheet + (lines if is_along == (not look.oriented) else 0)
+                values, weight, squares = sums.at(opposite, block)
+            else:
+                forward = covering.forward_share(state) if flows else np.float32(0.5)
+                backward = 1 - forward
+                # What drifts forward comes along the opposite sheet.
+                one, one_weight, one_squares = sums.at(first_sheet + lines, block)
+                other, other_weight, other_squares = sums.at(first_sheet, block)
+                values = [forward * a + backward * b for a, b in zip(one, other, strict=True)]
+                weight = forward * one_weight + backward * other_weight
+                squares = forward**2 * one_squares + backward**2 * other_squares
+                squares += 2 * forward * backward * np.float32(OWN_WEIGHT**2)
+            samples = weight**2 / squares
+            parts = [values[0].real, *(part for v in values[1:] for part in (v.real, v.imag))]
+            mean = np.stack(parts, axis=1)
+            mean *= (match / weight)[:, None]
+            mean += np.float32(NOISE_MEAN)
+            scaled = normalize_variance(mean, samples, look) - np.float32(NOISE_MEAN)
+            constant[line, block] = scaled[:, : constant.shape[2]]
+            if wave is not None:
+                wave[line, block] = scaled[:, 1] + np.complex64(1j) * scaled[:, 2]
+            effective_samples[block] += samples
+    effective_samples /= lines
+    return StreakWaves(constant, wave, effective_samples)

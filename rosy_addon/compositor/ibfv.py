@@ -15,10 +15,11 @@ A^D is known by where the streamline of each state comes from, D steps upstream.
 and are composed by interpolation, as in hierarchical line integration (Hlawatsch, Sadlo and Weiskopf, IEEE
 TVCG 2011). Some doublings replace more than a hundred blends, and values are interpolated once in each.
 
-Noise that varies in time makes the streaks drift. That of `flow` has one frequency, and A does not depend
-on the time. So the picture of any frame is a blend of three images, which serve all frames: the average of
-what is constant in the noise, and the cosine and sine parts of the rest. Frames need no earlier ones, and
-loops close.
+Noise that varies in time makes the streaks drift. It is interpolated between the three channels of the
+flow, by a constant and a cosine and sine of the phase: n_c at the phase -c / 3. The squares of the weights
+(1 + 2 cos) / 3 have the sum 1, so the contrast is constant. There is one frequency, and A does not depend on
+the time. So the picture of any frame is a blend of three images, which serve all frames: averages of the
+constant, the cosine and the sine part of the noise. Frames need no earlier ones, and loops close.
 
 Streaks of a field of odd degree are one-sided, along its directions. A line without direction is a pair of
 opposite sheets. Its streaks are those of both.
@@ -44,16 +45,13 @@ from .lic_images import LicImages, lic_images_task, step_limits_task
 from .look import Look, has_flow
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField
 
-#: Steps whose noise is added one by one, before the first doubling. Their noise is not interpolated.
-FIRST_STEPS = 4
-
 #: The doublings end when the weights of further steps are below this. Averages are divided by the weights
 #: that they have.
 MIN_WEIGHT = 0.01
 
 #: How much the noise of a pixel is raised above that of each of its four neighbors. This restores what
 #: interpolation blurs, on average: streaks across the rows of pixels are not blurred, others are.
-SHARPENING = np.float32(0.125)
+SHARPENING = np.float32(0.15)
 
 #: Factor of the contrast, which gives streaks the standard deviation of those of other methods: of streaks
 #: on one side of a pixel, which are carried further, and of those on both sides.
@@ -68,7 +66,7 @@ MAX_PARTING = np.float32(2.5)
 OWN_WEIGHT = 0.5
 
 #: Label of all steps.
-STEP_LABEL = "carrying noise"
+STEP_LABEL = "tracing streamlines"
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,28 +154,22 @@ def streak_waves_task(
     look = looks[0]
     if not len(field.pixel):
         return [_empty_waves(field, each, noise) for each in looks]
-    noise = noise - np.float32(NOISE_MEAN)
-    covering = yield from subtask(build_covering_task(field, look, noise[:, :1]), 0.0, 0.1)
+    # Of the noise, the covering only needs the number of channels.
+    covering_task = build_covering_task(field, look, np.zeros((len(field.pixel), 1), np.float32))
+    covering = yield from subtask(covering_task, 0.0, 0.05)
     sheets = _Sheets(covering, is_upstream=not look.oriented)
-    sources = [sheets.sharpened(source) for source in _noise_sources(noise, look)]
-    own = sheets.own_states()
+    yield from subtask(sheets.link_task(), 0.05, 0.1)
+    sources = yield from subtask(sheets.sources_task(noise, look), 0.1, 0.1)
     sums = []
     for each in looks:
         decay = yield from subtask(_decay_task(field, each), 0.1, 0.1)
         sums.append(_Sums(sheets, sources, decay, _turn(look)))
-        yield from subtask(sums[-1].add_noise_task(0, own), 0.1, 0.1)
-    one_step = origins = yield from subtask(sheets.one_step_task(), 0.1, 0.2)
-    for step in range(1, FIRST_STEPS):
-        start, stop = 0.15 + 0.05 * step, 0.2 + 0.05 * step
-        for total in sums:
-            yield from subtask(total.add_noise_task(step, origins), start, start)
-        origins = yield from subtask(sheets.composed_task(origins, one_step), start, stop)
+        yield from subtask(sums[-1].start_task(), 0.1, 0.1)
+    origins = yield from subtask(sheets.one_step_task(), 0.1, 0.2)
     doublings = max(total.doublings() for total in sums)
     for doubling in range(doublings):
-        start, stop = (0.35 + 0.55 * place / doublings for place in (doubling, doubling + 1))
-        task = sheets.doubled_task(
-            sums, FIRST_STEPS << doubling, origins, doubling == doublings - 1
-        )
+        start, stop = (0.2 + 0.7 * place / doublings for place in (doubling, doubling + 1))
+        task = sheets.doubled_task(sums, 1 << doubling, origins, doubling == doublings - 1)
         origins = yield from subtask(task, start, stop)
     waves = []
     for each, total in zip(looks, sums, strict=True):
@@ -211,12 +203,9 @@ def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
         has the other two channels of colored noise, or the wave of `StreakWaves`.
     """
     if has_flow(look):
-        # The weights of the channels are a constant and a cosine: see `flow.channel_weights`.
-        mean = math.sqrt(8 / 9) / 2
         third = np.exp(2j * np.pi * np.arange(FLOW_CHANNELS) / FLOW_CHANNELS)
-        constant = noise @ np.full(FLOW_CHANNELS, mean, dtype=np.float32)
-        wave = -mean * third
-        real, imaginary = (noise @ part.astype(np.float32) for part in (wave.real, wave.imag))
+        weights = np.stack([np.full(FLOW_CHANNELS, 0.5), third.real, third.imag]) * (2 / 3)
+        constant, real, imaginary = (noise @ row for row in weights.astype(np.float32))
         return [constant + np.complex64(1j), real + np.complex64(1j) * imaginary]
     sources = [noise[:, 0] + np.complex64(1j)]
     if noise.shape[1] == 3:
@@ -379,7 +368,7 @@ class _Sheets:
         if is_upstream and covering.has_directions:
             sheet = (sheet + lines) % (2 * lines)
         self._covering_sheet = sheet
-        self._shift = self._shift_table()
+        self._shift = np.full(9 * self.cell_count, -1, dtype=np.int8)
         # The first state of each sheet, which are counted on after the last.
         self._first_states = np.tile(np.arange(self.count) * self.cell_count, 2)
 
@@ -388,38 +377,58 @@ class _Sheets:
         (numbers,) = np.nonzero(self._covering_sheet == covering_sheet)
         return int(numbers[0])
 
-    def sharpened(self, values: np.ndarray) -> np.ndarray:
-        """Return (C,) values of cells, 0 outside, from (P,) values of pixels; see `SHARPENING`."""
-        result = np.zeros(self.cell_count, dtype=values.dtype)
-        result[self.cells] = values
-        cells, sharp = self.cells.astype(np.intp), result.copy()
-        for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
-            if abs(column) + abs(row) == 1:
-                linked = self._shift.take(bit * self.cell_count + cells) >= 0
-                neighbor = result.take(cells + (row * self._width + column))
-                sharp[cells] += np.where(linked, SHARPENING * (values - neighbor), 0)
+    def link_task(self) -> Task[None]:
+        """Tabulate what steps to neighbors add to the number of the sheet, from 0.
+
+        It is -1 where streamlines cannot step.
+        """
+        phase = self._covering.packed_phase
+        table = self._shift.reshape(9, -1)
+        for share, _, block, state in self.blocks(1):
+            yield Progress(share, STEP_LABEL)
+            cell, own = self.cells[block], phase.take(state)
+            mask = unpack_neighbor_mask(own)
+            for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
+                turned = own - phase.take(state + (row * self._width + column))
+                shift = np.rint(turned / self._spacing).astype(np.int32) % self.count
+                table[bit, cell] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
+
+    def sources_task(self, noise: np.ndarray, look: Look) -> Task[list[np.ndarray]]:
+        """Return the (C,) `_noise_sources` of cells, 0 outside, from (P, K) noise; see `SHARPENING`."""
+        plain: list[np.ndarray] = []
+        for share, _, block, cell in self.blocks(1):
+            yield Progress(share, STEP_LABEL)
+            parts = _noise_sources(noise[block] - np.float32(NOISE_MEAN), look)
+            plain = plain or [np.zeros(self.cell_count, dtype=np.complex64) for _ in parts]
+            for source, part in zip(plain, parts, strict=True):
+                source[cell] = part
+        sharp = [source.copy() for source in plain]
+        for share, _, _, cell in self.blocks(1):
+            yield Progress(share, STEP_LABEL)
+            for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
+                if abs(column) + abs(row) == 1:
+                    linked = cell[self._shift.take(bit * self.cell_count + cell) >= 0]
+                    neighbor = linked + (row * self._width + column)
+                    for source, result in zip(plain, sharp, strict=True):
+                        result[linked] += SHARPENING * (source.take(linked) - source.take(neighbor))
         return sharp
 
-    def blocks(self) -> Iterator[tuple[float, int, slice, np.ndarray]]:
-        """Yield the share of the blocks before, the sheet, the pixels, and their (n,) intp states."""
-        count = len(self.cells)
-        for sheet in range(self.count):
-            for block in pixel_blocks(count):
-                share = (sheet + block.start / count) / self.count
-                yield (
-                    share,
-                    sheet,
-                    block,
-                    sheet * self.cell_count + self.cells[block].astype(np.intp),
-                )
+    def blocks(self, sheets: int = 0) -> Iterator[tuple[float, int, slice, np.ndarray]]:
+        """Yield blocks of pixels on each sheet, or on the first ones.
 
-    def own_states(self) -> _Origins:
-        """Return the origins of states before the first step."""
-        own = _Origins.ended(self.count * self.cell_count)
-        for sheet in range(self.count):
-            state = sheet * self.cell_count + self.cells
-            own.cell[state], own.sheet[state] = self.cells, sheet
-        return own
+        Yields
+        ------
+        share : float
+            Of the blocks before.
+        sheet : int
+        block : slice
+        state : (n,) intp ndarray
+        """
+        sheets, count = sheets or self.count, len(self.cells)
+        for sheet in range(sheets):
+            for block in pixel_blocks(count):
+                state = sheet * self.cell_count + self.cells[block].astype(np.intp)
+                yield (sheet + block.start / count) / sheets, sheet, block, state
 
     def one_step_task(self) -> Task[_Origins]:
         """Find where each state is reached from in a step, by the midpoint method."""
@@ -444,14 +453,6 @@ class _Sheets:
             for corner, weight in zip(around.states, around.weights(), strict=True):
                 middle += weight * step.take(corner)
             result.put(state, self._moved(_Origins(cell, sheets, middle)))
-        return result
-
-    def composed_task(self, first: _Origins, second: _Origins) -> Task[_Origins]:
-        """Follow streamlines to the origins `first`, and from there to those of `second`."""
-        result = _Origins.ended(len(first.cell))
-        for share, _, _, state in self.blocks():
-            yield Progress(share, STEP_LABEL)
-            result.put(state, self._interpolated(second, self.surroundings(first.at(state))))
         return result
 
     def doubled_task(
@@ -586,20 +587,6 @@ class _Sheets:
         target[blocked], matched[blocked], rest[blocked] = SINK_CELL, 0, 0
         return _Origins(target, matched.astype(np.int8), rest), bit
 
-    def _shift_table(self) -> np.ndarray:
-        """(9 C,) int8: what a step to a neighbor adds to the sheet, from 0; -1 where there is none."""
-        phase, cells = self._covering.packed_phase, self.cells.astype(np.intp)
-        table = np.full((9, self.cell_count), -1, dtype=np.int8)
-        mask = unpack_neighbor_mask(phase.take(cells))
-        own = phase.take(cells)
-        for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
-            neighbor = phase.take(cells + row * self._width + column)
-            shift = (
-                np.rint((own - neighbor) / np.float32(self._spacing)).astype(np.int32) % self.count
-            )
-            table[bit, cells] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
-        return table.reshape(-1)
-
 
 class _Sums:
     """Weighted sums of noise along the streamlines of all states.
@@ -626,21 +613,17 @@ class _Sums:
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
 
     def doublings(self) -> int:
-        """Return how many doublings the sums need after the first steps."""
+        """Return how many doublings the sums need."""
         largest = float(np.max(self.decay))
         steps = math.log(MIN_WEIGHT) / math.log(largest) if largest > 0 else 0
-        return max(math.ceil(math.log2(max(steps, 1) / FIRST_STEPS)), 0)
+        return math.ceil(math.log2(max(steps, 1)))
 
-    def add_noise_task(self, step: int, origins: _Origins) -> Task[None]:
-        """Add the noise at the origins of a step."""
+    def start_task(self) -> Task[None]:
+        """Set the sums to the noise of each state."""
         for share, _, block, state in self._sheets.blocks():
             yield Progress(share, STEP_LABEL)
-            around = self._sheets.surroundings(origins.at(state))
-            cells = [corner % self._sheets.cell_count for corner in around.states]
-            for total, source, factor in zip(
-                self.values, self.sources, self.factors(step, block), strict=True
-            ):
-                total[state] += interpolated(source, cells, around.weights()) * factor
+            for total, source in zip(self.values, self.sources, strict=True):
+                total[state] = source.take(self._sheets.cells[block])
 
     def factors(self, step: int, block: slice) -> list[np.ndarray]:
         """Return the weights of a step at the pixels of a block, for each of the sources."""

@@ -66,6 +66,10 @@ SURFACE_NOISE_BYTES, IMAGE_NOISE_BYTES = 155, 34
 #: directions there.
 MEMBERS_BYTES, MEMBERS_LINE_BYTES, BRUTE_BYTES, BRUTE_DIRECTION_BYTES = 59, 39, 79, 34
 
+#: Bytes of a sample of the rectangle around the visible samples with the method "ibfv", of each of its
+#: states, and of each sum over the noise there.
+IBFV_CELL_BYTES, IBFV_STATE_BYTES, IBFV_SUM_BYTES = 13, 26, 16
+
 #: Bytes of a visible sample with even lines instead of streaks, and of each of its lines.
 EVEN_LINES_BYTES, EVEN_LINE_BYTES = 26, 14
 
@@ -309,6 +313,8 @@ def _lic_bytes(
         lic = _sheets_bytes(view, look, coverage, lines, noise_channels)
     elif look.method == "members":
         lic = (MEMBERS_BYTES + MEMBERS_LINE_BYTES * lines + 12 * noise_channels) * visible
+    elif look.method == "ibfv":
+        lic = _ibfv_bytes(view, look, coverage, lines, degree)
     else:
         image_bytes = 4 * lines * (noise_channels - 1)
         lic = (BRUTE_BYTES + BRUTE_DIRECTION_BYTES * degree + image_bytes) * visible
@@ -338,6 +344,19 @@ def _sheets_bytes(
     step_bytes = STEP_BYTES + (16 * noise_channels if has_flow(look) else 0)
     images = (8 * noise_channels + 4 * lines * noise_channels + 4) * visible
     return images + strip + step_bytes * steps
+
+
+def _ibfv_bytes(view: ViewInput, look: Look, coverage: Coverage, lines: int, degree: int) -> float:
+    """Return the bytes that the method "ibfv" takes; see `ibfv`."""
+    camera = view.shaded_camera
+    frame = camera.width * camera.height
+    has_three_channels = look.noise == "colour" or has_flow(look)
+    sums = (2 if has_three_channels else 1) * (2 if has_breaks(look) else 1)
+    state_bytes = IBFV_STATE_BYTES + IBFV_SUM_BYTES * sums
+    # Without opposites, the states are those of the directions alone; the covering has all.
+    cell_bytes = IBFV_CELL_BYTES + 8 * sums + 16 * lines
+    noise = (56 if has_three_channels else 12) * coverage.visible
+    return (noise + (state_bytes * degree + cell_bytes) * coverage.columns * coverage.rows) * frame
 
 
 def _color_bytes(look: Look, lines: int, noise_channels: int) -> float:

@@ -141,6 +141,8 @@ def traced_peak(work) -> int:
         (4, {}),
         (4, {"method": "brute", "length": 1, "supersampling": 2}),
         (4, {"method": "members", "length": 1, "supersampling": 2}),
+        (4, {"method": "ibfv", "length": 4, "supersampling": 2}),
+        (3, {"method": "ibfv", "length": 4, "supersampling": 2, "flow": 1.0}),
         (2, {"anchor": "surface", "supersampling": 2}),
         (4, {"ink": "hatch", "supersampling": 2}),
         (4, {"ink": "hatch", "lines": "even", "grain": 12.0, "supersampling": 2}),

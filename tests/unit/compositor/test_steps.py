@@ -58,8 +58,9 @@ def steps_by_label(look: Look, side: int) -> Counter[str]:
         ),
         (replace(INK, anchor="picture", paper_grain=0.5), HATCHED),
         (replace(Look(), method="brute", magnitude="length", high_pass=20.0), set()),
+        (replace(Look(), method="ibfv", flow=1.0, magnitude="length"), set()),
     ],
-    ids=["default", "paper", "on the surface", "on the picture", "brute"],
+    ids=["default", "paper", "on the surface", "on the picture", "brute", "ibfv"],
 )
 def test_a_step_is_at_most_two_blocks_of_pixels(look, more):
     """So the longest step does not grow with the picture."""

@@ -1,0 +1,327 @@
+"""Image based flow visualization: directions, contrast, drift, loops, seams."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planar_fields import pixel_centers
+from scipy import ndimage
+
+from bench import cases
+from rosy_addon.cache import Cache
+from rosy_addon.compositor import stages
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.filter_kernel import full_sample_count
+from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.ibfv import decay_of_samples
+from rosy_addon.compositor.lic import lic_task, look_noise
+from rosy_addon.compositor.lic_images import LicImages
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.pixel_field import PixelField, SeamSteps, planar_pixel_field
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.project import project
+
+LOOK = Look(method="ibfv")
+
+#: Pixels at the border of pictures whose streaks end early.
+MARGIN = 40
+
+
+def draw(field: PixelField, look: Look = LOOK, noise: np.ndarray | None = None) -> LicImages:
+    return run_to_completion(lic_task(field, look, noise))
+
+
+def uniform(angle: float, degree: int, size: int = 192) -> PixelField:
+    return planar_pixel_field(np.full((size, size), angle), degree)
+
+
+def frame(values: np.ndarray, field: PixelField) -> np.ndarray:
+    return values.reshape(field.height, field.width)
+
+
+def inside(image: np.ndarray, margin: int = MARGIN) -> np.ndarray:
+    return image[margin:-margin, margin:-margin]
+
+
+def angle_to(image: np.ndarray, direction: np.ndarray | complex) -> float:
+    """Return the mean angle from a direction to the streaks of an image, by the structure tensor."""
+    slope = ndimage.gaussian_filter(image, 1, order=(0, 1)) + 1j * (
+        ndimage.gaussian_filter(image, 1, order=(1, 0))
+    )
+    relative = inside(slope * np.conj(direction))
+    return float(0.5 * np.angle(-(relative**2).sum()))
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize("angle", [0.21, 0.55])
+def test_streaks_have_the_directions_of_the_members(degree, angle):
+    field = uniform(angle, degree)
+    images = [draw(field, replace(LOOK, seed=seed)).members for seed in range(2)]
+    turn = 2 * np.pi / degree
+    first = angle - turn * np.rint(angle / turn)  # nearest to the guiding angle
+    for line in range(field.line_count):
+        member = np.exp(1j * (first + turn * line))
+        error = np.mean([angle_to(frame(image[line], field), member) for image in images])
+        assert np.degrees(abs(error)) < 0.7
+
+
+@pytest.mark.parametrize("degree", [1, 4])
+def test_streaks_follow_circles(degree):
+    """The mean error would be several degrees if steps were tangents."""
+    size = 256
+    x, y = pixel_centers(size)
+    angle = np.arctan2(y - size / 2, x - size / 2 - 200) + np.pi / 2
+    field = planar_pixel_field(angle, degree)
+    image = frame(draw(field).members[0], field)
+    # The line of the first image is nearest to the guiding angle.
+    turn = 2 * np.pi / degree
+    nearest = angle - turn * np.rint(angle / turn)
+    assert np.degrees(abs(angle_to(image, np.exp(1j * nearest)))) < 0.7
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"taper": True}, {"flow": 2.0, "flow_phase": 0.3}], ids=str
+)
+@pytest.mark.parametrize("degree", [1, 4])
+def test_the_contrast_is_that_of_sheets(degree, settings):
+    stds = []
+    for method in ("ibfv", "sheets"):
+        look = Look(method=method, **settings)
+        images = [draw(uniform(angle, degree), look) for angle in (0.1, 0.4, 0.7)]
+        stds.append(np.std([inside(frame(i.members[0], uniform(0, 1))) for i in images]))
+    assert stds[0] == pytest.approx(stds[1], rel=0.06)
+
+
+def test_the_contrast_is_the_same_where_streaks_end():
+    """Without the correction it would be several times as high."""
+    field = uniform(0.3, 1)
+    images = [frame(draw(field, replace(LOOK, seed=seed)).members[0], field) for seed in range(3)]
+    begin, middle = (
+        np.std([image[:, part] for image in images]) for part in (slice(6, 14), slice(90, 98))
+    )
+    assert begin == pytest.approx(middle, rel=0.2)
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+@pytest.mark.parametrize("samples", [1.0, 3.0, 81.0, 2001.0])
+def test_the_kernel_has_the_effective_samples(samples, two_sided):
+    decay = float(decay_of_samples(np.array(samples), two_sided))
+    weight = decay ** np.arange(100_000)
+    weight[0] = 0.5
+    if two_sided:
+        weight = np.concatenate([weight[:0:-1], [1.0], weight[1:]])
+    assert weight.sum() ** 2 / (weight**2).sum() == pytest.approx(samples, rel=1e-3)
+
+
+def test_the_kernel_is_exponential():
+    """A bright pixel becomes a streak that begins there, and fades along the direction of the field."""
+    noise = np.full((64, 200), 0.5)
+    noise[32, 60] = 1.5
+    look = replace(LOOK, length=10)
+    field = planar_pixel_field(np.zeros(noise.shape), 1)
+    image = frame(draw(field, look, noise.reshape(-1, 1).astype(np.float32)).members[0], field)
+    decay = float(decay_of_samples(np.array(full_sample_count(look)), False))
+    # The noise of the first pixels is sharpened.
+    streak = image[32, 63:93] - 0.5
+    np.testing.assert_allclose(streak / streak[0], decay ** np.arange(30), rtol=0.02)
+    assert np.abs(image[32, :59] - 0.5).max() < 1e-6
+
+
+def test_branch_cuts_of_the_angle_leave_no_seam():
+    """Around a singularity of index 1/4, the members are numbered differently on either side of a cut."""
+    size = 256
+    x, y = pixel_centers(size)
+    angle = np.arctan2(y - size / 2, x - size / 2) / 4 + 0.2
+    images = draw(planar_pixel_field(angle, 4))
+    blend = images.blend.reshape(size, size)
+    change = np.abs(np.diff(blend, axis=0)).mean(axis=1)
+    along_cut = np.abs(np.diff(blend, axis=0))[size // 2 - 1, 20 : size // 2 - 20].mean()
+    assert along_cut == pytest.approx(change.mean(), rel=0.35)
+
+
+def cut_in_two(angle: float, degree: int, size: int) -> tuple[PixelField, PixelField, np.ndarray]:
+    """Return a uniform field in a square, and that in two charts, of which the right one is upside down.
+
+    The numbers of the pixels of the square in the charts are returned as well.
+    """
+    whole = uniform(angle, degree, size)
+    half, gap = size // 2, 5
+    width = size + gap
+    row, column = np.divmod(np.arange(size * size), size)
+    is_right = column >= half
+    place = np.where(
+        is_right, (size - 1 - row) * width + (size - 1 - column) + half + gap, row * width + column
+    )
+    order = np.argsort(place)
+    number = np.argsort(order)
+    mask = np.full(size * size, 0, dtype=np.uint16)
+    steps = []
+    for bit, (dx, dy) in enumerate((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)):
+        exists = (row + dy >= 0) & (row + dy < size) & (column + dx >= 0) & (column + dx < size)
+        target = np.where(exists, (row + dy) * size + column + dx, 0)
+        same = exists & (is_right[target] == is_right)
+        # In the chart that is upside down, the same neighbor is in the opposite direction.
+        chart_bit = np.where(is_right, 8 - bit, bit)
+        mask |= (same << chart_bit).astype(np.uint16)
+        across = np.flatnonzero(exists & ~same)
+        steps.append(np.stack([number[across], chart_bit[across], number[target[across]]]))
+    source, bits, target = np.concatenate(steps, axis=1)
+    by_source = np.lexsort([bits, source])
+    count = len(source)
+    seam_steps = SeamSteps(
+        source[by_source].astype(np.int32),
+        bits[by_source].astype(np.uint8),
+        target[by_source].astype(np.int32),
+        np.zeros(count, dtype=np.complex64),
+        np.full(count, -1, dtype=np.complex64),
+        np.zeros(count, dtype=np.complex64),
+        np.full(count, np.pi, dtype=np.float32),
+    )
+    turned = whole.representation * np.where(is_right, np.exp(1j * degree * np.pi), 1)
+    charts = replace(
+        whole,
+        width=width,
+        pixel=place[order].astype(np.int32),
+        representation=turned[order].astype(np.complex64),
+        neighbor_mask=mask[order],
+        seam_steps=seam_steps,
+    )
+    return whole, charts, number
+
+
+@pytest.mark.parametrize("degree", [1, 3, 4])
+def test_streaks_cross_the_seams_of_charts(degree):
+    size = 128
+    whole, charts, number = cut_in_two(0.3, degree, size)
+    noise = look_noise(whole, LOOK)
+    chart_noise = np.empty_like(noise)
+    chart_noise[number] = noise
+    expected, actual, cut = (
+        draw(field, LOOK, values).blend[:, 0]
+        for field, values in (
+            (whole, noise),
+            (charts, chart_noise),
+            (replace(charts, seam_steps=None), chart_noise),
+        )
+    )
+    beside_seam = np.s_[20:-20, size // 2 + 1 : size // 2 + 12]
+    expected = expected.reshape(size, size)[beside_seam]
+    actual, cut = (values[number].reshape(size, size)[beside_seam] for values in (actual, cut))
+    error, cut_error = (np.std(values - expected) / expected.std() for values in (actual, cut))
+    assert error < 0.2
+    assert cut_error > 2 * error
+
+
+# --- drift ----------------------------------------------------------------------------------------
+
+FLOW = replace(LOOK, flow=1.5, flow_distance=60.0)
+
+
+@pytest.mark.parametrize(("degree", "backward"), [(1, 0), (2, 0), (3, 0), (1, 1)])
+def test_streaks_drift_by_the_flow(degree, backward):
+    """The streak of a pixel is a wave that fades. After two frames, it is three pixels further."""
+    noise = np.full((64, 200, 3), 0.5, dtype=np.float32)
+    noise[32, 100] += (1.0, -0.5, 0.3)
+    field = planar_pixel_field(np.full((64, 200), np.pi * backward), degree)
+    frames = []
+    for number in (5, 7):
+        image = frame(draw(field, flow_at(FLOW, number), noise.reshape(-1, 3)).members[0], field)
+        frames.append((image[32, ::-1] if backward else image[32]) - 0.5)
+    decay = float(decay_of_samples(np.array(full_sample_count(FLOW)), False))
+    source = 200 - 101 if backward else 100
+    before, after = (
+        row[source + 3 + shift :][:40] for row, shift in zip(frames, (0, 3), strict=True)
+    )
+    np.testing.assert_allclose(after, before * decay**3, atol=0.003 * np.abs(before).max())
+    assert np.abs(frames[0][: source - 2]).max() < 1e-6
+    assert np.std(before / decay ** np.arange(40)) > 0.1 * np.abs(before).max()
+
+
+def test_lines_across_the_guiding_angle_drift_both_ways():
+    noise = np.full((64, 200, 3), 0.5, dtype=np.float32)
+    noise[32, 100] += (1.0, -0.5, 0.3)
+    field = planar_pixel_field(np.zeros((64, 200)), 2)
+    look = replace(FLOW, guiding_angle=np.pi / 2, flow_phase=0.3)
+    row = frame(draw(field, look, noise.reshape(-1, 3)).members[0], field)[32] - 0.5
+    np.testing.assert_allclose(row[101:180], row[99:20:-1], atol=1e-4)
+    assert np.abs(row[110]) > 0.1 * np.abs(row).max()
+
+
+def test_the_contrast_is_the_same_in_all_frames():
+    field = uniform(0.3, 1)
+    stds = [
+        inside(frame(draw(field, flow_at(FLOW, n)).members[0], field)).std()
+        for n in range(0, 40, 5)
+    ]
+    assert np.ptp(stds) < 0.1 * np.mean(stds)
+
+
+@pytest.mark.parametrize("degree", [1, 4])
+def test_a_loop_closes(degree):
+    field = uniform(0.3, degree)
+    frames = [
+        draw(field, flow_at(FLOW, number, loop_frames=12)).members.astype(float)
+        for number in (0, 1, 11, 12)
+    ]
+    np.testing.assert_array_equal(frames[0], frames[3])
+    to_next, to_last = np.std(frames[1] - frames[0]), np.std(frames[2] - frames[3])
+    assert to_last == pytest.approx(to_next, rel=0.1)
+    assert to_next < 0.5 * np.std(frames[0])
+
+
+def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):
+    """And noise is carried once for all of them."""
+    gbuffer = project([cases.instance(2000, 4)], cases.camera(64))
+    calls = []
+    task = stages.streak_waves_task
+    monkeypatch.setattr(stages, "streak_waves_task", lambda *args: calls.append(1) or task(*args))
+    cache = Cache()
+    sequence = [compose(gbuffer, flow_at(FLOW, number), cache=cache).rgba for number in range(4)]
+    assert len(calls) == 1
+    for number in (3, 1):
+        np.testing.assert_array_equal(
+            compose(gbuffer, flow_at(FLOW, number)).rgba, sequence[number]
+        )
+    assert np.abs(sequence[3] - sequence[0]).mean() > 0.01
+
+
+# --- fields and looks of all kinds ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
+def test_pictures_of_any_size(shape):
+    images = draw(planar_pixel_field(np.full(shape, 0.7), 3))
+    assert np.isfinite(images.members).all()
+    assert images.effective_samples.min() >= 0.99
+
+
+def test_undefined_pixels_are_gray():
+    angle = np.full((60, 60), 0.4)
+    angle[20:40, 20:40] = np.nan
+    images = draw(planar_pixel_field(angle, 4))
+    assert np.isfinite(images.members).all()
+    hole = images.members[0].reshape(60, 60)[25:35, 25:35]
+    assert np.abs(hole - 0.5).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"noise": "colour"},
+        {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
+        {"anchor": "surface", "flow": 1.0},
+        {"magnitude": "both"},
+        {"foreshorten": True, "oriented": True},
+        {"ink": "hatch", "lines": "even", "breaks": 0.5, "flow": 1.0},
+        {"length": 1, "step": 0.3},
+    ],
+    ids=str,
+)
+def test_looks(settings):
+    for degree in (3, 4):
+        gbuffer = project([cases.instance(2000, degree)], cases.camera(64))
+        picture = compose(gbuffer, LOOK.with_settings(settings))
+        assert np.isfinite(picture.rgba).all()
+        assert picture.rgba[..., :3][picture.rgba[..., 3] > 0].std() > 0.01

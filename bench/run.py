@@ -23,6 +23,7 @@ from bench.timing import RUNS, machine, write  # noqa: E402
 #: The scripts, in the order in which they run.
 SCRIPTS = (
     "table1",
+    "ibfv",
     "scaling",
     "stages",
     "planar_rlic",

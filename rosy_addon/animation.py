@@ -22,7 +22,7 @@ import numpy as np
 
 from .annotation.key_contents import PictureKey
 from .cache import Cache, content_hash
-from .compositor.look import Look
+from .compositor.look import Look, has_flow
 from .errors import RosyError
 from .file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
 from .gpu.select import select_renderer
@@ -250,8 +250,11 @@ def _frame_task(
     look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)
     # The look may be animated, and its method decides which renderer can draw it.
     renderer = cache.get_or_create(
-        ("renderer", settings.device, look.method),
-        lambda: select_renderer(settings.device, look, cache, keep_gbuffers=False, workers=pool),
+        ("renderer", settings.device, look.method, has_flow(look)),
+        # Frames in which only the streaks move share their G-buffer.
+        lambda: select_renderer(
+            settings.device, look, cache, keep_gbuffers=has_flow(look), workers=pool
+        ),
     )
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)

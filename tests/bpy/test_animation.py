@@ -17,9 +17,11 @@ import pytest
 from rosy.rosy_addon import animation
 from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local
 from rosy.rosy_addon.gpu.select import select_renderer
+from rosy.rosy_addon.projection import project as projection
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
 from rosy.rosy_addon.scene.file_names import picture_stem
@@ -451,6 +453,29 @@ def test_the_renderer_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png")))
     moving.frame_set(2)
     np.testing.assert_allclose(pixels(bake(moving)[0].image), frame, atol=1 / 255)
+
+
+def test_frames_in_which_only_streaks_move_share_their_work(
+    scene, camera, monkey, tmp_path, monkeypatch
+):
+    """Their noise is carried along the field once, and the meshes are projected once."""
+    scene.render.resolution_x, scene.render.resolution_y = 96, 72
+    look, calls = scene.rosy.look, []
+    look.method, look.flow = "ibfv", 1.0
+    for frame, phase in ((1, 0.0), (11, 1.0)):
+        look.flow_phase = phase
+        look.keyframe_insert("flow_phase", frame=frame)
+    for module, name in ((projection, "project_task"), (stages, "streak_waves_task")):
+        real = getattr(module, name)
+        monkeypatch.setattr(
+            module, name, lambda *args, real=real, name=name: calls.append(name) or real(*args)
+        )
+    bake_animation(scene, [2, 3, 4], settings=OutputSettings(folder=tmp_path))
+    assert sorted(calls) == ["project_task", "streak_waves_task"]
+    assert len(set(frames_of(tmp_path).values())) == 3
+    scene.frame_set(4)
+    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
+    np.testing.assert_allclose(pixels(bake(scene)[0].image), frame, atol=1 / 255)
 
 
 # --- turntables ------------------------------------------------------------------------------

@@ -205,7 +205,10 @@ def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
     if has_flow(look):
         third = np.exp(2j * np.pi * np.arange(FLOW_CHANNELS) / FLOW_CHANNELS)
         weights = np.stack([np.full(FLOW_CHANNELS, 0.5), third.real, third.imag]) * (2 / 3)
-        constant, real, imaginary = (noise @ row for row in weights.astype(np.float32))
+        constant, real, imaginary = (
+            sum(weight * channel for weight, channel in zip(row, noise.T, strict=True))
+            for row in weights.astype(np.float32)
+        )
         return [constant + np.complex64(1j), real + np.complex64(1j) * imaginary]
     sources = [noise[:, 0] + np.complex64(1j)]
     if noise.shape[1] == 3:
@@ -472,13 +475,14 @@ class _Sheets:
             around = self.surroundings(origins.at(state))
             weights = around.weights()
             for total, results in zip(sums, doubled, strict=True):
-                factors = total.factors(steps, block)
-                for values, target, factor in zip(total.values, results, factors, strict=True):
-                    target[state] += interpolated(values, around.states, weights) * factor
+                for place, (values, target) in enumerate(zip(total.values, results, strict=True)):
+                    arriving = interpolated(values, around.states, weights)
+                    target[state] += total.weighted(place, arriving, steps, block)
             if not is_last:
                 result.put(state, self._interpolated(origins, around))
         for total, results in zip(sums, doubled, strict=True):
             total.values = results
+            total.weight = total.weight * total.weight
         return result
 
     def _interpolated(self, origins: _Origins, around: _Surroundings) -> _Origins:
@@ -608,6 +612,8 @@ class _Sums:
         self._sheets = sheets
         self.sources = sources
         self.decay = decay
+        # That of the steps by which the sums are doubled next.
+        self.weight = decay
         self._turns = [0.0, turn][: len(sources)]
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
@@ -625,14 +631,31 @@ class _Sums:
             for total, source in zip(self.values, self.sources, strict=True):
                 total[state] = source.take(self._sheets.cells[block])
 
-    def factors(self, step: int, block: slice) -> list[np.ndarray]:
-        """Return the weights of a step at the pixels of a block, for each of the sources."""
-        decay = self.decay[block] if np.ndim(self.decay) else self.decay
-        weight = decay ** np.float32(step)
-        return [
-            weight if not turn else weight * np.complex64(np.exp(1j * turn * step))
-            for turn in self._turns
-        ]
+    def weighted(self, place: int, values: np.ndarray, steps: int, block: slice) -> np.ndarray:
+        """Multiply sums that arrive from a number of steps by their weight, and turn them.
+
+        The arithmetic uses real numbers. Products of complex numbers are not rounded alike on all
+        processors.
+
+        Parameters
+        ----------
+        place : int
+            Of the source.
+        values : (n,) complex64 ndarray
+            At the pixels of a block.
+        steps : int
+            The number of steps whose weight is `weight`.
+        block : slice
+        """
+        values = values * (self.weight[block] if np.ndim(self.weight) else self.weight)
+        if not self._turns[place]:
+            return values
+        angle = self._turns[place] * steps
+        cosine, sine = np.float32(math.cos(angle)), np.float32(math.sin(angle))
+        turned = np.empty_like(values)
+        turned.real = values.real * cosine - values.imag * sine
+        turned.imag = values.real * sine + values.imag * cosine
+        return turned
 
     def at(
         self, covering_sheet: int, block: slice

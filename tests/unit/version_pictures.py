@@ -30,6 +30,7 @@ def draw() -> dict[str, np.ndarray]:
     shapes = {
         "torus": (torus(), "curvature", 4, look),
         "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="colour")),
+        "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0, flow_phase=0.3)),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
         "magnitude": (icosphere(3), "axis", 3, Look(magnitude="both", supersampling=2)),

@@ -49,9 +49,9 @@ from .pixel_field import NEIGHBOR_OFFSETS, PixelField
 #: that they have.
 MIN_WEIGHT = 0.01
 
-#: How much the noise of a pixel is raised above that of each of its four neighbors. This restores what
-#: interpolation blurs, on average: streaks across the rows of pixels are not blurred, others are.
-SHARPENING = np.float32(0.15)
+#: How much the noise of a pixel is raised above that of each of its four neighbors, for each doubling. This
+#: restores what interpolation blurs, on average: streaks along the rows of pixels are not blurred, others are.
+SHARPENING = 0.02
 
 #: Factor of the contrast, which gives streaks the standard deviation of those of other methods: of streaks
 #: on one side of a pixel, which are carried further, and of those on both sides.
@@ -159,14 +159,16 @@ def streak_waves_task(
     covering = yield from subtask(covering_task, 0.0, 0.05)
     sheets = _Sheets(covering, is_upstream=not look.oriented)
     yield from subtask(sheets.link_task(), 0.05, 0.1)
-    sources = yield from subtask(sheets.sources_task(noise, look), 0.1, 0.1)
-    sums = []
+    decays = []
     for each in looks:
-        decay = yield from subtask(_decay_task(field, each), 0.1, 0.1)
-        sums.append(_Sums(sheets, sources, decay, _turn(look)))
-        yield from subtask(sums[-1].start_task(), 0.1, 0.1)
+        decays.append((yield from subtask(_decay_task(field, each), 0.1, 0.1)))
+    doublings = max(_doublings(decay) for decay in decays)
+    sharpening = np.float32(SHARPENING * doublings)
+    sources = yield from subtask(sheets.sources_task(noise, look, sharpening), 0.1, 0.1)
+    sums = [_Sums(sheets, sources, decay, _turn(look)) for decay in decays]
+    for total in sums:
+        yield from subtask(total.start_task(), 0.1, 0.1)
     origins = yield from subtask(sheets.one_step_task(), 0.1, 0.2)
-    doublings = max(total.doublings() for total in sums)
     for doubling in range(doublings):
         start, stop = (0.2 + 0.7 * place / doublings for place in (doubling, doubling + 1))
         task = sheets.doubled_task(sums, 1 << doubling, origins, doubling == doublings - 1)
@@ -239,6 +241,13 @@ def _decay_task(field: PixelField, look: Look) -> Task[np.ndarray]:
     length = np.arange(look.length + 1, dtype=np.float64)
     samples = kernel_weights(length, length, length, kernel_of(look)).effective_samples
     return decay_of_samples(samples, two_sided).astype(np.float32)[limits]
+
+
+def _doublings(decay: np.ndarray) -> int:
+    """Return how many doublings sums with this decay need."""
+    largest = float(np.max(decay))
+    steps = math.log(MIN_WEIGHT) / math.log(largest) if largest > 0 else 0
+    return math.ceil(math.log2(max(steps, 1)))
 
 
 def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarray:
@@ -396,7 +405,9 @@ class _Sheets:
                 shift = np.rint(turned / self._spacing).astype(np.int32) % self.count
                 table[bit, cell] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
 
-    def sources_task(self, noise: np.ndarray, look: Look) -> Task[list[np.ndarray]]:
+    def sources_task(
+        self, noise: np.ndarray, look: Look, sharpening: np.float32
+    ) -> Task[list[np.ndarray]]:
         """Return the (C,) `_noise_sources` of cells, 0 outside, from (P, K) noise; see `SHARPENING`."""
         plain: list[np.ndarray] = []
         for share, _, block, cell in self.blocks(1):
@@ -413,7 +424,8 @@ class _Sheets:
                     linked = cell[self._shift.take(bit * self.cell_count + cell) >= 0]
                     neighbor = linked + (row * self._width + column)
                     for source, result in zip(plain, sharp, strict=True):
-                        result[linked] += SHARPENING * (source.take(linked) - source.take(neighbor))
+                        difference = source.take(linked) - source.take(neighbor)
+                        result[linked] += sharpening * difference
         return sharp
 
     def blocks(self, sheets: int = 0) -> Iterator[tuple[float, int, slice, np.ndarray]]:
@@ -617,12 +629,6 @@ class _Sums:
         self._turns = [0.0, turn][: len(sources)]
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
-
-    def doublings(self) -> int:
-        """Return how many doublings the sums need."""
-        largest = float(np.max(self.decay))
-        steps = math.log(MIN_WEIGHT) / math.log(largest) if largest > 0 else 0
-        return math.ceil(math.log2(max(steps, 1)))
 
     def start_task(self) -> Task[None]:
         """Set the sums to the noise of each state."""

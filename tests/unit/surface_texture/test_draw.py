@@ -51,7 +51,12 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     middle = np.linalg.norm(surface.face_center, axis=1, keepdims=True)
     instance = MeshInstance(surface, np.eye(4), RosyField(4, field.vectors * middle))
     points = surface_points(surface, 20_000)
-    for changes in ({"noise": "colour"}, {"magnitude": "both"}, {"taper": True}):
+    for changes in (
+        {"noise": "colour"},
+        {"magnitude": "both"},
+        {"taper": True},
+        {"method": "ibfv"},
+    ):
         look = WIDER.with_settings(changes)
         colors = [
             colors_at(draw_texture(instance, uv, look, 512).rgba, surface, uv, points)

@@ -32,6 +32,10 @@ from .look import Look, has_flow
 #: Channels of noise. Three is the least number for which the squares of the weights have a constant sum.
 FLOW_CHANNELS = 3
 
+#: The distance of a cycle with the method "ibfv", in lengths of a streamline in one direction. Its streaks are waves
+#: of the noise in time: shorter ones would cut them into pieces.
+IBFV_DISTANCE = 4.0
+
 #: The cosine of the angle between a line and the guiding angle above which the line drifts one way only. Of
 #: four directions, one is always above it.
 ONE_WAY_COSINE = math.sqrt(0.5)
@@ -52,7 +56,9 @@ def noise_channel_count(look: Look) -> int:
 
 def cycle_distance(look: Look) -> float:
     """Return the pixels that streaks drift in a cycle."""
-    return look.flow_distance or look.length * look.step
+    if look.flow_distance:
+        return look.flow_distance
+    return look.length * look.step * (IBFV_DISTANCE if look.method == "ibfv" else 1.0)
 
 
 def with_cycle_distance(look: Look) -> Look:

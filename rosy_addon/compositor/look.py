@@ -197,7 +197,8 @@ class Look:
         0.0,
         0.0,
         8000.0,
-        "Pixels that a streak drifts while it appears and fades again. 0: half its length",
+        "Pixels that a streak drifts while it appears and fades again. 0: half its length, or twice its length "
+        "with the method IBFV",
         is_pixel_length=True,
         panel="streaks",
         applies=has_flow,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -44,7 +45,7 @@ def film(
     fields: Sequence[Field],
     path: str | os.PathLike[str],
     *,
-    between: int = 0,
+    between: int | None = 0,
     loop: bool = False,
     rate: float = 24.0,
     view: tuple[float, float] = DEFAULT_VIEW,
@@ -69,9 +70,9 @@ def film(
         read files.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
-    between : int
+    between : int or None
         Pictures between two fields, for which the fields and the vertices are interpolated. The surfaces must
-        then have the same polygons. Streaks flicker if the field turns by more than a half degree or so from
+        then have the same polygons. None: as many as keep streaks steady. Streaks flicker if the field turns by more than a half degree or so from
         picture to picture.
     loop : bool
         The first field follows the last one again: the film, shown in a loop, has no seam.
@@ -146,6 +147,8 @@ class _Survey(NamedTuple):
     largest_magnitude : float
     turn : float
         Largest mean angle between neighboring fields, in radians.
+    keeps_polygons : bool
+        Whether all fields have the polygons of the first one.
     rest_vertices : (V, 3) float64 ndarray or None
         The vertices of the first surface, if the others have the same polygons and other vertices.
     """
@@ -153,6 +156,7 @@ class _Survey(NamedTuple):
     points: NDArray[np.float64]
     largest_magnitude: float
     turn: float
+    keeps_polygons: bool
     rest_vertices: NDArray[np.float64] | None
 
 
@@ -170,8 +174,8 @@ class Film:
         Azimuth and elevation in degrees, see `orbit_camera`.
     size : (int, int)
         Pixels.
-    between : int
-        Pictures between two fields.
+    between : int or None
+        Pictures between two fields. None: as many as keep streaks steady, or 0 if the polygons change.
     loop : bool
         Whether the first field follows the last one.
     perspective : bool
@@ -193,7 +197,7 @@ class Film:
         view_angles: tuple[float, float],
         size: tuple[int, int],
         *,
-        between: int = 0,
+        between: int | None = 0,
         loop: bool = False,
         perspective: bool = True,
         keeps_anchor: bool = False,
@@ -201,9 +205,9 @@ class Film:
     ) -> None:
         if len(fields) < 2:
             raise RosyError(f"{name}: a film needs 2 fields or more")
-        if not 0 <= between <= MAX_BETWEEN:
+        if between is not None and not 0 <= between <= MAX_BETWEEN:
             raise RosyError(f"{name}: between must be from 0 to {MAX_BETWEEN}, not {between}")
-        self._fields, self._look, self._between, self._loop = fields, look, between, loop
+        self._fields, self._look, self._asked, self._loop = fields, look, between, loop
         self._framing = (*view_angles, *size)
         self._perspective, self._keeps_anchor = perspective, keeps_anchor
         #: What the user should know about the motion after the first view; may be empty.
@@ -211,9 +215,17 @@ class Film:
 
     @property
     def picture_count(self) -> int:
-        """The number of views."""
+        """The number of views. If it depends on how fast the fields turn, they are looked at first."""
         intervals = len(self._fields) - (not self._loop)
         return intervals * (self._between + 1) + (not self._loop)
+
+    @property
+    def _between(self) -> int:
+        """The number of pictures between two fields."""
+        if self._asked is not None:
+            return self._asked
+        survey = self._survey
+        return _steady_between(survey.turn, self._look) if survey.keeps_polygons else 0
 
     def views(self) -> Iterator[ViewInput]:
         """Yield the views.
@@ -223,7 +235,7 @@ class Film:
         RosyError
             As of `film`. What is wrong with a field is found before the first view.
         """
-        survey, look = self._survey(), self._look
+        survey, look = self._survey, self._look
         if look.magnitude != "none" and not look.magnitude_range:
             look = replace(look, magnitude_range=survey.largest_magnitude)
         rest = survey.rest_vertices
@@ -257,8 +269,9 @@ class Film:
         if not self._loop:
             yield previous.surface.mesh, previous.rosy, previous.surface.up
 
+    @cached_property
     def _survey(self) -> _Survey:
-        """Look at all fields."""
+        """What all fields have in common. They are looked at once."""
         points, largest, turn = np.zeros((0, 3)), 0.0, 0.0
         first = previous = self._fields[0]
         keeps_polygons, moves = True, False
@@ -280,7 +293,7 @@ class Film:
         if self._loop and self._check(0, first, previous):
             turn = max(turn, _mean_turn(previous, first))
         rest = first.surface.mesh.vertices if keeps_polygons and moves else None
-        return _Survey(points, largest, turn, rest)
+        return _Survey(points, largest, turn, keeps_polygons, rest)
 
     def _check(self, number: int, field: Field, previous: Field) -> bool:
         """Return whether a field has the polygons of the one before it.
@@ -297,7 +310,7 @@ class Film:
             )
         mesh, other = field.surface.mesh, previous.surface.mesh
         has_same = mesh is other or have_same_polygons(mesh, other)
-        if self._between and not has_same:
+        if self._asked and not has_same:
             raise RosyError(
                 f"{name} has other polygons than the one before it ({counted(mesh.face_count, 'face')} after "
                 f"{other.face_count:,}): there can be no pictures between them"
@@ -324,12 +337,17 @@ def _mean_turn(first: Field, second: Field) -> float:
     return float((weight * angle).sum() / max(weight.sum(), 1e-300))
 
 
+def _steady_between(turn: float, look: Look) -> int:
+    """Return how many pictures between two fields keep streaks steady."""
+    if look.unit != "pixels":
+        return 0
+    steady = STEADY_TURN * look.grain / (look.length * look.step)
+    return min(max(int(np.ceil(turn / steady - 1e-9)) - 1, 0), MAX_BETWEEN)
+
+
 def _advice(turn: float, between: int, look: Look) -> str:
     """Return how many pictures between two fields keep streaks steady, if there are too few."""
-    if look.unit != "pixels":
-        return ""
-    steady = STEADY_TURN * look.grain / (look.length * look.step)
-    needed = min(int(np.ceil(turn / steady - 1e-9)) - 1, MAX_BETWEEN)
+    needed = _steady_between(turn, look)
     if needed <= between:
         return ""
     return (

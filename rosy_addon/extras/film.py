@@ -67,10 +67,11 @@ def add_film_command(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--between",
-        type=int_between(0, MAX_BETWEEN),
+        type=_count_or_auto,
         default=0,
-        metavar="N",
-        help="pictures between two steps, for which fields and vertices are interpolated (%(default)d)",
+        metavar="N|auto",
+        help="pictures between two steps, for which fields and vertices are interpolated (%(default)d); auto: as "
+        "many as keep streaks steady",
     )
     parser.add_argument(
         "--loop",
@@ -84,6 +85,11 @@ def add_film_command(subparsers: Any) -> None:
     add_look_options(parser)
 
 
+def _count_or_auto(text: str) -> int | None:
+    """Return the number of pictures between two steps; None for 'auto'."""
+    return None if text == "auto" else int_between(0, MAX_BETWEEN)(text)
+
+
 def run_film(options: argparse.Namespace) -> None:
     """Draw the steps of a simulation, or a series of fields, under one camera, as a video."""
     check_output(options)
@@ -95,20 +101,22 @@ def run_film(options: argparse.Namespace) -> None:
     picture_look(str(options.series[0]), preset, settings, {})
     encode = video_encoder(options)
     fields = requested_fields(options)
-    count, stride = len(fields), options.between + 1
-    pictures = (count - (not options.loop)) * stride + (not options.loop)
+    count, between = len(fields), options.between
+    total = ""
+    if between is not None:
+        total = f" of {(count - (not options.loop)) * (between + 1) + (not options.loop)}"
 
     def announce(number: int) -> None:
-        if stride > 1:
-            print_line(f"picture {number} of {pictures}")
-        else:
+        if between == 0:
             print_line(f"step {number} of {count}{fields.time_text(number - 1)}")
+        else:
+            print_line(f"picture {number}{total}")
 
     with printed_warnings():
         api.film(
             fields,
             options.output,
-            between=options.between,
+            between=between,
             loop=options.loop,
             rate=options.rate,
             view=options.view,

@@ -100,9 +100,11 @@ def test_fast_turns_are_noted(square, tmp_path):
     options = {"size": (32, 32), "workers": 1}
     with pytest.warns(rf.RosyWarning, match=r"turns by up to 10\.0 degrees .*: 15 pictures"):
         rf.film(fields, tmp_path / "a.gif", **options)
-    film = Film(fields, Look(), (0.0, 90.0), (32, 32), between=15)
-    next(film.views())
-    assert not film.advice
+    for between in (15, None):
+        film = Film(fields, Look(), (0.0, 90.0), (32, 32), between=between)
+        assert film.picture_count == 17
+        next(film.views())
+        assert not film.advice
     with Image.open(tmp_path / "a.gif") as gif:
         assert gif.n_frames == 2
 

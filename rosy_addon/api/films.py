@@ -34,8 +34,8 @@ from .field import Field, warn
 from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, announced, find_ffmpeg, picture_look
 
 #: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
-#: divided by the width of lines. The correlation of the two pictures is then 0.9.
-STEADY_TURN = 0.25
+#: divided by the width of lines. The correlation of the two pictures is then above 0.9.
+STEADY_TURN = 0.2
 
 #: Pictures between two fields, at most.
 MAX_BETWEEN = 1000

@@ -98,11 +98,11 @@ def test_fast_turns_are_noted(square, tmp_path):
     """With as many pictures between two fields as the note says, there is no note."""
     fields = series(square, 2, degrees=10)
     options = {"size": (32, 32), "workers": 1}
-    with pytest.warns(rf.RosyWarning, match=r"turns by up to 10\.0 degrees .*: 18 pictures"):
+    with pytest.warns(rf.RosyWarning, match=r"turns by up to 10\.0 degrees .*: 23 pictures"):
         rf.film(fields, tmp_path / "a.gif", **options)
-    for between in (18, None):
+    for between in (23, None):
         film = Film(fields, Look(), (0.0, 90.0), (32, 32), between=between)
-        assert film.picture_count == 20
+        assert film.picture_count == 25
         next(film.views())
         assert not film.advice
     with Image.open(tmp_path / "a.gif") as gif:

@@ -34,6 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.symmetry import FieldSymmetry
 from ..progress import Progress, Task, subtask
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
@@ -162,10 +163,10 @@ def streak_waves_task(
     decays = []
     for each in looks:
         decays.append((yield from subtask(_decay_task(field, each), 0.1, 0.1)))
-    doublings = max(_doublings(decay) for decay in decays)
+    doublings = max(doubling_count(float(np.max(decay))) for decay in decays)
     sharpening = np.float32(SHARPENING * doublings)
     sources = yield from subtask(sheets.sources_task(noise, look, sharpening), 0.1, 0.1)
-    sums = [_Sums(sheets, sources, decay, _turn(look)) for decay in decays]
+    sums = [_Sums(sheets, sources, decay, step_turn(look)) for decay in decays]
     for total in sums:
         yield from subtask(total.start_task(), 0.1, 0.1)
     origins = yield from subtask(sheets.one_step_task(), 0.1, 0.2)
@@ -218,8 +219,8 @@ def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
     return sources
 
 
-def _turn(look: Look) -> float:
-    """The angle by which the phase of the noise differs from that of the noise a step nearer."""
+def step_turn(look: Look) -> float:
+    """Return the angle by which the phase of the noise differs from that of the noise a step nearer."""
     if not has_flow(look):
         return 0.0
     angle = 2 * np.pi * look.step / cycle_distance(look)
@@ -227,27 +228,36 @@ def _turn(look: Look) -> float:
     return angle if look.oriented else -angle
 
 
-def _is_two_sided(field: PixelField, look: Look) -> bool:
-    """Whether streaks are averages over both directions of a line, with equal weights."""
-    return field.symmetry.has_opposites and not has_flow(look)
+def is_two_sided(symmetry: FieldSymmetry, look: Look) -> bool:
+    """Return whether streaks are averages over both directions of a line, with equal weights."""
+    return symmetry.has_opposites and not has_flow(look)
+
+
+def contrast_match(two_sided: bool) -> np.float32:
+    """Return the factor of the contrast of streaks on both sides of a pixel, or on one."""
+    return TWO_SIDED_MATCH if two_sided else ONE_SIDED_MATCH
+
+
+def full_decay(look: Look, two_sided: bool) -> np.float32:
+    """Return the ratio q of the weights of successive steps of full streamlines."""
+    return np.float32(decay_of_samples(np.float64(full_sample_count(look)), two_sided))
+
+
+def doubling_count(decay: float) -> int:
+    """Return how many doublings a sum needs whose weights have the ratio `decay`."""
+    steps = math.log(MIN_WEIGHT) / math.log(decay) if decay > 0 else 0
+    return math.ceil(math.log2(max(steps, 1)))
 
 
 def _decay_task(field: PixelField, look: Look) -> Task[np.ndarray]:
     """(P,) or () float32 ratios q of the weights of successive steps."""
-    two_sided = _is_two_sided(field, look)
+    two_sided = is_two_sided(field.symmetry, look)
     limits = yield from step_limits_task(field, look)
     if limits is None:
-        return np.float32(decay_of_samples(np.float64(full_sample_count(look)), two_sided))
+        return full_decay(look, two_sided)
     length = np.arange(look.length + 1, dtype=np.float64)
     samples = kernel_weights(length, length, length, kernel_of(look)).effective_samples
     return decay_of_samples(samples, two_sided).astype(np.float32)[limits]
-
-
-def _doublings(decay: np.ndarray) -> int:
-    """Return how many doublings sums with this decay need."""
-    largest = float(np.max(decay))
-    steps = math.log(MIN_WEIGHT) / math.log(largest) if largest > 0 else 0
-    return math.ceil(math.log2(max(steps, 1)))
 
 
 def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarray:
@@ -691,7 +701,7 @@ def _line_waves_task(
     """Blend the two sheets of each line, and equalize the contrast."""
     lines, count = field.line_count, len(field.pixel)
     flows = has_flow(look)
-    match = TWO_SIDED_MATCH if _is_two_sided(field, look) else ONE_SIDED_MATCH
+    match = contrast_match(is_two_sided(field.symmetry, look))
     channels = 2 * len(sums.sources) - 1
     constant = np.empty((lines, count, 1 if flows else channels), dtype=np.float32)
     wave = np.empty((lines, count), dtype=np.complex64) if flows else None

@@ -18,6 +18,7 @@ from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOU
 from ..compositor.filter_kernel import Kernel
 from ..compositor.flow import ONE_WAY_COSINE
 from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
+from ..compositor.ibfv import MAX_PARTING, OWN_WEIGHT, SHARPENING
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
     FINALIZER_FACTORS,
@@ -84,6 +85,10 @@ CREASES_PER_ROW, CREASE_SLICES = 1024, 16
 #: Bit of a pixel that contains an edge, besides those of borders in `outline`.
 EDGE_BIT = 4
 
+#: Units of a pixel in the origins of states, and the bits that make normal floats of them. A word has 15
+#: bits for a pixel, 12 for these units and 2 of the 4 bits of a sheet, which leave this exponent alone.
+ORIGIN_UNITS, ORIGIN_EXPONENT = 4096, 0x40000000
+
 #: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.
 REDUCE_BLOCK = 16
 
@@ -104,6 +109,9 @@ FLOAT_CONSTANTS = {
     "MIN_COVERAGE": MIN_COVERAGE,
     "MIN_EFFECTIVE_SAMPLES": MIN_EFFECTIVE_SAMPLES,
     "ONE_WAY_COSINE": ONE_WAY_COSINE,
+    "OWN_WEIGHT": OWN_WEIGHT,
+    "SHARPENING": float(SHARPENING),
+    "MAX_PARTING": float(MAX_PARTING),
     "DEPTH_JUMP": DEPTH_JUMP,
     "MIN_STEP": MIN_STEP,
     "STEP_RATIO": STEP_RATIO,
@@ -137,6 +145,7 @@ INT_CONSTANTS = {
     "MIN_MARK_LENGTH": MIN_MARK_LENGTH,
     "FULL_MARK_LENGTH": FULL_MARK_LENGTH,
     "REDUCE_BLOCK": REDUCE_BLOCK,
+    "ORIGIN_UNITS": ORIGIN_UNITS,
     "ROW_BITS": ROW_BITS,
     "POSITION_TEXEL": POSITION_TEXEL,
     "NORMAL_TEXEL": NORMAL_TEXEL,
@@ -155,7 +164,7 @@ INT_CONSTANTS = {
     "HEADLIGHT": HEADLIGHT,
 }
 
-HASH_CONSTANTS = dict(
+UNSIGNED_CONSTANTS = dict(
     zip(
         ("HASH_X", "HASH_Y", "HASH_Z", "HASH_OCTAVE", "HASH_INSTANCE"),
         HASH_FACTORS,
@@ -166,6 +175,7 @@ HASH_CONSTANTS = dict(
     "HASH_CHANNEL": CHANNEL_FACTOR,
     "HASH_FINALIZER_0": FINALIZER_FACTORS[0],
     "HASH_FINALIZER_1": FINALIZER_FACTORS[1],
+    "ORIGIN_EXPONENT": ORIGIN_EXPONENT,
 }
 
 
@@ -177,7 +187,7 @@ def shader_defines() -> str:
         values[name] = f"vec{len(vector)}({', '.join(map(_float_literal, vector))})"
     # Fails if a constant is not an integer.
     values |= {name: str(operator.index(value)) for name, value in INT_CONSTANTS.items()}
-    values |= {name: f"0x{value:08X}u" for name, value in HASH_CONSTANTS.items()}
+    values |= {name: f"0x{value:08X}u" for name, value in UNSIGNED_CONSTANTS.items()}
     return "".join(f"#define {name} {text}\n" for name, text in values.items())
 
 

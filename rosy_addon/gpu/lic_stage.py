@@ -8,11 +8,12 @@ from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
 from ..compositor.look import Look
-from ..progress import Progress, Task
+from ..progress import Progress, Task, subtask
 from . import lookup_tables, passes
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
 from .field_kind import FieldKind
 from .frame import Frame
+from .ibfv_stage import carry_task, is_carried, states_fit
 from .passes import WORKGROUP_SIZE
 from .resources import GpuResources
 from .screen_box import Box
@@ -42,6 +43,11 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     look, resources = frame.look, frame.resources
     covering = covering_uniforms(kind, look)
     textures = {**frame.textures, **(yield from _unfold_task(frame, kind, box, covering))}
+    uniforms = {**covering, **look_uniforms(kind, look)}
+    if is_carried(look) and states_fit(frame.size, kind.degree):
+        task = carry_task(frame, kind, box, textures)
+        textures["line_image"], carried = yield from subtask(task, 0.0, 0.8)
+        uniforms |= carried
     yield Progress(0.0, "measuring streaks")
     textures |= {
         "max_magnitude": _max_magnitude(frame, textures, kind, look),
@@ -60,7 +66,6 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
             resources, *frame.size, look, kind.line_count
         )
     yield Progress(0.0, "measuring streaks")
-    uniforms = {**covering, **look_uniforms(kind, look)}
     yield from frame.resources.device.compile_task([passes.LIC.variant(uniforms)])
     yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
@@ -78,7 +83,7 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
 def _unfold_task(
     frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]
 ) -> Task[dict[str, Any]]:
-    """Return the images of the covering: its cells, and directions with their gradients."""
+    """Return the images of the covering: its cells, and directions without and with their gradients."""
     yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
     has_color_noise = noise_args(frame.pixel_look)["channels"] > 1
@@ -101,7 +106,7 @@ def _unfold_task(
     textures = {"cells": cells, "directions": directions}
     images = {"angle_gradients": angle_gradients}
     frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
-    return {"cells": cells, "angle_gradients": angle_gradients}
+    return {**textures, **images}
 
 
 def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look: Look) -> Any:

@@ -377,6 +377,34 @@ ANGLE_GRADIENT = ComputePass(
     (*_BOX_ORIGIN, *_COVERING[1:]),
 )
 
+#: Uniforms of passes over the states of `ibfv`.
+_STATES: Uniforms = (*_BOX_ORIGIN, ("degree", "int"), ("sheet_count", "int"))
+
+#: Images that these passes write: one layer per sheet.
+_STATE_IMAGES = (("next_origins[]", "RG32F"), ("next_sums[]", "RGBA16F"))
+
+IBFV_START = ComputePass(
+    "ibfv_start",
+    ("cells", "directions[]"),
+    _STATE_IMAGES,
+    (
+        *_STATES,
+        ("line_count", "int"),
+        ("first_sheet", "int"),
+        ("step_length", "float"),
+        ("flow_mode", "int"),
+    ),
+    includes=("ibfv_states", "ibfv_source"),
+)
+
+IBFV_DOUBLE = ComputePass(
+    "ibfv_double",
+    ("cells", "state_origins[]", "state_sums[]"),
+    _STATE_IMAGES,
+    (*_STATES, ("steps_weight", "float"), ("turns_wave", "int"), ("wave_turn", "vec2")),
+    includes=("ibfv_states",),
+)
+
 #: The depth map of a light.
 SHADOW_MAP = RasterPass(
     "shadow_map",
@@ -450,6 +478,8 @@ TONE = ComputePass(
 #: `TONE` with the places of numbers in the color map, in the last component.
 TONE_AND_VALUES = replace(TONE, constants=(("HAS_VALUES", 1),))
 
+#: The picture. Its array ``line_image`` is that of `EVEN_LINES`, or the sums of `IBFV_DOUBLE`. Some cards
+#: read no more than 16 textures.
 LIC = ComputePass(
     "lic",
     (
@@ -480,6 +510,10 @@ LIC = ComputePass(
         ("flow_mode", "int"),
         ("flow_shifts", "vec4"),
         ("flow_weights", "vec4"),
+        ("is_carried", "int"),
+        ("decay", "float"),
+        ("carried_contrast", "float"),
+        ("wave_phase", "vec2"),
         ("half_length", "int"),
         ("full_samples", "float"),
         ("step_length", "float"),
@@ -517,9 +551,12 @@ LIC = ComputePass(
         ("fade_pixels", "vec2"),
         ("crowded_pixels", "vec2"),
     ),
-    includes=("line_member", "lic_trace", "lic_inks", "lic_even_lines", "lic_outline"),
+    includes=(
+        *("line_member", "lic_trace", "ibfv_source", "lic_carried"),
+        *("lic_inks", "lic_even_lines", "lic_outline"),
+    ),
     switches=(
-        *("kernel", "flow_mode", "magnitude_mode", "colors_values", "noise_channels"),
+        *("kernel", "flow_mode", "is_carried", "magnitude_mode", "colors_values", "noise_channels"),
         *("family_count", "is_hatched", "is_light_ink", "even_lines", "ink_count"),
     ),
 )
@@ -580,6 +617,8 @@ ALL_PASSES = (
     OUTLINE_BLOCKS,
     OUTLINE_WIDTHS,
     ANGLE_GRADIENT,
+    IBFV_START,
+    IBFV_DOUBLE,
     SHADOW_MAP,
     SHADOW_VISIBILITY,
     LIGHTING,

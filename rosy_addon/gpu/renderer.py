@@ -31,6 +31,7 @@ from .device import Device
 from .even_lines_stage import even_lines_task
 from .frame import Frame
 from .gbuffer_stage import render_gbuffer
+from .ibfv_stage import check_states
 from .lic_stage import largest_magnitude, lic_task
 from .noise_stage import noise_task
 from .outline_stage import outline_task
@@ -77,6 +78,8 @@ class GpuRenderer:
         check_color_values(look, instances)
         check_instances(instances, view.sample_camera, look.display)
         items = self.upload(instances, look.display)
+        for degree in {item.kind.degree for item in items if item.kind is not None}:
+            check_states(look, (view.sample_camera.width, view.sample_camera.height), degree)
         texture = yield from self.render_texture_task(items, view)
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
@@ -105,8 +108,8 @@ class GpuRenderer:
     ) -> Task[Any]:
         """As `ViewportRenderer.render_texture_task`.
 
-        The look's method is ignored: the streamlines of the covering are traced. The texture is
-        reused by later pictures.
+        The streamlines of the covering are traced, whatever the look's method is, except "ibfv" where it
+        can be drawn. The texture is reused by later pictures.
 
         Raises
         ------

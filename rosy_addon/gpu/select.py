@@ -10,6 +10,7 @@ from ..rendering.cpu import CpuRenderer
 from ..rendering.renderer import Renderer, ViewportRenderer
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
+from .ibfv_stage import ibfv_obstacle
 from .renderer import GpuRenderer
 
 #: Devices that draw pictures, by key: label and description in the user interface.
@@ -21,7 +22,7 @@ RENDER_DEVICES = {
 
 
 #: LIC methods that the graphics card does not have. In 3D views it traces streamlines instead.
-CPU_METHODS = ("members", "ibfv")
+CPU_METHODS = ("members",)
 
 
 def select_renderer(
@@ -34,7 +35,7 @@ def select_renderer(
 ) -> Renderer:
     """Return the renderer that draws a look on a device.
 
-    The choice depends on the device and on the look's method alone.
+    The choice depends on the device and on the look alone.
 
     Parameters
     ----------
@@ -59,6 +60,12 @@ def select_renderer(
             raise DeviceError(
                 f"the graphics card cannot draw the method '{look.method}': choose another method, or the "
                 "processor"
+            )
+        obstacle = ibfv_obstacle(look) if look.method == "ibfv" else None
+        if obstacle:
+            raise DeviceError(
+                f"the graphics card cannot draw the method 'ibfv' with {obstacle}: choose another method, or "
+                "the processor"
             )
         return GpuRenderer(blender_device())
     except DeviceError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -27,6 +28,7 @@ from ..compositor.hatching import (
     has_overshoot,
     has_paper_grain,
 )
+from ..compositor.ibfv import contrast_match, full_decay, is_two_sided, step_turn
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
@@ -67,6 +69,14 @@ from .defines import (
 from .field_kind import FieldKind
 from .passes import LIC_SETTINGS, TONE_SETTINGS
 from .resources import DrawItem
+
+#: The uniforms of `carried_uniforms` for streaks that are traced.
+NOT_CARRIED = {
+    "is_carried": 0,
+    "decay": 0.0,
+    "carried_contrast": 0.0,
+    "wave_phase": (0.0, 0.0),
+}
 
 #: Planes that clip nothing.
 NO_CLIP_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
@@ -115,6 +125,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         **setting_values(pixel_look, LIC_SETTINGS),
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, pixel_look),
+        **NOT_CARRIED,
         "half_length": 0 if has_even_lines(look) else pixel_look.length,
         "full_samples": full_sample_count(pixel_look),
         "step_length": pixel_look.step,
@@ -155,6 +166,43 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": tuple(pixels * look.supersampling for pixels in FADE_PIXELS),
         "crowded_pixels": crowded_pixels(pixel_look),
+    }
+
+
+def carried_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
+    """Return the uniforms of the LIC pass that differ for streaks that are carried; see `ibfv`.
+
+    `look` is in pixels of the supersampled frame, and for the symmetry of the kind.
+    """
+    two_sided = is_two_sided(kind.symmetry, look)
+    phase = 2 * math.pi * look.flow_phase
+    return {
+        "is_carried": 1,
+        "decay": float(full_decay(look, two_sided)),
+        "carried_contrast": float(contrast_match(two_sided)),
+        "wave_phase": (math.cos(phase), math.sin(phase)),
+        "half_length": 0,
+    }
+
+
+def state_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
+    """Return the uniforms of passes over states, for the same look as `carried_uniforms`."""
+    comes_against = not kind.symmetry.has_opposites and not look.oriented
+    return {
+        **covering_uniforms(kind, look),
+        "first_sheet": kind.line_count if comes_against else 0,
+        "step_length": look.step,
+        "flow_mode": _flow_uniforms(kind, look)["flow_mode"],
+    }
+
+
+def doubling_uniforms(look: Look, decay: float, steps: int) -> dict[str, Any]:
+    """Return the uniforms of the pass that doubles sums over a number of steps."""
+    turn = step_turn(look) * steps
+    return {
+        "steps_weight": decay**steps,
+        "turns_wave": int(turn != 0),
+        "wave_turn": (math.cos(turn), math.sin(turn)),
     }
 
 

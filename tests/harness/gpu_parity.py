@@ -103,7 +103,7 @@ def draw_pair(
 ) -> Pair:
     """Draw a picture on the card and with numpy.
 
-    Numpy uses brute force, which averages each streamline separately.
+    Numpy uses brute force, which averages each streamline separately, except for the method "ibfv".
 
     Parameters
     ----------
@@ -127,7 +127,9 @@ def draw_pair(
     card_picture = card.read(texture, width, height)
     images = card.read_gbuffer(camera)
     gbuffer = rosy.project(instances, camera, look.display)
-    if module_of(rosy.package, "compositor.look").has_flow(look):
+    if look.method == "ibfv":
+        numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
+    elif module_of(rosy.package, "compositor.look").has_flow(look):
         with one_streamline_per_pixel(rosy.package):
             numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
     else:

@@ -1,5 +1,5 @@
-// The picture: line integral convolution along each line through a pixel, in both directions. The
-// mean of the images of all lines gets the contrast of one of them. Then color, ink and light are
+// The picture: line integral convolution along each line through a pixel, in both directions, or streaks
+// that have been carried there. The mean of the images of all lines gets the contrast of one of them. Then color, ink and light are
 // applied.
 
 vec3 mapped_color(float value)
@@ -106,6 +106,7 @@ void main()
   if (flow_mode != FLOW_NONE) {
     disc_noise = vec3(dot(disc_noise, flow_weights.xyz));
   }
+  vec3 source = is_carried != 0 ? sharpened_source(pixel, cell) : vec3(0.0);
   // The light that all inks together let through, and the sum of the weights of their lines.
   float target = 1.0, transmittance = 1.0, onset_sum = 1.0;
   vec3 lic_sum = vec3(0.0), hue_sum = vec3(0.0);
@@ -124,12 +125,27 @@ void main()
       drift.forward_share = smooth_unit_step(0.5 + cosine * (0.5 / ONE_WAY_COSINE));
     }
     break_drift.forward_share = drift.forward_share;
-    Half forward = traced_half(pixel, line, 1.0, cell, 1.0, drift, break_drift, overshoot_count,
-                               weight_slope(along));
-    Half backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
-                                overshoot_count, weight_slope(-along));
-    Sums sums = both_halves(cell.yzw, forward.all, backward.all, drift);
-    vec3 mean = normalized_mean(sums, full_samples, drift);
+    Half forward, backward;
+    forward.tones = backward.tones = vec2(0.0);
+    if (is_carried == 0 || overshoot_steps > 0) {
+      forward = traced_half(pixel, line, 1.0, cell, 1.0, drift, break_drift, overshoot_count,
+                            weight_slope(along));
+      backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
+                             overshoot_count, weight_slope(-along));
+    }
+    vec3 mean;
+    float sample_count;
+    if (is_carried != 0) {
+      float forward_share = flow_mode == FLOW_NONE ? 0.5 : drift.forward_share;
+      Carried carried = carried_mean(pixel, line, forward_share, source);
+      mean = carried.mean;
+      sample_count = carried.samples;
+    }
+    else {
+      Sums line_sums = both_halves(cell.yzw, forward.all, backward.all, drift);
+      mean = normalized_mean(line_sums, full_samples, drift);
+      sample_count = effective_samples(line_sums, drift);
+    }
     if (is_hatched != 0) {
       if (line == 0 || overshoot_steps > 0) {
         vec2 tone_sum = vec2(pixel_tone, 1.0) + forward.tones + backward.tones;
@@ -198,7 +214,7 @@ void main()
       ink_light *= 1.0 - coverage * (1.0 - ink_transmittance);
     }
     lic_sum += mean;
-    sample_sum += effective_samples(sums, drift);
+    sample_sum += sample_count;
     if (family_count > 1) {
       float weight = exp(hue_sharpness * gray(mean));
       int family = line_family(line, first_angle, family_angle, known_families);

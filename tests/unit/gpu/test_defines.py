@@ -52,7 +52,7 @@ def test_shaders_have_no_literal_where_there_is_a_define(name):
         *defines.FLOAT_CONSTANTS.values(),
         *(value for vector in defines.VECTOR_CONSTANTS.values() for value in vector),
         *defines.INT_CONSTANTS.values(),
-        *defines.HASH_CONSTANTS.values(),
+        *defines.UNSIGNED_CONSTANTS.values(),
     }
     assert not literals_of(SOURCES[name]) & ({float(value) for value in shared} - COMMON)
 

@@ -1,0 +1,47 @@
+// Twice as many steps (`ibfv`): the sums along the streamlines of all states, and those that arrive from
+// their origins. The origins themselves are composed. Each layer is a sheet.
+
+void main()
+{
+  ivec3 state = ivec3(gl_GlobalInvocationID) + ivec3(box_origin, 0);
+  if (any(greaterThanEqual(state.xy, imageSize(next_sums).xy)) ||
+      texelFetch(cells, state.xy, 0).x == 0.0) {
+    return;
+  }
+  vec4 own_sums = texelFetch(state_sums, state, 0);
+  Origin origin = unpacked_origin(texelFetch(state_origins, state, 0).xy);
+  if (origin.state.z < 0) {
+    imageStore(next_sums, state, own_sums);
+    imageStore(next_origins, state, vec4(0.0));
+    return;
+  }
+  float phase = texelFetch(cells, origin.state.xy, 0).x;
+  ivec2 side = side_of(origin.offset);
+  vec4 weights = bilinear_weights(origin.offset);
+  vec4 arriving = weights.x * texelFetch(state_sums, origin.state, 0);
+  Origin target = unpacked_origin(texelFetch(state_origins, origin.state, 0).xy);
+  vec2 change = vec2(0.0);
+  for (int corner = 1; corner < 4; ++corner) {
+    ivec2 move = side * ivec2(corner & 1, corner >> 1);
+    vec2 parting = vec2(move);
+    ivec3 around = origin.state;
+    if (is_linked(phase, move)) {
+      around = neighbor_state(origin.state, phase, move);
+      Origin other = unpacked_origin(texelFetch(state_origins, around, 0).xy);
+      vec2 apart = vec2(other.state.xy - target.state.xy) + (other.offset - target.offset);
+      // Of points that are reached from elsewhere, the distance to the pixel is taken.
+      if (other.state.z >= 0 && max(abs(apart.x), abs(apart.y)) <= MAX_PARTING) {
+        parting = apart;
+      }
+    }
+    arriving += weights[corner] * texelFetch(state_sums, around, 0);
+    change += weights[corner] * parting;
+  }
+  arriving.yz = turns_wave != 0 ? times(arriving.yz, wave_turn) : arriving.yz;
+  imageStore(next_sums, state, own_sums + steps_weight * arriving);
+  if (target.state.z >= 0) {
+    float target_phase = texelFetch(cells, target.state.xy, 0).x;
+    target = moved_origin(target.state, target_phase, target.offset + change);
+  }
+  imageStore(next_origins, state, vec4(packed_origin(target), 0.0, 0.0));
+}

@@ -1,0 +1,129 @@
+"""Noise that is carried along the sheets of the covering: the method "ibfv" of `compositor.ibfv`.
+
+The sums and origins of all states are images with a layer for each sheet. Each pass doubles the number of
+steps of the sums, and reads one pair of images to write the other.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..compositor.even_lines import has_even_lines
+from ..compositor.filter_kernel import look_for_symmetry
+from ..compositor.hatching import has_breaks
+from ..compositor.ibfv import doubling_count
+from ..compositor.look import Look
+from ..errors import RosyError
+from ..progress import Progress, Task
+from . import passes
+from .field_kind import FieldKind
+from .frame import Frame
+from .screen_box import Box
+from .uniforms import carried_uniforms, doubling_uniforms, state_uniforms
+
+#: Bytes of a state: its sums and its origin, in two images each.
+STATE_BYTES = 2 * (8 + 8)
+
+#: Maximum size of the states of a frame. Cards have little more memory than this beside that of a window
+#: system and of the other images.
+MAX_STATE_BYTES = 1 << 31
+
+#: Label of all steps of this stage.
+STEP_LABEL = "carrying noise"
+
+
+def ibfv_obstacle(look: Look) -> str | None:
+    """Return what a look with the method "ibfv" has that the shaders do not draw by it, if anything."""
+    if look.magnitude in ("length", "both"):
+        return f"magnitude '{look.magnitude}'"
+    if has_breaks(look):
+        return "breaks or wobble"
+    return None
+
+
+def is_carried(look: Look) -> bool:
+    """Return whether the streaks of a look are drawn by this method. Others are traced."""
+    return look.method == "ibfv" and not has_even_lines(look) and ibfv_obstacle(look) is None
+
+
+def states_fit(size: tuple[int, int], degree: int) -> bool:
+    """Return whether the states of a field of N directions fit into the memory of a card.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height of the supersampled frame, in pixels.
+    degree : int
+        N, which is also the number of sheets that streaks come along.
+    """
+    return size[0] * size[1] * degree * STATE_BYTES <= MAX_STATE_BYTES
+
+
+def check_states(look: Look, size: tuple[int, int], degree: int) -> None:
+    """Raise an error if a look needs the states of a frame, and these do not fit.
+
+    Parameters
+    ----------
+    look : Look
+    size, degree
+        As for `states_fit`.
+    """
+    if is_carried(look) and not states_fit(size, degree):
+        raise RosyError(
+            f"a frame of {size[0]} x {size[1]} pixels, including supersampling, with {degree} directions "
+            "takes too much memory of the graphics card with the method 'ibfv': choose a smaller size, "
+            "another method, or the processor"
+        )
+
+
+def carry_task(
+    frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any]
+) -> Task[tuple[Any, dict[str, Any]]]:
+    """Average the noise upstream of every state of the fields of a kind.
+
+    Parameters
+    ----------
+    frame : Frame
+    kind : FieldKind
+    box : Box
+    textures : dict of str to texture
+        The cells and directions of the covering.
+
+    Returns
+    -------
+    sums : texture
+        Of `IBFV_DOUBLE`: a layer for each sheet.
+    uniforms : dict
+        Of the LIC pass, for streaks that are carried.
+    """
+    yield Progress(0.0, STEP_LABEL)
+    look = look_for_symmetry(frame.pixel_look, kind.symmetry)
+    uniforms = carried_uniforms(kind, look)
+    states = state_uniforms(kind, look)
+    pairs = [
+        {
+            f"next_{name}": frame.resources.image(
+                f"{name} {index}", *frame.size, texel_format, kind.degree
+            )
+            for name, texel_format in (("origins", "RG32F"), ("sums", "RGBA16F"))
+        }
+        for index in range(2)
+    ]
+    frame.run(passes.IBFV_START, box, textures, pairs[0], states, layers=kind.degree)
+    doublings = doubling_count(uniforms["decay"])
+    for doubling in range(doublings):
+        yield Progress(doubling / doublings, STEP_LABEL)
+        read, written = pairs[doubling % 2], pairs[1 - doubling % 2]
+        frame.run(
+            passes.IBFV_DOUBLE,
+            box,
+            {
+                "cells": textures["cells"],
+                "state_origins": read["next_origins"],
+                "state_sums": read["next_sums"],
+            },
+            written,
+            {**states, **doubling_uniforms(look, uniforms["decay"], 1 << doubling)},
+            layers=kind.degree,
+        )
+    return pairs[doublings % 2]["next_sums"], uniforms

@@ -12,14 +12,14 @@ from ..compositor.even_lines import has_even_lines
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.hatching import has_breaks
 from ..compositor.ibfv import doubling_count
-from ..compositor.look import Look
+from ..compositor.look import Look, has_flow
 from ..errors import RosyError
 from ..progress import Progress, Task
 from . import passes
 from .field_kind import FieldKind
 from .frame import Frame
 from .screen_box import Box
-from .uniforms import carried_uniforms, doubling_uniforms, state_uniforms
+from .uniforms import doubling_uniforms
 
 #: Bytes of a state: its sums and its origin, in two images each.
 STATE_BYTES = 2 * (8 + 8)
@@ -34,11 +34,14 @@ STEP_LABEL = "carrying noise"
 
 def ibfv_obstacle(look: Look) -> str | None:
     """Return what a look with the method "ibfv" has that the shaders do not draw by it, if anything."""
-    if look.magnitude in ("length", "both"):
-        return f"magnitude '{look.magnitude}'"
-    if has_breaks(look):
-        return "breaks or wobble"
-    return None
+    if not has_breaks(look):
+        return None
+    if has_even_lines(look):
+        return "breaks or wobble of even lines"
+    # A texel has the sums of one image, and of one more channel.
+    if has_flow(look):
+        return "breaks or wobble of streaks that drift"
+    return "breaks or wobble of colored noise" if look.noise == "colour" else None
 
 
 def is_carried(look: Look) -> bool:
@@ -77,8 +80,8 @@ def check_states(look: Look, size: tuple[int, int], degree: int) -> None:
 
 
 def carry_task(
-    frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any]
-) -> Task[tuple[Any, dict[str, Any]]]:
+    frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
+) -> Task[Any]:
     """Average the noise upstream of every state of the fields of a kind.
 
     Parameters
@@ -87,19 +90,17 @@ def carry_task(
     kind : FieldKind
     box : Box
     textures : dict of str to texture
-        The cells and directions of the covering.
+        Of the LIC pass, and the directions of the covering.
+    uniforms : dict
+        Of the LIC pass, and `carried_uniforms`.
 
     Returns
     -------
-    sums : texture
-        Of `IBFV_DOUBLE`: a layer for each sheet.
-    uniforms : dict
-        Of the LIC pass, for streaks that are carried.
+    texture
+        The sums of `IBFV_DOUBLE`: a layer for each sheet.
     """
     yield Progress(0.0, STEP_LABEL)
-    look = look_for_symmetry(frame.pixel_look, kind.symmetry)
-    uniforms = carried_uniforms(kind, look)
-    states = state_uniforms(kind, look)
+    yield from frame.resources.device.compile_task([passes.IBFV_DOUBLE.variant(uniforms)])
     pairs = [
         {
             f"next_{name}": frame.resources.image(
@@ -109,8 +110,12 @@ def carry_task(
         }
         for index in range(2)
     ]
-    frame.run(passes.IBFV_START, box, textures, pairs[0], states, layers=kind.degree)
-    doublings = doubling_count(uniforms["decay"])
+    frame.run(passes.IBFV_START, box, textures, pairs[0], uniforms, layers=kind.degree)
+    look = look_for_symmetry(frame.pixel_look, kind.symmetry)
+    decays = [uniforms["decay"]]
+    if uniforms["break_steps"]:
+        decays.append(uniforms["break_decay"])
+    doublings = doubling_count(max(decays))
     for doubling in range(doublings):
         yield Progress(doubling / doublings, STEP_LABEL)
         read, written = pairs[doubling % 2], pairs[1 - doubling % 2]
@@ -118,12 +123,12 @@ def carry_task(
             passes.IBFV_DOUBLE,
             box,
             {
-                "cells": textures["cells"],
+                **textures,
                 "state_origins": read["next_origins"],
                 "state_sums": read["next_sums"],
             },
             written,
-            {**states, **doubling_uniforms(look, uniforms["decay"], 1 << doubling)},
+            {**uniforms, **doubling_uniforms(look, 1 << doubling)},
             layers=kind.degree,
         )
-    return pairs[doublings % 2]["next_sums"], uniforms
+    return pairs[doublings % 2]["next_sums"]

@@ -17,7 +17,13 @@ from .ibfv_stage import carry_task, is_carried, states_fit
 from .passes import WORKGROUP_SIZE
 from .resources import GpuResources
 from .screen_box import Box
-from .uniforms import camera_uniforms, covering_uniforms, direction_uniforms, look_uniforms
+from .uniforms import (
+    camera_uniforms,
+    carried_uniforms,
+    covering_uniforms,
+    direction_uniforms,
+    look_uniforms,
+)
 
 #: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers abort runs that
 #: take too long.
@@ -42,12 +48,12 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     """
     look, resources = frame.look, frame.resources
     covering = covering_uniforms(kind, look)
-    textures = {**frame.textures, **(yield from _unfold_task(frame, kind, box, covering))}
     uniforms = {**covering, **look_uniforms(kind, look)}
     if is_carried(look) and states_fit(frame.size, kind.degree):
-        task = carry_task(frame, kind, box, textures)
-        textures["line_image"], carried = yield from subtask(task, 0.0, 0.8)
-        uniforms |= carried
+        uniforms |= carried_uniforms(kind, look_for_symmetry(frame.pixel_look, kind.symmetry))
+    traces_lines = not uniforms["is_carried"] or uniforms["overshoot_steps"] > 0
+    unfold_task = _unfold_task(frame, kind, box, covering, traces_lines)
+    textures = {**frame.textures, **(yield from unfold_task)}
     yield Progress(0.0, "measuring streaks")
     textures |= {
         "max_magnitude": _max_magnitude(frame, textures, kind, look),
@@ -65,11 +71,15 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         textures["paper_grain"] = lookup_tables.picture_grain(
             resources, *frame.size, look, kind.line_count
         )
+    if uniforms["is_carried"]:
+        task = carry_task(frame, kind, box, textures, uniforms)
+        textures["line_image"] = yield from subtask(task, 0.0, 0.0)
     yield Progress(0.0, "measuring streaks")
     yield from frame.resources.device.compile_task([passes.LIC.variant(uniforms)])
     yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
-    half_steps = streamline_reach(frame.pixel_look) if uniforms["half_length"] else 0
+    is_traced = uniforms["half_length"] and not uniforms["is_carried"]
+    half_steps = streamline_reach(frame.pixel_look) if is_traced else 0
     row_steps = (right - left) * kind.line_count * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
@@ -81,16 +91,18 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
 
 
 def _unfold_task(
-    frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]
+    frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any], traces_lines: bool
 ) -> Task[dict[str, Any]]:
-    """Return the images of the covering: its cells, and directions without and with their gradients."""
+    """Return the images of the covering: its cells, and directions without and with their gradients.
+
+    Those with gradients are for streamlines only.
+    """
     yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
     has_color_noise = noise_args(frame.pixel_look)["channels"] > 1
     shader = passes.COLOR_DIRECTIONS if has_color_noise else passes.DIRECTIONS
     cells = image("cells", *frame.size, dict(shader.images)["cells"])
     directions = image("directions", *frame.size, "RGBA16F", lines)
-    angle_gradients = image("angle_gradients", *frame.size, "RGBA16F", lines)
     frame.run(
         shader,
         box,
@@ -104,7 +116,9 @@ def _unfold_task(
     )
     yield Progress(0.0, "finding directions")
     textures = {"cells": cells, "directions": directions}
-    images = {"angle_gradients": angle_gradients}
+    if not traces_lines:
+        return {**textures, "angle_gradients": directions}
+    images = {"angle_gradients": image("angle_gradients", *frame.size, "RGBA16F", lines)}
     frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
     return {**textures, **images}
 

@@ -393,16 +393,31 @@ IBFV_START = ComputePass(
         ("first_sheet", "int"),
         ("step_length", "float"),
         ("flow_mode", "int"),
+        ("break_steps", "int"),
     ),
     includes=("ibfv_states", "ibfv_source"),
 )
 
 IBFV_DOUBLE = ComputePass(
     "ibfv_double",
-    ("cells", "state_origins[]", "state_sums[]"),
+    ("cells", "field_values", "max_magnitude", "state_origins[]", "state_sums[]"),
     _STATE_IMAGES,
-    (*_STATES, ("steps_weight", "float"), ("turns_wave", "int"), ("wave_turn", "vec2")),
-    includes=("ibfv_states",),
+    (
+        *_STATES,
+        ("line_count", "int"),
+        ("kernel", "int"),
+        ("flow_mode", "int"),
+        ("magnitude_mode", "int"),
+        ("magnitude_range", "float"),
+        ("half_length", "int"),
+        ("break_steps", "int"),
+        ("decay", "float"),
+        ("break_decay", "float"),
+        ("step_count", "float"),
+        ("wave_turn", "vec2"),
+    ),
+    includes=("ibfv_states", "magnitude", "full_samples", "ibfv_decay"),
+    switches=("kernel", "flow_mode", "magnitude_mode"),
 )
 
 #: The depth map of a light.
@@ -512,6 +527,7 @@ LIC = ComputePass(
         ("flow_weights", "vec4"),
         ("is_carried", "int"),
         ("decay", "float"),
+        ("break_decay", "float"),
         ("carried_contrast", "float"),
         ("wave_phase", "vec2"),
         ("half_length", "int"),
@@ -552,7 +568,8 @@ LIC = ComputePass(
         ("crowded_pixels", "vec2"),
     ),
     includes=(
-        *("line_member", "lic_trace", "ibfv_source", "lic_carried"),
+        *("magnitude", "full_samples", "line_member", "lic_trace"),
+        *("ibfv_source", "ibfv_decay", "lic_carried"),
         *("lic_inks", "lic_even_lines", "lic_outline"),
     ),
     switches=(

@@ -74,6 +74,7 @@ from .resources import DrawItem
 NOT_CARRIED = {
     "is_carried": 0,
     "decay": 0.0,
+    "break_decay": 0.0,
     "carried_contrast": 0.0,
     "wave_phase": (0.0, 0.0),
 }
@@ -170,40 +171,27 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
 
 
 def carried_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the uniforms of the LIC pass that differ for streaks that are carried; see `ibfv`.
+    """Return the uniforms of streaks that are carried, beside those of the LIC pass; see `ibfv`.
 
     `look` is in pixels of the supersampled frame, and for the symmetry of the kind.
     """
     two_sided = is_two_sided(kind.symmetry, look)
+    comes_against = not kind.symmetry.has_opposites and not look.oriented
     phase = 2 * math.pi * look.flow_phase
     return {
         "is_carried": 1,
         "decay": float(full_decay(look, two_sided)),
+        "break_decay": float(full_decay(replace(look, length=break_steps(look)), two_sided)),
         "carried_contrast": float(contrast_match(two_sided)),
         "wave_phase": (math.cos(phase), math.sin(phase)),
-        "half_length": 0,
-    }
-
-
-def state_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the uniforms of passes over states, for the same look as `carried_uniforms`."""
-    comes_against = not kind.symmetry.has_opposites and not look.oriented
-    return {
-        **covering_uniforms(kind, look),
         "first_sheet": kind.line_count if comes_against else 0,
-        "step_length": look.step,
-        "flow_mode": _flow_uniforms(kind, look)["flow_mode"],
     }
 
 
-def doubling_uniforms(look: Look, decay: float, steps: int) -> dict[str, Any]:
+def doubling_uniforms(look: Look, steps: int) -> dict[str, Any]:
     """Return the uniforms of the pass that doubles sums over a number of steps."""
     turn = step_turn(look) * steps
-    return {
-        "steps_weight": decay**steps,
-        "turns_wave": int(turn != 0),
-        "wave_turn": (math.cos(turn), math.sin(turn)),
-    }
+    return {"step_count": float(steps), "wave_turn": (math.cos(turn), math.sin(turn))}
 
 
 def setting_values(look: Look, names: tuple[str, ...]) -> dict[str, Any]:

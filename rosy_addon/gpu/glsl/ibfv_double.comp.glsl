@@ -37,8 +37,17 @@ void main()
     arriving += weights[corner] * texelFetch(state_sums, around, 0);
     change += weights[corner] * parting;
   }
-  arriving.yz = turns_wave != 0 ? times(arriving.yz, wave_turn) : arriving.yz;
-  imageStore(next_sums, state, own_sums + steps_weight * arriving);
+  float own_decay = decay, own_break_decay = break_decay;
+  if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
+    float share = magnitude_share(texelFetch(field_values, state.xy, 0).xy);
+    own_decay = decay_of_steps(int(round(float(half_length) * share)));
+    own_break_decay = decay_of_steps(int(round(float(break_steps) * share)));
+  }
+  float steps_weight = pow(own_decay, step_count);
+  // The wave turns. Breaks have weights of their own.
+  vec2 turn = break_steps > 0 ? vec2(pow(own_break_decay, step_count), 0.0) : steps_weight * wave_turn;
+  arriving = vec4(steps_weight * arriving.x, times(arriving.yz, turn), steps_weight * arriving.w);
+  imageStore(next_sums, state, own_sums + arriving);
   if (target.state.z >= 0) {
     float target_phase = texelFetch(cells, target.state.xy, 0).x;
     target = moved_origin(target.state, target_phase, target.offset + change);

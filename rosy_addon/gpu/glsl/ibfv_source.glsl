@@ -1,11 +1,12 @@
 // The noise that streaks are sums of (`ibfv`), around 0.
 
-// The channels of the noise. Of streaks that drift, the constant part and the two of the wave.
+// The channels of the noise. Of streaks that drift, the constant part and the two of the wave. Of lines with
+// breaks, the noise twice, for streaks of either length, and the weight of the shorter ones.
 vec3 streak_source(vec3 noise_value)
 {
   vec3 centered = noise_value - NOISE_MEAN;
   if (flow_mode == FLOW_NONE) {
-    return centered;
+    return break_steps > 0 ? vec3(centered.xx, 1.0) : centered;
   }
   // The channels are a third of a cycle apart.
   float real_part = (2.0 * centered.x - centered.y - centered.z) / 3.0;

@@ -42,10 +42,7 @@ void main()
   vec4 value = texelFetch(field_values, pixel, 0);
   float relative_magnitude = 1.0;
   if (magnitude_mode != 0) {
-    float max_value = magnitude_range > 0.0 ?
-                          magnitude_range :
-                          texelFetch(max_magnitude, ivec2(0), 0).x;
-    relative_magnitude = min(length(value.xy) / (max_value > 0.0 ? max_value : 1.0), 1.0);
+    relative_magnitude = magnitude_share(value.xy);
   }
   int step_count = (magnitude_mode & MAGNITUDE_LENGTH) != 0 ?
                        int(round(float(half_length) * relative_magnitude)) :
@@ -92,6 +89,15 @@ void main()
     break_step_count = int(round(float(break_step_count) * relative_magnitude));
     overshoot_count = int(round(float(overshoot_count) * relative_magnitude));
   }
+  float line_decay = decay, line_break_decay = break_decay;
+  if (is_carried != 0) {
+    if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
+      line_decay = decay_of_steps(step_count);
+      line_break_decay = decay_of_steps(break_step_count);
+    }
+    // Nothing is traced but overshoot.
+    step_count = break_step_count = 0;
+  }
   Drift drift, break_drift;
   drift.half_steps = step_count;
   break_drift.half_steps = break_step_count;
@@ -133,11 +139,13 @@ void main()
       backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
                              overshoot_count, weight_slope(-along));
     }
+    SheetSums carried_sums;
     vec3 mean;
     float sample_count;
     if (is_carried != 0) {
       float forward_share = flow_mode == FLOW_NONE ? 0.5 : drift.forward_share;
-      Carried carried = carried_mean(pixel, line, forward_share, source);
+      carried_sums = sums_of_line(pixel, line, forward_share, source);
+      Carried carried = carried_mean(carried_sums, line_decay, full_samples);
       mean = carried.mean;
       sample_count = carried.samples;
     }
@@ -179,8 +187,15 @@ void main()
       }
       float streak = gray(mean) / streak_std, break_streak = 0.0, break_weight = 0.0;
       if (break_steps > 0) {
-        Sums near_sums = both_halves(cell.yzw, forward.near, backward.near, break_drift);
-        vec3 break_mean = normalized_mean(near_sums, break_samples, break_drift);
+        vec3 break_mean;
+        if (is_carried != 0) {
+          SheetSums near_sums = sums_of_breaks(carried_sums);
+          break_mean = carried_mean(near_sums, line_break_decay, break_samples).mean;
+        }
+        else {
+          Sums near_sums = both_halves(cell.yzw, forward.near, backward.near, break_drift);
+          break_mean = normalized_mean(near_sums, break_samples, break_drift);
+        }
         break_streak = gray(break_mean) / break_std;
         // As `hatching`: breaks are fewer where the ink is dense.
         float min_breaks = WOBBLE_BREAKS * wobble_strength;

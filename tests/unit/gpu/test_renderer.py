@@ -778,6 +778,18 @@ CARRIED_LOOKS = {
     "carried, hatched": CARRIED | {"ink": "hatch", "shading": 1.0, "grain": 3.0},
     "carried, hatched, overshoot": CARRIED
     | {"ink": "hatch", "shading": 1.0, "overshoot": 9.0, "paper_grain": 0.5, "degree": 3},
+    "carried, magnitude as length": CARRIED | {"magnitude": "length"},
+    "carried, magnitude as both, with a range": CARRIED
+    | {"magnitude": "both", "magnitude_range": 0.9, "taper": True, "degree": 3},
+    "carried, hatched, with breaks": CARRIED
+    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
+    "carried, hatched, breaks and length by magnitude": CARRIED
+    | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude": "both", "degree": 3},
+    "carried, hatched, wobbling": CARRIED
+    | {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5, "overshoot": 6.0},
+    "carried, even lines": CARRIED
+    | {"ink": "hatch", "lines": "even", "shading": 0.9, "grain": 3.0},
+    "carried, drifting, length by magnitude": CARRIED | DRIFTING | {"magnitude": "length"},
     "carried, drifting": CARRIED | DRIFTING,
     "carried, drifting, one direction": CARRIED | DRIFTING | {"degree": 1, "flow_distance": 13.0},
     "carried, drifting, oriented": CARRIED | DRIFTING | {"degree": 3, "oriented": True},

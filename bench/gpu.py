@@ -49,8 +49,14 @@ STAGES = {
     "streamlines and light (lic)": ("lic",),
 }
 
-#: Degree and settings for the times of streaks that drift.
-FLOW_DEGREE, FLOW = 4, {"flow": 2.0}
+#: Settings of two looks whose times are compared, by the name of the option.
+COMPARISONS: dict[str, dict[str, dict[str, Any]]] = {
+    "flow": {"still": {}, "drifting": {"flow": 2.0}},
+    "ibfv": {"traced": {}, "carried": {"method": "ibfv"}},
+}
+
+#: Degrees of these looks.
+COMPARED_DEGREES = {"flow": (4,), "ibfv": DEGREES}
 
 #: Number of frames of a median, and the maximum of their total time in seconds.
 FRAMES = 21
@@ -177,16 +183,18 @@ def measure_rows(
             }
 
 
-def measure_flow(
-    device: Any, sizes: Sequence[tuple[int, int]], frames: int
+def measure_comparison(
+    device: Any, comparison: str, sizes: Sequence[tuple[int, int]], frames: int
 ) -> Iterator[dict[str, Any]]:
-    """Yield the times of still and of drifting streaks for each size, with the camera moving."""
+    """Yield the times of two looks for each size and degree, with the camera moving."""
     for size in sizes:
-        row: dict[str, Any] = {"width": size[0], "height": size[1], "degree": FLOW_DEGREE}
-        for name, look in (("still", cases.LOOK), ("drifting", replace(cases.LOOK, **FLOW))):
-            times, card_times = Frames(device, size, FLOW_DEGREE, look).times(frames).T
-            row[name], row[f"{name} card"] = float(np.median(times)), float(card_times.min())
-        yield row
+        for degree in COMPARED_DEGREES[comparison]:
+            row: dict[str, Any] = {"width": size[0], "height": size[1], "degree": degree}
+            for name, settings in COMPARISONS[comparison].items():
+                look = replace(cases.LOOK, **settings)
+                times, card_times = Frames(device, size, degree, look).times(frames).T
+                row[name], row[f"{name} card"] = float(np.median(times)), float(card_times.min())
+            yield row
 
 
 def measure_stages(device: Any, frame_count: int) -> dict[str, float]:
@@ -228,11 +236,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--no-stages", action="store_true", help="time only whole frames, not stages"
     )
-    parser.add_argument(
-        "--flow",
-        action="store_true",
-        help=f"time only still and drifting streaks, N = {FLOW_DEGREE}",
-    )
+    for comparison, looks in COMPARISONS.items():
+        parser.add_argument(
+            f"--{comparison}",
+            action="store_const",
+            const=comparison,
+            dest="comparison",
+            help=f"time only {' and '.join(looks)} streaks",
+        )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
     options = parser.parse_args(arguments)
     device = open_device()
@@ -240,8 +251,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     report: dict[str, Any] = {"renderer": device.name, "triangles": TRIANGLES, "rows": []}
     print(device.name)
-    if options.flow:
-        _print_flow(device, options, report)
+    if options.comparison:
+        _print_comparison(device, options, report)
     else:
         _print_all(device, options, report)
     if options.json:
@@ -250,17 +261,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _print_flow(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:
-    """Time still and drifting streaks, and print and store the rows."""
-    print(f"N = {FLOW_DEGREE}; milliseconds a frame and the card's own least, still and drifting")
-    for row in measure_flow(device, options.sizes, options.frames):
+def _print_comparison(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:
+    """Time two looks, and print and store the rows."""
+    first, second = COMPARISONS[options.comparison]
+    print(f"N; milliseconds a frame and the card's own least, {first} and {second}")
+    for row in measure_comparison(device, options.comparison, options.sizes, options.frames):
         report["rows"].append(row)
         size = f"{row['width']} x {row['height']}"
         times = "  ".join(
-            f"{row[name]:9.2f} {row[f'{name} card']:9.2f}" for name in ("still", "drifting")
+            f"{row[name]:9.2f} {row[f'{name} card']:9.2f}" for name in (first, second)
         )
-        ratio = row["drifting card"] / row["still card"]
-        print(f"{size:>11}  {times}  ratio {ratio:.2f}", flush=True)
+        ratio = row[f"{second} card"] / row[f"{first} card"]
+        print(f"{size:>11}  {row['degree']:>2}  {times}  ratio {ratio:.2f}", flush=True)
 
 
 def _print_all(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:

@@ -85,9 +85,12 @@ CREASES_PER_ROW, CREASE_SLICES = 1024, 16
 #: Bit of a pixel that contains an edge, besides those of borders in `outline`.
 EDGE_BIT = 4
 
-#: Units of a pixel in the origins of states, and the bits that make normal floats of them. A word has 15
-#: bits for a pixel, 12 for these units and 2 of the 4 bits of a sheet, which leave this exponent alone.
-ORIGIN_UNITS, ORIGIN_EXPONENT = 4096, 0x40000000
+#: Bit that makes a normal float of a word of up to 29 bits.
+WORD_EXPONENT = 0x40000000
+
+#: Units of a pixel in the origins of states. A word has 15 bits for a pixel, 12 for these units and 2 of the
+#: 4 bits of a sheet.
+ORIGIN_UNITS = 4096
 
 #: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.
 REDUCE_BLOCK = 16
@@ -175,7 +178,7 @@ UNSIGNED_CONSTANTS = dict(
     "HASH_CHANNEL": CHANNEL_FACTOR,
     "HASH_FINALIZER_0": FINALIZER_FACTORS[0],
     "HASH_FINALIZER_1": FINALIZER_FACTORS[1],
-    "ORIGIN_EXPONENT": ORIGIN_EXPONENT,
+    "WORD_EXPONENT": WORD_EXPONENT,
 }
 
 

@@ -100,7 +100,8 @@ def carry_task(
         The sums of `IBFV_DOUBLE`: a layer for each sheet.
     """
     yield Progress(0.0, STEP_LABEL)
-    yield from frame.resources.device.compile_task([passes.IBFV_DOUBLE.variant(uniforms)])
+    variants = [passes.IBFV_DOUBLE.variant({**uniforms, "is_last": last}) for last in (0, 1)]
+    yield from frame.resources.device.compile_task(variants)
     pairs = [
         {
             f"next_{name}": frame.resources.image(
@@ -110,6 +111,9 @@ def carry_task(
         }
         for index in range(2)
     ]
+    links = frame.resources.image("links", *frame.size, "R32F")
+    frame.run(passes.IBFV_LINKS, box, textures, {"links": links}, uniforms)
+    textures = {**textures, "links": links}
     frame.run(passes.IBFV_START, box, textures, pairs[0], uniforms, layers=kind.degree)
     look = look_for_symmetry(frame.pixel_look, kind.symmetry)
     decays = [uniforms["decay"]]
@@ -128,7 +132,7 @@ def carry_task(
                 "state_sums": read["next_sums"],
             },
             written,
-            {**uniforms, **doubling_uniforms(look, 1 << doubling)},
+            {**uniforms, **doubling_uniforms(look, 1 << doubling, doubling == doublings - 1)},
             layers=kind.degree,
         )
     return pairs[doublings % 2]["next_sums"]

@@ -383,9 +383,11 @@ _STATES: Uniforms = (*_BOX_ORIGIN, ("degree", "int"), ("sheet_count", "int"))
 #: Images that these passes write: one layer per sheet.
 _STATE_IMAGES = (("next_origins[]", "RG32F"), ("next_sums[]", "RGBA16F"))
 
+IBFV_LINKS = ComputePass("ibfv_links", ("cells",), (("links", "R32F"),), _STATES)
+
 IBFV_START = ComputePass(
     "ibfv_start",
-    ("cells", "directions[]"),
+    ("cells", "links", "directions[]"),
     _STATE_IMAGES,
     (
         *_STATES,
@@ -400,11 +402,11 @@ IBFV_START = ComputePass(
 
 IBFV_DOUBLE = ComputePass(
     "ibfv_double",
-    ("cells", "field_values", "max_magnitude", "state_origins[]", "state_sums[]"),
+    ("links", "field_values", "max_magnitude", "state_origins[]", "state_sums[]"),
     _STATE_IMAGES,
     (
-        *_STATES,
-        ("line_count", "int"),
+        *_BOX_ORIGIN,
+        *_COVERING[:2],
         ("kernel", "int"),
         ("flow_mode", "int"),
         ("magnitude_mode", "int"),
@@ -415,9 +417,10 @@ IBFV_DOUBLE = ComputePass(
         ("break_decay", "float"),
         ("step_count", "float"),
         ("wave_turn", "vec2"),
+        ("is_last", "int"),
     ),
     includes=("ibfv_states", "magnitude", "full_samples", "ibfv_decay"),
-    switches=("kernel", "flow_mode", "magnitude_mode"),
+    switches=("kernel", "flow_mode", "magnitude_mode", "is_last"),
 )
 
 #: The depth map of a light.
@@ -634,6 +637,7 @@ ALL_PASSES = (
     OUTLINE_BLOCKS,
     OUTLINE_WIDTHS,
     ANGLE_GRADIENT,
+    IBFV_LINKS,
     IBFV_START,
     IBFV_DOUBLE,
     SHADOW_MAP,

@@ -188,10 +188,14 @@ def carried_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     }
 
 
-def doubling_uniforms(look: Look, steps: int) -> dict[str, Any]:
+def doubling_uniforms(look: Look, steps: int, is_last: bool) -> dict[str, Any]:
     """Return the uniforms of the pass that doubles sums over a number of steps."""
     turn = step_turn(look) * steps
-    return {"step_count": float(steps), "wave_turn": (math.cos(turn), math.sin(turn))}
+    return {
+        "step_count": float(steps),
+        "wave_turn": (math.cos(turn), math.sin(turn)),
+        "is_last": int(is_last),
+    }
 
 
 def setting_values(look: Look, names: tuple[str, ...]) -> dict[str, Any]:

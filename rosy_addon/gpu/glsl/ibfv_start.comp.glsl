@@ -23,6 +23,7 @@ void main()
   if (cell.x == 0.0) {
     return;
   }
+  uint pixel_links = links_at(state.xy);
   vec2 own_step = state_step(state);
   vec2 middle = 0.5 * own_step;
   ivec2 side = side_of(middle);
@@ -30,10 +31,11 @@ void main()
   vec2 total = weights.x * own_step;
   for (int corner = 1; corner < 4; ++corner) {
     ivec2 move = side * ivec2(corner & 1, corner >> 1);
-    bool linked = is_linked(cell.x, move);
-    total += weights[corner] * (linked ? state_step(neighbor_state(state, cell.x, move)) : own_step);
+    int link = link_of(pixel_links, move);
+    total += weights[corner] *
+             (link > 0 ? state_step(neighbor_state(state, link, move)) : own_step);
   }
-  Origin origin = moved_origin(state, cell.x, total);
+  Origin origin = moved_origin(state, pixel_links, total);
   imageStore(next_origins, state, vec4(packed_origin(origin), 0.0, 0.0));
   imageStore(next_sums, state, vec4(sharpened_source(state.xy, cell), 1.0));
 }

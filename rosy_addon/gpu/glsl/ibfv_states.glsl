@@ -32,7 +32,7 @@ vec2 packed_origin(Origin origin)
   vec2 within = clamp(round(origin.offset * float(ORIGIN_UNITS)), -half_pixel, half_pixel - 1.0);
   uvec2 place = uvec2(origin.state.xy * ORIGIN_UNITS + ivec2(within + half_pixel));
   uvec2 sheet_bits = uvec2(origin.state.z & 3, origin.state.z >> 2);
-  return uintBitsToFloat((place << 2 | sheet_bits) | ORIGIN_EXPONENT);
+  return uintBitsToFloat((place << 2 | sheet_bits) | WORD_EXPONENT);
 }
 
 Origin unpacked_origin(vec2 texel)
@@ -40,37 +40,40 @@ Origin unpacked_origin(vec2 texel)
   if (texel == vec2(0.0)) {
     return no_origin();
   }
-  uvec2 words = floatBitsToUint(texel) & ~ORIGIN_EXPONENT;
+  uvec2 words = floatBitsToUint(texel) & ~WORD_EXPONENT;
   ivec2 sheet_bits = ivec2(words & 3u), place = ivec2(words >> 2);
   ivec2 pixel = place / ORIGIN_UNITS;
   vec2 offset = vec2(place - pixel * ORIGIN_UNITS) / float(ORIGIN_UNITS) - 0.5;
   return origin_at(ivec3(pixel, sheet_bits.x | sheet_bits.y << 2), offset);
 }
 
-bool is_linked(float phase, ivec2 move)
+// What a step to a neighbor adds to the number of the sheet, and 2. It is 0 where streamlines cannot step.
+int link_of(uint pixel_links, ivec2 move)
 {
-  return ((neighbor_mask(phase) >> (move.x + 3 * move.y + 4)) & 1) == 1;
+  return int(pixel_links >> (2 * (move.x + 3 * move.y + 4)) & 3u);
 }
 
-// The state of a linked neighbor, on the sheet that matches that of a state.
-ivec3 neighbor_state(ivec3 state, float phase, ivec2 move)
+uint links_at(ivec2 pixel)
 {
-  ivec2 neighbor = state.xy + move;
-  float turned = phase - texelFetch(cells, neighbor, 0).x;
-  // Every other sheet of a RoSy of odd degree is a direction.
-  int shift = int(round(turned * float(degree) / float(sheet_count)));
-  return ivec3(neighbor, wrap_once(state.z + shift, degree));
+  return floatBitsToUint(texelFetch(links, pixel, 0).x) & ~WORD_EXPONENT;
+}
+
+// The state of a neighbor, on the sheet that matches that of a state.
+ivec3 neighbor_state(ivec3 state, int link, ivec2 move)
+{
+  return ivec3(state.xy + move, wrap_once(state.z + link - 2, degree));
 }
 
 // The origin at an offset from the center of a pixel, at most in an adjacent one. The streamline ends if
 // it cannot step there.
-Origin moved_origin(ivec3 state, float phase, vec2 offset)
+Origin moved_origin(ivec3 state, uint pixel_links, vec2 offset)
 {
   ivec2 move = ivec2(clamp(round(offset), -1.0, 1.0));
-  if (!is_linked(phase, move)) {
+  int link = link_of(pixel_links, move);
+  if (link == 0) {
     return no_origin();
   }
-  return origin_at(neighbor_state(state, phase, move), offset - vec2(move));
+  return origin_at(neighbor_state(state, link, move), offset - vec2(move));
 }
 
 // The steps from a pixel to the next ones in x and y, on the side of an offset.

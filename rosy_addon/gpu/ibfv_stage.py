@@ -6,7 +6,11 @@ steps of the sums, and reads one pair of images to write the other.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ..compositor.even_lines import has_even_lines
 from ..compositor.filter_kernel import look_for_symmetry
@@ -84,6 +88,8 @@ def carry_task(
 ) -> Task[Any]:
     """Average the noise upstream of every state of the fields of a kind.
 
+    The sums of the last picture of this size are used again if only the phase of the flow has changed.
+
     Parameters
     ----------
     frame : Frame
@@ -102,37 +108,64 @@ def carry_task(
     yield Progress(0.0, STEP_LABEL)
     variants = [passes.IBFV_DOUBLE.variant({**uniforms, "is_last": last}) for last in (0, 1)]
     yield from frame.resources.device.compile_task(variants)
-    pairs = [
-        {
-            f"next_{name}": frame.resources.image(
-                f"{name} {index}", *frame.size, texel_format, kind.degree
-            )
-            for name, texel_format in (("origins", "RG32F"), ("sums", "RGBA16F"))
-        }
-        for index in range(2)
-    ]
+    pairs = _image_pairs(frame, kind)
+    decays = [uniforms["decay"], uniforms["break_decay"] if uniforms["break_steps"] else 0.0]
+    doublings = doubling_count(max(decays))
+    sums = pairs[doublings % 2]["next_sums"]
+    contents, place = frame.resources.contents, id(pairs[0]["next_sums"])
+    key = _still_key(frame, kind)
+    if contents.get(place) == key:
+        return sums
+    # Until all is done, the images are only those of this task.
+    contents[place] = task_mark = object()
     links = frame.resources.image("links", *frame.size, "R32F")
     frame.run(passes.IBFV_LINKS, box, textures, {"links": links}, uniforms)
     textures = {**textures, "links": links}
     frame.run(passes.IBFV_START, box, textures, pairs[0], uniforms, layers=kind.degree)
     look = look_for_symmetry(frame.pixel_look, kind.symmetry)
-    decays = [uniforms["decay"]]
-    if uniforms["break_steps"]:
-        decays.append(uniforms["break_decay"])
-    doublings = doubling_count(max(decays))
     for doubling in range(doublings):
         yield Progress(doubling / doublings, STEP_LABEL)
+        if contents.get(place) is not task_mark:
+            contents.pop(place, None)
         read, written = pairs[doubling % 2], pairs[1 - doubling % 2]
+        read_textures = {"state_origins": read["next_origins"], "state_sums": read["next_sums"]}
         frame.run(
             passes.IBFV_DOUBLE,
             box,
-            {
-                **textures,
-                "state_origins": read["next_origins"],
-                "state_sums": read["next_sums"],
-            },
+            {**textures, **read_textures},
             written,
             {**uniforms, **doubling_uniforms(look, 1 << doubling, doubling == doublings - 1)},
             layers=kind.degree,
         )
-    return pairs[doublings % 2]["next_sums"]
+    if contents.get(place) is task_mark:
+        contents[place] = key
+    return sums
+
+
+def _image_pairs(frame: Frame, kind: FieldKind) -> list[dict[str, Any]]:
+    """Return two pairs of images of origins and sums, by their names in shaders."""
+    formats = dict(passes.IBFV_DOUBLE.images)
+    return [
+        {
+            name.removesuffix("[]"): frame.resources.image(
+                f"{name} {index}", *frame.size, texel_format, kind.degree
+            )
+            for name, texel_format in formats.items()
+        }
+        for index in range(2)
+    ]
+
+
+def _still_key(frame: Frame, kind: FieldKind) -> Hashable:
+    """Return what the sums depend on: not the phase of the flow, which is applied to them afterwards."""
+    camera = frame.camera
+    return (
+        kind,
+        replace(frame.look, flow_phase=0.0),
+        (camera.view.tobytes(), camera.projection.tobytes(), frame.size),
+        np.asarray(frame.clip_planes).tobytes(),
+        tuple(
+            (item.mesh, item.kind, item.model_matrix.tobytes(), item.object_scale)
+            for item in frame.items
+        ),
+    )

@@ -6,6 +6,7 @@ skipped without moderngl or without a context (EGL; software OpenGL is enough).
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import replace
 from functools import lru_cache
@@ -1185,6 +1186,57 @@ def test_twelve_sheets_have_numbers_of_their_own(card):
     """The origins of states hold the numbers of their sheets bit by bit."""
     look = replace(LOOK, method="ibfv")
     assert_parity(card, [ball(12)], view(), look, likeness=0.99)
+
+
+def test_only_the_phase_of_the_flow_leaves_sums_as_they_are(device, monkeypatch):
+    """Then noise is not carried again, and the picture is the same as if it were."""
+    look = replace(LOOK, method="ibfv", flow=1.0, magnitude="length")
+    card, counts = GpuRenderer(device), []
+    compute = device.compute
+    monkeypatch.setattr(
+        device,
+        "compute",
+        lambda shader, *rest: counts.append(shader.name) or compute(shader, *rest),
+    )
+
+    def draw(renderer, items, camera, phase, **changes):
+        counts.clear()
+        changed = replace(look, flow_phase=phase, **changes)
+        picture = renderer.read(render_texture(renderer, items, camera, changed), *SIZE).copy()
+        return picture, "ibfv_double" in counts
+
+    items, other = (card.upload([ball(degree)], "smooth") for degree in (4, 3))
+    turned = card.upload([ball(4, placed(rotation(0, 0, 1)))], "smooth")
+    cases = [
+        (items, view(), 0.0, {}, True),
+        (items, view(), 0.4, {}, False),
+        (items, view(azimuth=0.5), 0.4, {}, True),
+        (turned, view(azimuth=0.5), 0.4, {}, True),
+        (other, view(azimuth=0.5), 0.4, {}, True),
+        (turned, view(azimuth=0.5), 0.7, {}, False),
+        (turned, view(azimuth=0.5), 0.7, {"seed": 3}, True),
+    ]
+    for shown, camera, phase, changes, is_carried in cases:
+        picture, was_carried = draw(card, shown, camera, phase, **changes)
+        assert was_carried == is_carried
+        np.testing.assert_array_equal(
+            picture, draw(GpuRenderer(device), shown, camera, phase, **changes)[0]
+        )
+
+
+def test_pictures_drawn_in_turns_do_not_leave_their_sums(card):
+    """Two tasks with the same images: neither knows what these hold."""
+    look = replace(LOOK, method="ibfv")
+    items = card.upload([ball(4)], "smooth")
+    inputs = [ViewInput((), view(azimuth=azimuth), look) for azimuth in (0.1, 0.2)]
+    one, other = (card.render_texture_task(items, view_input) for view_input in inputs)
+    for _ in itertools.zip_longest(one, other):
+        pass
+    for view_input in inputs:
+        drawn = card.read(run_to_completion(card.render_texture_task(items, view_input)), *SIZE)
+        fresh = GpuRenderer(card.device)
+        alone = fresh.read(run_to_completion(fresh.render_texture_task(items, view_input)), *SIZE)
+        np.testing.assert_array_equal(drawn, alone)
 
 
 def test_states_that_take_too_much_memory(card, monkeypatch, error_of):

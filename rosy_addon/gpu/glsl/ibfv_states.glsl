@@ -32,16 +32,18 @@ vec2 packed_origin(Origin origin)
   vec2 within = clamp(round(origin.offset * float(ORIGIN_UNITS)), -half_pixel, half_pixel - 1.0);
   uvec2 place = uvec2(origin.state.xy * ORIGIN_UNITS + ivec2(within + half_pixel));
   uvec2 sheet_bits = uvec2(origin.state.z & 3, origin.state.z >> 2);
-  return uintBitsToFloat((place << 2 | sheet_bits) | WORD_EXPONENT);
+  uvec2 words = place << 2 | sheet_bits | uvec2(WORD_EXPONENT);
+  return vec2(uintBitsToFloat(words.x), uintBitsToFloat(words.y));
 }
 
 Origin unpacked_origin(vec2 texel)
 {
-  if (texel == vec2(0.0)) {
+  if (texel.x == 0.0) {
     return no_origin();
   }
-  uvec2 words = floatBitsToUint(texel) & ~WORD_EXPONENT;
-  ivec2 sheet_bits = ivec2(words & 3u), place = ivec2(words >> 2);
+  uvec2 words = uvec2(floatBitsToUint(texel.x), floatBitsToUint(texel.y));
+  words &= uvec2(~WORD_EXPONENT);
+  ivec2 sheet_bits = ivec2(words & uvec2(3u)), place = ivec2(words >> 2);
   ivec2 pixel = place / ORIGIN_UNITS;
   vec2 offset = vec2(place - pixel * ORIGIN_UNITS) / float(ORIGIN_UNITS) - 0.5;
   return origin_at(ivec3(pixel, sheet_bits.x | sheet_bits.y << 2), offset);

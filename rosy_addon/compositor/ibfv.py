@@ -164,7 +164,8 @@ def streak_waves_task(
     for each in looks:
         decays.append((yield from subtask(_decay_task(field, each), 0.1, 0.1)))
     doublings = max(doubling_count(float(np.max(decay))) for decay in decays)
-    sharpening = np.float32(SHARPENING * doublings)
+    full_decays = [float(full_decay(each, is_two_sided(field.symmetry, each))) for each in looks]
+    sharpening = np.float32(sharpening_strength(full_decays))
     sources = yield from subtask(sheets.sources_task(noise, look, sharpening), 0.1, 0.1)
     sums = [_Sums(sheets, sources, decay, step_turn(look)) for decay in decays]
     for total in sums:
@@ -247,6 +248,11 @@ def doubling_count(decay: float) -> int:
     """Return how many doublings a sum needs whose weights have the ratio `decay`."""
     steps = math.log(MIN_WEIGHT) / math.log(decay) if decay > 0 else 0
     return math.ceil(math.log2(max(steps, 1)))
+
+
+def sharpening_strength(decays: Sequence[float]) -> float:
+    """Return how much noise is raised above its neighbors, for streaks with these decays."""
+    return SHARPENING * doubling_count(max(decays))
 
 
 def _decay_task(field: PixelField, look: Look) -> Task[np.ndarray]:

@@ -18,7 +18,7 @@ from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOU
 from ..compositor.filter_kernel import Kernel
 from ..compositor.flow import ONE_WAY_COSINE
 from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
-from ..compositor.ibfv import MAX_PARTING, OWN_WEIGHT, SHARPENING
+from ..compositor.ibfv import MAX_PARTING, OWN_WEIGHT
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
     FINALIZER_FACTORS,
@@ -113,7 +113,6 @@ FLOAT_CONSTANTS = {
     "MIN_EFFECTIVE_SAMPLES": MIN_EFFECTIVE_SAMPLES,
     "ONE_WAY_COSINE": ONE_WAY_COSINE,
     "OWN_WEIGHT": OWN_WEIGHT,
-    "SHARPENING": float(SHARPENING),
     "MAX_PARTING": float(MAX_PARTING),
     "DEPTH_JUMP": DEPTH_JUMP,
     "MIN_STEP": MIN_STEP,

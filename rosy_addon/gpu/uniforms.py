@@ -28,7 +28,13 @@ from ..compositor.hatching import (
     has_overshoot,
     has_paper_grain,
 )
-from ..compositor.ibfv import contrast_match, full_decay, is_two_sided, step_turn
+from ..compositor.ibfv import (
+    contrast_match,
+    full_decay,
+    is_two_sided,
+    sharpening_strength,
+    step_turn,
+)
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
@@ -76,6 +82,7 @@ NOT_CARRIED = {
     "decay": 0.0,
     "break_decay": 0.0,
     "carried_contrast": 0.0,
+    "sharpening": 0.0,
     "wave_phase": (0.0, 0.0),
 }
 
@@ -178,11 +185,15 @@ def carried_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     two_sided = is_two_sided(kind.symmetry, look)
     comes_against = not kind.symmetry.has_opposites and not look.oriented
     phase = 2 * math.pi * look.flow_phase
+    decay = float(full_decay(look, two_sided))
+    break_decay = float(full_decay(replace(look, length=break_steps(look)), two_sided))
+    decays = [decay, break_decay] if has_breaks(look) else [decay]
     return {
         "is_carried": 1,
-        "decay": float(full_decay(look, two_sided)),
-        "break_decay": float(full_decay(replace(look, length=break_steps(look)), two_sided)),
+        "decay": decay,
+        "break_decay": break_decay,
         "carried_contrast": float(contrast_match(two_sided)),
+        "sharpening": sharpening_strength(decays),
         "wave_phase": (math.cos(phase), math.sin(phase)),
         "first_sheet": kind.line_count if comes_against else 0,
     }

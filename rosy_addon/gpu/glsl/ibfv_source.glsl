@@ -21,7 +21,7 @@ vec3 sharpened_source(ivec2 pixel, vec4 cell)
   for (int bit = 1; bit < 9; bit += 2) {
     if (((neighbor_mask(cell.x) >> bit) & 1) == 1) {
       ivec2 neighbor = pixel + ivec2(bit % 3 - 1, bit / 3 - 1);
-      result += SHARPENING * (own - streak_source(texelFetch(cells, neighbor, 0).yzw));
+      result += sharpening * (own - streak_source(texelFetch(cells, neighbor, 0).yzw));
     }
   }
   return result;

@@ -82,7 +82,7 @@ LOOKS = {
         length=6, grain=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
     ),
     "magnitude": Look(length=14, magnitude="both", magnitude_range=1.0),
-    "flow": Look(length=10, flow=1.0, flow_phase=0.2, magnitude="both", magnitude_range=1.0),
+    "flow": Look(length=10, flow=1.0, flow_phase=0.2),
 }
 
 

@@ -1,13 +1,13 @@
-"""Which vertices a camera sees: exact rays from each of them to the eye, without a depth buffer.
+"""Which points of surfaces a camera sees: exact rays from each of them to the eye, without a depth buffer.
 
-A triangle hides a vertex if it covers its projection, nearer to the eye. Barycentric coordinates come
+A triangle hides a point if it covers its projection, nearer to the eye. Barycentric coordinates come
 from homogeneous clip coordinates, so triangles that reach behind the eye need no clipping; see Marc Olano
 and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous Coordinates", 1997.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,28 +19,28 @@ from .clip_planes import is_cut_away
 from .gbuffer import MeshInstance
 from .project import all_triangles
 
-#: Surfaces that are nearer to a vertex than this fraction of the size of the scene do not hide it.
+#: Surfaces that are nearer to a point than this fraction of the size of the scene do not hide it.
 SAME_POINT = 1e-6
 
-#: Triangles in a step, and pairs of triangles and vertices that are tested at a time.
+#: Triangles in a step, and pairs of triangles and points that are tested at a time.
 TRIANGLES_PER_STEP, PAIRS_PER_STEP = 1 << 15, 1 << 20
 
-#: Label of all steps.
-STEP_LABEL = "finding visible singularities"
+#: Labels of all steps, for vertices and for points in triangles.
+STEP_LABEL, POINTS_LABEL = "finding visible singularities", "finding places of arrowheads"
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectedVertices:
-    """K vertices in a picture.
+class ProjectedPoints:
+    """K points in a picture.
 
     Attributes
     ----------
     position : (K, 2) float64 ndarray
-        Pixels from the lower left of the picture. NaN if the vertex is not in front of the camera.
+        Pixels from the lower left of the picture. NaN if the point is not in front of the camera.
     depth : (K,) float64 ndarray
         Distance along the axis of the camera, Blender units.
     is_in_view : (K,) bool ndarray
-        Whether the vertex is between the near and the far plane of the camera, in front of it, and not
+        Whether the point is between the near and the far plane of the camera, in front of it, and not
         cut away. It may be beside the frame.
     is_visible : (K,) bool ndarray
         Whether it is in the frame, too, and no surface is in front of it.
@@ -51,13 +51,22 @@ class ProjectedVertices:
     is_in_view: np.ndarray
     is_visible: np.ndarray
 
+    def part(self, chosen: np.ndarray) -> ProjectedPoints:
+        """Return those that a mask or indices choose."""
+        return ProjectedPoints(
+            self.position[chosen],
+            self.depth[chosen],
+            self.is_in_view[chosen],
+            self.is_visible[chosen],
+        )
+
 
 def project_vertices_task(
     instances: Sequence[MeshInstance],
     camera: Camera,
     vertices: Sequence[np.ndarray],
     clip_planes: np.ndarray | None = None,
-) -> Task[ProjectedVertices]:
+) -> Task[ProjectedPoints]:
     """Project vertices, and find those that no triangle hides.
 
     Parameters
@@ -76,40 +85,146 @@ def project_vertices_task(
 
     Returns
     -------
-    ProjectedVertices
+    ProjectedPoints
         Of the vertices of all instances, in their order.
     """
     yield Progress(0.0, STEP_LABEL)
     clip, triangles, _ = all_triangles(instances, camera)
     world = np.concatenate([instance.world_points() for instance in instances])
-    distance = -(world @ camera.view[2, :3] + camera.view[2, 3])
     first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances[:-1])])
     vertex = np.concatenate(
         [start + np.asarray(part, np.intp) for start, part in zip(first, vertices, strict=True)]
     )
-    x, y, z, w = clip[vertex].T
-    is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut_away(world[vertex], clip_planes)
-    ndc = np.full((len(vertex), 2), np.nan)
+
+    def touches(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
+        return (triangles[triangle] == vertex[point][:, None]).any(axis=1)
+
+    scene = _Scene(clip, world, triangles, camera, clip_planes)
+    return (yield from _project_task(scene, clip[vertex], world[vertex], touches, STEP_LABEL))
+
+
+def project_points_task(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    triangle: np.ndarray,
+    barycentric: np.ndarray,
+    clip_planes: np.ndarray | None = None,
+    *,
+    finds_hidden: bool = True,
+) -> Task[ProjectedPoints]:
+    """Project points in triangles, and find those that no other triangle hides.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        All of them hide points.
+    camera : Camera
+    triangle : (K,) int ndarray
+        Counted over all instances, in their order.
+    barycentric : (K, 3) float64 ndarray
+    clip_planes : (6, 4) float64 ndarray, optional
+        World space. The negative side of each plane is cut away.
+    finds_hidden : bool
+        Whether hidden points are told from visible ones; if not, all in the frame count as visible.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    ProjectedPoints
+    """
+    yield Progress(0.0, POINTS_LABEL)
+    clip, triangles, _ = all_triangles(instances, camera)
+    world = np.concatenate([instance.world_points() for instance in instances])
+    corners = triangles[triangle]
+    point_clip, point_world = (
+        sum(barycentric[:, k, None] * values[corners[:, k]] for k in range(3))
+        for values in (clip, world)
+    )
+
+    def touches(other: np.ndarray, point: np.ndarray) -> np.ndarray:
+        return other == triangle[point]
+
+    occluders = triangles if finds_hidden else triangles[:0]
+    scene = _Scene(clip, world, occluders, camera, clip_planes)
+    return (yield from _project_task(scene, point_clip, point_world, touches, POINTS_LABEL))
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """All triangles of a scene, and what is seen of them.
+
+    Attributes
+    ----------
+    clip : (V, 4) float64 ndarray
+    world : (V, 3) float64 ndarray
+    triangles : (T, 3) int ndarray
+        Those that hide points.
+    camera : Camera
+    clip_planes : (6, 4) float64 ndarray or None
+    """
+
+    clip: np.ndarray
+    world: np.ndarray
+    triangles: np.ndarray
+    camera: Camera
+    clip_planes: np.ndarray | None
+
+    def distance(self, world: np.ndarray) -> np.ndarray:
+        """Return the (n,) distances of (n, 3) points along the axis of the camera."""
+        return -(world @ self.camera.view[2, :3] + self.camera.view[2, 3])
+
+
+def _project_task(
+    scene: _Scene,
+    clip: np.ndarray,
+    world: np.ndarray,
+    touches: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    label: str,
+) -> Task[ProjectedPoints]:
+    """Project K points, given in clip space and in world space, and find the visible ones.
+
+    `touches` tells whether the (n,) triangles of the scene contain (n,) points, by their numbers: they do not
+    hide them.
+    """
+    camera, clip_planes = scene.camera, scene.clip_planes
+    x, y, z, w = clip.T
+    is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut_away(world, clip_planes)
+    ndc = np.full((len(clip), 2), np.nan)
     np.divide(np.stack([x, y], axis=1), w[:, None], out=ndc, where=(w > 0)[:, None])
     position = (ndc + 1) * (0.5 * np.array([camera.width, camera.height]))
     is_visible = is_in_view & (np.abs(ndc) <= 1).all(axis=1)
+    distance = scene.distance(world)
     # A triangle nearer than the near plane, or beyond the far one, hides nothing.
-    for is_outside in (clip[:, 2] < -clip[:, 3], clip[:, 2] > clip[:, 3]):
-        triangles = triangles[~is_outside[triangles].all(axis=1)]
-    tolerance = SAME_POINT * float(np.ptp(world, axis=0).max(initial=0.0))
-    occluders = _Occluders(clip, world, distance, triangles, clip_planes, tolerance)
-    for start in range(0, len(triangles), TRIANGLES_PER_STEP):
-        yield Progress(start / len(triangles), STEP_LABEL)
+    number = np.arange(len(scene.triangles))
+    for is_outside in (scene.clip[:, 2] < -scene.clip[:, 3], scene.clip[:, 2] > scene.clip[:, 3]):
+        number = number[~is_outside[scene.triangles[number]].all(axis=1)]
+    tolerance = SAME_POINT * float(np.ptp(scene.world, axis=0).max(initial=0.0))
+    occluders = _Occluders(
+        scene.clip,
+        scene.world,
+        scene.distance(scene.world),
+        scene.triangles[number],
+        clip_planes,
+        tolerance,
+    )
+    for start in range(0, len(number), TRIANGLES_PER_STEP):
+        yield Progress(start / len(number), label)
         left = np.flatnonzero(is_visible)
-        for triangle, point in occluders.pairs(start, start + TRIANGLES_PER_STEP, ndc[left]):
-            hidden = occluders.hides(triangle, vertex[left[point]], ndc[left[point]])
-            is_visible[left[point[hidden]]] = False
-    return ProjectedVertices(position, distance[vertex], is_in_view, is_visible)
+        for triangle, chosen in occluders.pairs(start, start + TRIANGLES_PER_STEP, ndc[left]):
+            point = left[chosen]
+            others = np.flatnonzero(~touches(number[triangle], point))
+            triangle, point = triangle[others], point[others]
+            hidden = occluders.hides(triangle, ndc[point], distance[point])
+            is_visible[point[hidden]] = False
+    return ProjectedPoints(position, distance, is_in_view, is_visible)
 
 
 @dataclass(frozen=True, eq=False)
 class _Occluders:
-    """T triangles that may hide vertices.
+    """T triangles that may hide points.
 
     Attributes
     ----------
@@ -120,7 +235,7 @@ class _Occluders:
     triangles : (T, 3) int ndarray
     clip_planes : (6, 4) float64 ndarray or None
     tolerance : float
-        Distance in front of a vertex at which surfaces begin to hide it.
+        Distance in front of a point at which surfaces begin to hide it.
     """
 
     clip: np.ndarray
@@ -178,39 +293,37 @@ class _Occluders:
             yield triangle, order[concatenated_ranges(first[part], count[part])]
             done = until
 
-    def hides(self, triangle: np.ndarray, vertex: np.ndarray, ndc: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether triangles hide vertices that are not their own.
+    def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
+        """(n,) bool: whether triangles hide points that are not on them.
 
         Parameters
         ----------
-        triangle, vertex : (n,) ndarray of int
+        triangle : (n,) ndarray of int
         ndc : (n, 2) float64 ndarray
-            Of the vertices.
+            Of the points.
+        distance : (n,) float64 ndarray
+            Of the points, along the axis of the camera.
         """
         corner = self.triangles[triangle]
-        other = np.flatnonzero((corner != vertex[:, None]).all(axis=1))
-        corner, vertex = corner[other], vertex[other]
         a, b, c = np.moveaxis(self.clip[corner][..., (0, 1, 3)], 1, 0)
-        point = np.concatenate([ndc[other], np.ones((len(other), 1))], axis=1)
+        point = np.concatenate([ndc, np.ones((len(ndc), 1))], axis=1)
         area = (a * np.cross(b, c)).sum(axis=1)
         weights = np.stack(
             [(point * np.cross(*pair)).sum(axis=1) for pair in ((b, c), (c, a), (a, b))], axis=1
         )
         weights = np.divide(weights, area[:, None], out=weights, where=area[:, None] != 0)
-        covers = (weights >= 0).all(axis=1) & (area != 0)
-        other, corner, vertex, weights = (
-            array[covers] for array in (other, corner, vertex, weights)
-        )
+        covers = np.flatnonzero((weights >= 0).all(axis=1) & (area != 0))
+        corner, weights = corner[covers], weights[covers]
         # These weights are the barycentric coordinates divided by w.
         z = (weights * self.clip[corner, 2]).sum(axis=1)
         weights /= weights.sum(axis=1, keepdims=True)
-        distance = (weights * self.distance[corner]).sum(axis=1)
-        hides = (np.abs(z) <= 1) & (distance < self.distance[vertex] - self.tolerance)
+        hit_distance = (weights * self.distance[corner]).sum(axis=1)
+        hides = (np.abs(z) <= 1) & (hit_distance < distance[covers] - self.tolerance)
         if self.clip_planes is not None:
             hit = np.einsum("nk,nki->ni", weights, self.world[corner])
             hides &= ~is_cut_away(hit, self.clip_planes)
         result = np.zeros(len(triangle), dtype=bool)
-        result[other[hides]] = True
+        result[covers[hides]] = True
         return result
 
 

@@ -182,6 +182,28 @@ class Look:
         panel="streaks",
         applies=_has_streaks,
     )
+    arrows: float = number(
+        0.0,
+        0.0,
+        8000.0,
+        "Least distance in pixels between arrowheads over the lines, which show which way they point. For "
+        "fields of odd degree. 0: none",
+        label="Arrowheads",
+        is_pixel_length=True,
+        panel="streaks",
+        stage=Stage.SHADING,
+    )
+    arrow_size: float = number(
+        12.0,
+        3.0,
+        4096.0,
+        "Length of the arrowheads in pixels",
+        label="Arrowhead Size",
+        is_pixel_length=True,
+        panel="streaks",
+        stage=Stage.SHADING,
+        applies=lambda look: look.arrows > 0,
+    )
     flow: float = number(
         0.0,
         0.0,

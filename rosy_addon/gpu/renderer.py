@@ -23,6 +23,7 @@ from ..progress import Progress, Task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
+from ..rendering.arrowheads import with_arrowheads_task
 from ..rendering.singularities import with_singularities_task
 from ..rendering.view_input import Background, ViewInput
 from . import lookup_tables, passes
@@ -85,6 +86,7 @@ class GpuRenderer:
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
         picture = Picture(rgba, (), color_range=self._color_range(view))
+        picture = yield from with_arrowheads_task(picture, view)
         return (yield from with_singularities_task(picture, view))
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:

@@ -32,6 +32,7 @@ from .rasterizer import (
     rasterize_samples_task,
     rasterize_task,
 )
+from .surface_points import SurfacePoints
 
 #: Largest holonomy over a triangle, in radians, that is neglected in the interpolation of values.
 HOLONOMY_EPS = 3e-4
@@ -197,6 +198,57 @@ def project_samples_task(
     samples = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.5)
     yield from subtask(_fill_instances_task(samples, visible, display, cache), 0.5, 1.0)
     return samples, home, shown
+
+
+def surface_points_task(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    display: str,
+    points: SurfacePoints,
+    position: np.ndarray,
+    cache: Cache | None = None,
+) -> Task[GBuffer]:
+    """Compute the G-buffer at points of surfaces, visible or not.
+
+    Parameters
+    ----------
+    instances, camera, display, cache
+        As for `project_task`.
+    points : SurfacePoints
+        P points of instances with a field, in front of the camera.
+    position : (P, 2) float64 ndarray
+        Where they are in the frame, pixels from the lower left.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    GBuffer
+        With an entry for each point, in their order. Several may have the same pixel.
+    """
+    yield Progress(0.0, "finding directions")
+    clip, triangles, first_triangle = all_triangles(instances, camera)
+    global_triangle = points.triangle + first_triangle[points.instance_id]
+    corners = clip[triangles[global_triangle]]
+    a, b, c = np.moveaxis(corners[..., (0, 1, 3)], 1, 0)
+    front_facing = (a * np.cross(b, c)).sum(axis=1) > 0
+    z, w = (points.barycentric[:, :, None] * corners[..., 2:]).sum(axis=1).T
+    size = np.array([camera.width, camera.height])
+    column, row = np.clip(position.astype(np.int64), 0, size - 1).T
+    fragments = Fragments(
+        (row * camera.width + column).astype(np.int32),
+        global_triangle.astype(np.int32),
+        points.barycentric.astype(np.float32),
+        front_facing,
+        z / w,
+    )
+    visible_ids = np.flatnonzero(np.bincount(points.instance_id)).tolist()
+    visible = _VisiblePixels(fragments, points.instance_id, points.triangle, visible_ids)
+    gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.0, 0.1)
+    yield from subtask(_fill_instances_task(gbuffer, visible, display, cache), 0.1, 1.0)
+    return gbuffer
 
 
 def cached_project_task(

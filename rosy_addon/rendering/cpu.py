@@ -14,6 +14,7 @@ from ..errors import RosyError
 from ..progress import Task, subtask
 from ..projection.gbuffer import GBuffer
 from ..projection.project import cached_project_task, check_instances, project_task
+from .arrowheads import with_arrowheads_task
 from .band_workers import BandWorkers
 from .picture_memory import check_picture_memory
 from .singularities import with_singularities_task
@@ -54,11 +55,12 @@ class CpuRenderer:
 
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`."""
-        picture = yield from subtask(self._picture_task(view), 0.0, 0.99)
+        picture = yield from subtask(self._picture_task(view), 0.0, 0.97)
+        picture = yield from subtask(with_arrowheads_task(picture, view, self._cache), 0.97, 0.99)
         return (yield from subtask(with_singularities_task(picture, view, self._cache), 0.99, 1.0))
 
     def _picture_task(self, view: ViewInput) -> Task[Picture]:
-        """Draw the picture without singularities."""
+        """Draw the picture without arrowheads and singularities."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
         if not view.draws_thresholds:
             check_color_values(view.look, view.instances)

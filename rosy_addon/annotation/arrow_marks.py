@@ -1,0 +1,275 @@
+"""Arrowheads over the lines of fields in a picture, where lines have a direction.
+
+Their places belong to the surface: they are chosen from `projection.progressive_samples`, in an order that does
+not depend on the view. Around each place, a field of N directions has N arrowheads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..cache import Cache
+from ..field.directional_field import evaluate_harmonics, field_symmetry
+from ..field.frames import dot
+from ..progress import Progress, Task, subtask
+from ..projection.camera import Camera
+from ..projection.gbuffer import GBuffer, MeshInstance
+from ..projection.pixel_neighbors import screen_jacobians
+from ..projection.progressive_samples import progressive_samples
+from ..projection.project import surface_points_task
+from ..projection.surface_points import SurfacePoints
+from ..projection.visible_vertices import ProjectedPoints, project_points_task
+from .even_spacing import spaced_points
+
+#: Colors of arrowheads and of their outlines.
+FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
+
+#: Width of an arrowhead, depth of the notch at its back, and width of its outline, in lengths.
+WIDTH, NOTCH, OUTLINE = 0.78, 0.24, 0.1
+
+#: Least width of the outline, pixels.
+MIN_OUTLINE = 1.0
+
+#: Most arrowheads of a picture, about: more are drawn farther apart.
+MAX_COUNT = 1 << 16
+
+#: Directions that are shortened to less than this fraction have no arrowhead.
+MIN_FORESHORTENING = 0.3
+
+#: Least cosine of the angle between the normal of the surface and the direction to the eye at places of one
+#: arrowhead and of several: none reach far beyond silhouettes.
+MIN_FACING, MIN_FACING_OF_SEVERAL = 0.15, 0.35
+
+#: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least distance
+#: between neighbors, in widths.
+REACH, MIN_GAP = 1.0, 1.2
+
+#: A place is taken for hidden if another one, next to it in the picture, is nearer by more spacings than this.
+HIDDEN_SPACINGS = 2.5
+
+
+@dataclass(frozen=True, eq=False)
+class ArrowMarks:
+    """K arrowheads in a picture.
+
+    Attributes
+    ----------
+    anchor : (K, 3) float64 ndarray
+        Their places on surfaces, in world space.
+    place : (K, 2) float64 ndarray
+        The same in the picture, pixels from the lower left.
+    position : (K, 2) float64 ndarray
+        Their middles, pixels from the lower left.
+    direction : (K, 2) float64 ndarray
+        Unit vectors in the picture.
+    size : float
+        Length of an arrowhead, pixels.
+    """
+
+    anchor: np.ndarray
+    place: np.ndarray
+    position: np.ndarray
+    direction: np.ndarray
+    size: float
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def outline(self) -> float:
+        """Width of their outlines, pixels."""
+        return outline_width(self.size)
+
+
+def outline_width(size: float) -> float:
+    """Return the width of the outlines of arrowheads of a length, pixels."""
+    return max(OUTLINE * size, MIN_OUTLINE)
+
+
+def has_arrows(instance: MeshInstance) -> bool:
+    """Return whether the lines of the field of an instance have a direction."""
+    return instance.field is not None and not field_symmetry(instance.field).has_opposites
+
+
+def arrow_marks_task(
+    instances: Sequence[MeshInstance],
+    camera: Camera,
+    spacing: float,
+    size: float,
+    *,
+    display: str = "smooth",
+    clip_planes: np.ndarray | None = None,
+    cache: Cache | None = None,
+    is_exact: bool = True,
+) -> Task[ArrowMarks]:
+    """Find the places and directions of arrowheads in a view.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        Those without a field, or whose lines have no direction, only hide arrowheads.
+    camera : Camera
+        Of the picture.
+    spacing : float
+        Least distance between the places of arrowheads, pixels.
+    size : float
+        Length of an arrowhead, pixels.
+    display : {"smooth", "flat"}
+        As for `projection.project.project_task`.
+    clip_planes : (6, 4) float64 ndarray, optional
+        World space. The negative side of each plane is cut away.
+    cache : Cache, optional
+        Stores corner fields.
+    is_exact : bool
+        Whether no place is hidden. If not, most hidden ones are left out, which is faster.
+
+    Yields
+    ------
+    Progress
+
+    Returns
+    -------
+    ArrowMarks
+    """
+    yield Progress(0.0, "finding places of arrowheads")
+    frame = camera.width, camera.height
+    degrees = [instance.field.degree for instance in instances if has_arrows(instance)]
+    reach = _reach(max(degrees, default=1), size)
+    spacing = max(spacing, 2 * reach + size, float(np.sqrt(frame[0] * frame[1] / MAX_COUNT)))
+    points = _samples_in_order(instances, camera, spacing)
+    first = np.cumsum([0, *(len(instance.surface.triangles) for instance in instances[:-1])])
+    task = project_points_task(
+        instances,
+        camera,
+        points.triangle + first[points.instance_id],
+        points.barycentric,
+        clip_planes,
+        finds_hidden=is_exact,
+    )
+    projected = yield from subtask(task, 0.0, 0.6)
+    kept = np.flatnonzero(projected.is_visible)
+    points, projected = points.part(kept), projected.part(kept)
+    if not len(kept):
+        return _no_marks(size)
+    task = surface_points_task(instances, camera, display, points, projected.position, cache)
+    gbuffer = yield from subtask(task, 0.6, 0.9)
+    directions = _screen_directions(gbuffer)
+    is_usable = (np.abs(directions) >= MIN_FORESHORTENING).any(axis=1) & _faces_camera(gbuffer)
+    if not is_exact:
+        is_usable &= ~_seems_hidden(projected, gbuffer, spacing)
+    usable = np.flatnonzero(is_usable)
+    chosen = usable[spaced_points(projected.position[usable], spacing, frame)]
+    return _marks_at(
+        instances, points.part(chosen), projected.position[chosen], directions[chosen], size
+    )
+
+
+def _samples_in_order(
+    instances: Sequence[MeshInstance], camera: Camera, spacing: float
+) -> SurfacePoints:
+    """Return points of all surfaces with arrowheads that are in the frame, by their ranks."""
+    parts = [SurfacePoints(np.empty(0, np.int32), np.empty(0, np.int32), np.empty((0, 3)))]
+    ranks = [np.empty(0)]
+    for number, instance in enumerate(instances):
+        if has_arrows(instance):
+            points, rank = progressive_samples(instance, camera, spacing)
+            parts.append(points._replace(instance_id=points.instance_id + np.int32(number)))
+            ranks.append(rank)
+    order = np.argsort(np.concatenate(ranks), kind="stable")
+    return SurfacePoints.concatenate(parts).part(order)
+
+
+def _reach(degree: int, size: float) -> float:
+    """Return the distance from a place to the middles of its N arrowheads, pixels."""
+    if degree == 1:
+        return 0.0
+    return max(REACH, MIN_GAP * WIDTH / (2 * np.sin(np.pi / degree))) * size
+
+
+def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
+    """(P, M) complex128: the directions of the field on screen, as long as they are seen.
+
+    M is the largest degree. A point with fewer directions, or without any, has zeros.
+    """
+    jacobian = screen_jacobians(gbuffer).astype(np.complex128)
+    degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
+    result = np.zeros((len(degree), int(degree.max(initial=1))), dtype=np.complex128)
+    for number in np.unique(degree).tolist():
+        of_degree = np.flatnonzero((degree == number) & (gbuffer.representation != 0))
+        z = gbuffer.representation[of_degree].astype(np.complex128)
+        member = np.exp(
+            1j * np.angle(z)[:, None] / number + 2j * np.pi * np.arange(number) / number
+        )
+        harmonics = [
+            (order, values[of_degree, None].astype(np.complex128))
+            for (kind, order), values in gbuffer.channels.items()
+            if kind == "deviation"
+        ]
+        if harmonics:
+            member = member * evaluate_harmonics(harmonics, member)
+            member /= np.maximum(np.abs(member), 1e-30)
+        x, y = jacobian[of_degree].T[..., None]
+        result[of_degree, :number] = x * member.real + y * member.imag
+    return result
+
+
+def _faces_camera(gbuffer: GBuffer) -> np.ndarray:
+    """(P,) bool: whether the surface is not too slanted for arrowheads."""
+    degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
+    limit = np.where(degree == 1, MIN_FACING, MIN_FACING_OF_SEVERAL)
+    return dot(gbuffer.geometric_normal, gbuffer.view_direction) >= limit
+
+
+def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) -> np.ndarray:
+    """(P,) bool: whether nearer points are next to points in the picture.
+
+    Behind a point on a front side, any on a back side seems hidden.
+    """
+    side = spacing / 2
+    column, row = (projected.position / side).astype(np.intp).T + 1
+    shape = int(row.max(initial=0)) + 2, int(column.max(initial=0)) + 2
+    nearest, nearest_front = np.full((2, *shape), np.inf)
+    np.minimum.at(nearest, (row, column), projected.depth)
+    front = np.flatnonzero(gbuffer.front_facing)
+    np.minimum.at(nearest_front, (row[front], column[front]), projected.depth[front])
+    nearest, nearest_front = (
+        np.min([depth[row + dy, column + dx] for dy in (-1, 0, 1) for dx in (-1, 0, 1)], axis=0)
+        for depth in (nearest, nearest_front)
+    )
+    pixel = 1 / gbuffer.camera.pixels_per_unit
+    if gbuffer.camera.is_perspective:
+        pixel = pixel * projected.depth
+    is_far = projected.depth - nearest > HIDDEN_SPACINGS * spacing * pixel
+    return is_far | (~gbuffer.front_facing & (projected.depth > nearest_front))
+
+
+def _marks_at(
+    instances: Sequence[MeshInstance],
+    points: SurfacePoints,
+    place: np.ndarray,
+    directions: np.ndarray,
+    size: float,
+) -> ArrowMarks:
+    """Return the arrowheads of the directions at points, those of a point one after the other."""
+    length = np.abs(directions)
+    point, member = np.nonzero(length >= MIN_FORESHORTENING)
+    unit = directions[point, member] / length[point, member]
+    direction = np.stack([unit.real, unit.imag], axis=1)
+    reach = np.array(
+        [0.0 if part.field is None else _reach(part.field.degree, size) for part in instances]
+    )
+    anchor = np.empty((len(place), 3))
+    for number in np.unique(points.instance_id).tolist():
+        chosen = points.instance_id == number
+        instance = instances[number]
+        corners = instance.world_points()[instance.surface.triangle_vertex[points.triangle[chosen]]]
+        anchor[chosen] = np.einsum("nk,nki->ni", points.barycentric[chosen], corners)
+    position = place[point] + reach[points.instance_id[point], None] * direction
+    return ArrowMarks(anchor[point], place[point], position, direction, size)
+
+
+def _no_marks(size: float) -> ArrowMarks:
+    return ArrowMarks(np.empty((0, 3)), *np.empty((3, 0, 2)), size)

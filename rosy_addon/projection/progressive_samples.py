@@ -1,0 +1,216 @@
+"""Points spread evenly over surfaces, as many as a view needs, which stay where they are.
+
+Triangle t with the area A has the points i = 0, 1, 2, ... of a sequence that fills it evenly from its first
+point on. A point has the rank (i + u) / A, where u is a random number of the triangle: all points up to a
+rank r are an even sample of the whole mesh, with the density r. A view takes them up to a rank that depends on
+how large a part of the surface is on screen. So a moving camera adds and drops points of high rank, and
+all others stay.
+
+The sequence is the van der Corput sequence of triangles: the digits of i to the base 4 choose one of the four
+parts of a triangle, then one of the four parts of that part, and so on; see Kinjal Basu and Art B. Owen, "Low
+discrepancy constructions in the triangle", 2015. Each triangle shuffles the parts in its own way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..field.blocks import concatenated_ranges
+from .camera import Camera
+from .gbuffer import MeshInstance
+from .project import all_triangles
+from .surface_points import SurfacePoints
+
+#: Points in the area of a square whose side is the spacing.
+POINTS_PER_SPACING = 8
+
+#: Digits to the base 4 that place a point, and divisions of a triangle that is seen in part or in perspective.
+DIGITS, MAX_DIVISIONS = 15, 12
+
+#: Largest ratio of the depths of the corners of a triangle that is not divided, and its largest area if it
+#: is only partly in the frame, in squares of the spacing.
+MAX_DEPTH_RATIO, MAX_CUT_AREA = 1.4, 16.0
+
+#: The corners of the parts of a triangle, in its barycentric coordinates: the middle, then those at its corners.
+PARTS = 0.5 * np.array(
+    [
+        [[0, 1, 1], [1, 0, 1], [1, 1, 0]],
+        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
+        [[1, 1, 0], [0, 2, 0], [0, 1, 1]],
+        [[1, 0, 1], [0, 1, 1], [0, 0, 2]],
+    ]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """n parts of triangles, each with the points of its sequence whose first digits are the same.
+
+    Attributes
+    ----------
+    triangle : (n,) intp ndarray
+    corners : (n, 3, 3) float64 ndarray
+        Barycentric coordinates of the corners of each part.
+    first : (n,) int64 ndarray
+        The first of its points. The others follow in steps of 4 ** `depth`.
+    depth : int
+        How often the triangle was divided.
+    """
+
+    triangle: np.ndarray
+    corners: np.ndarray
+    first: np.ndarray
+    depth: int
+
+    def part(self, chosen: np.ndarray) -> _Pieces:
+        """Return those that a mask chooses."""
+        return _Pieces(self.triangle[chosen], self.corners[chosen], self.first[chosen], self.depth)
+
+    def divided(self, shuffle: np.ndarray) -> _Pieces:
+        """Return the four parts of each piece, given the (T,) uint64 random bits of triangles."""
+        corners = np.einsum("pij,njk->npik", PARTS, self.corners).reshape(-1, 3, 3)
+        part = np.tile(np.arange(4), len(self.triangle))
+        triangle = np.repeat(self.triangle, 4)
+        digit = part ^ _shuffle_bits(shuffle[triangle], self.depth)
+        first = np.repeat(self.first, 4) + (digit << (2 * self.depth))
+        return _Pieces(triangle, corners, first, self.depth + 1)
+
+
+def progressive_samples(
+    instance: MeshInstance, camera: Camera, spacing: float
+) -> tuple[SurfacePoints, np.ndarray]:
+    """Sample the part of a surface that is in the frame of a camera, visible or not.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    camera : Camera
+    spacing : float
+        There are `POINTS_PER_SPACING` points in a square of this side, pixels.
+
+    Returns
+    -------
+    points : SurfacePoints
+        Of instance 0.
+    rank : (P,) float64 ndarray
+        The points up to a rank are an even sample of the surface. In points per square unit.
+    """
+    clip, triangles, _ = all_triangles([instance], camera)
+    area = _rest_areas(instance)
+    shuffle = _random_bits(len(triangles))
+    # The upper half of the bits is for u, the lower one for the parts.
+    offset = (shuffle >> np.uint64(32)).astype(np.float64) / 2.0**32
+    index, of_piece = [], []
+    todo = _Pieces(
+        np.arange(len(triangles)),
+        np.broadcast_to(np.eye(3), (len(triangles), 3, 3)),
+        np.zeros(len(triangles), dtype=np.int64),
+        0,
+    ).part(area > 0)
+    while len(todo.triangle):
+        corners = clip[triangles[todo.triangle]]
+        if todo.depth:
+            corners = np.einsum("nij,njk->nik", todo.corners, corners)
+        in_frame = _touches_frame(corners)
+        todo, corners = todo.part(in_frame), corners[in_frame]
+        screen_area, is_divided = _screen_areas(corners, camera, spacing)
+        is_divided &= todo.depth < MAX_DIVISIONS
+        whole = todo.part(~is_divided)
+        # The points of the triangle, if all of it had the scale of this part.
+        total = POINTS_PER_SPACING * screen_area[~is_divided] * 4.0**whole.depth / spacing**2
+        step = 4**whole.depth
+        count = np.ceil((total - offset[whole.triangle] - whole.first) / step)
+        count = np.clip(count, 0, (4**DIGITS - 1 - whole.first) // step).astype(np.int64)
+        chosen = np.repeat(np.arange(len(count)), count)
+        rank_in_piece = concatenated_ranges(np.zeros(len(count), dtype=np.intp), count)
+        index.append(whole.first[chosen] + rank_in_piece * step)
+        of_piece.append(whole.triangle[chosen])
+        todo = todo.part(is_divided).divided(shuffle)
+    number = np.concatenate(index) if index else np.empty(0, np.int64)
+    triangle = np.concatenate(of_piece) if of_piece else np.empty(0, np.intp)
+    points = SurfacePoints(
+        np.zeros(len(number), dtype=np.int32),
+        triangle.astype(np.int32),
+        _barycentric(number, shuffle[triangle]),
+    )
+    return points, (number + offset[triangle]) / area[triangle]
+
+
+def _touches_frame(corners: np.ndarray) -> np.ndarray:
+    """(n,) bool: whether triangles, (n, 3, 4) corners in clip space, may be in the frame."""
+    w = corners[..., 3:]
+    is_beyond = np.concatenate([corners[..., :3] > w, corners[..., :3] < -w], axis=2)
+    return ~is_beyond.all(axis=1).any(axis=1)
+
+
+def _screen_areas(
+    corners: np.ndarray, camera: Camera, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the areas of triangles on screen, and whether they have to be divided.
+
+    Parameters
+    ----------
+    corners : (n, 3, 4) float64 ndarray
+        Clip space.
+    camera : Camera
+    spacing : float
+        Pixels.
+
+    Returns
+    -------
+    area : (n,) float64 ndarray
+        Square pixels; 0 if the triangle reaches behind the eye.
+    is_divided : (n,) bool ndarray
+    """
+    w = corners[..., 3]
+    nearest, farthest = w.min(axis=1), w.max(axis=1)
+    is_in_front = nearest > 0
+    ndc = corners[..., :2] / np.where(is_in_front[:, None], w, 1.0)[..., None]
+    (ax, ay), (bx, by) = (np.moveaxis(ndc[:, k] - ndc[:, 0], 1, 0) for k in (1, 2))
+    area = np.abs(ax * by - ay * bx) * (camera.width * camera.height / 8)
+    area[~is_in_front] = 0.0
+    is_cut = (np.abs(ndc) > 1).any(axis=(1, 2))
+    is_large = area > spacing**2 / POINTS_PER_SPACING
+    return area, ~is_in_front | (
+        is_large
+        & ((farthest > MAX_DEPTH_RATIO * nearest) | (is_cut & (area > MAX_CUT_AREA * spacing**2)))
+    )
+
+
+def _rest_areas(instance: MeshInstance) -> np.ndarray:
+    """Return the (T,) areas of the triangles of an instance, before they deform."""
+    surface = instance.surface
+    corners = surface.in_rest_shape().vertices[surface.triangle_vertex]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    a, b, c = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+    scale = np.abs((np.cross(a, b) * c).sum())
+    return 0.5 * np.sqrt((normal * normal).sum(axis=1)) * scale ** (2 / 3)
+
+
+def _random_bits(count: int) -> np.ndarray:
+    """(count,) uint64: a hash of the numbers from 0 on (SplitMix64)."""
+    bits = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        bits ^= bits >> np.uint64(shift)
+        bits *= np.uint64(factor)
+    return bits ^ (bits >> np.uint64(31))
+
+
+def _shuffle_bits(shuffle: np.ndarray, depth: int) -> np.ndarray:
+    """(n,) int64, from 0 to 3: by which triangles shuffle their parts, after so many divisions."""
+    return (shuffle >> np.uint64(2 * depth) & np.uint64(3)).astype(np.int64)
+
+
+def _barycentric(index: np.ndarray, shuffle: np.ndarray) -> np.ndarray:
+    """(n, 3) barycentric coordinates of the points with an index, in triangles with random bits."""
+    result = np.full((len(index), 3), 1 / 3)
+    for depth in reversed(range(DIGITS)):
+        part = index >> (2 * depth) & 3 ^ _shuffle_bits(shuffle, depth)
+        result *= 0.5
+        middle = part == 0
+        result[middle] = 0.5 - result[middle]
+        corner = np.flatnonzero(~middle)
+        result[corner, part[corner] - 1] += 0.5
+    return result

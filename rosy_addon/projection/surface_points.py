@@ -1,0 +1,34 @@
+"""Points on the surfaces of mesh instances."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class SurfacePoints(NamedTuple):
+    """P points on mesh instances.
+
+    Attributes
+    ----------
+    instance_id : (P,) int32 ndarray
+        Index of the mesh instance.
+    triangle : (P,) int32 ndarray
+        Index of the triangle of the instance's surface.
+    barycentric : (P, 3) float64 ndarray
+        In that triangle.
+    """
+
+    instance_id: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> SurfacePoints:
+        """Return those that a mask or indices choose."""
+        return SurfacePoints(*(column[chosen] for column in self))
+
+    @staticmethod
+    def concatenate(parts: list[SurfacePoints]) -> SurfacePoints:
+        """Return the points of all parts, in their order."""
+        return SurfacePoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -1,0 +1,256 @@
+"""Arrowheads over the lines of pictures: their directions, their spacing, and where there are none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapes import globe, icosphere, torus
+
+from rosy_addon.annotation.arrow_marks import (
+    FILL_COLOR,
+    NOTCH,
+    WIDTH,
+    ArrowMarks,
+    arrow_marks_task,
+)
+from rosy_addon.annotation.draw_arrows import draw_arrows_task
+from rosy_addon.annotation.even_spacing import spaced_points
+from rosy_addon.color import from_hex, to_linear
+from rosy_addon.compositor.look import Look
+from rosy_addon.field.directional_field import field_directions, field_from_directions
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import run_to_completion
+from rosy_addon.projection.camera import (
+    look_at,
+    orbit_camera,
+    orthographic_camera,
+    perspective_camera,
+)
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.band_workers import BandWorkers
+from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
+
+CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 480, 400, fov=0.7)
+
+
+def arrows(instances, camera=CAMERA, spacing=24.0, size=8.0, **options) -> ArrowMarks:
+    return run_to_completion(arrow_marks_task(instances, camera, spacing, size, **options))
+
+
+def instance_of(surface, degree, kind="smoothest"):
+    return MeshInstance(surface, np.eye(4), generate(surface, GeneratorSettings(kind), degree))
+
+
+def rectangle(normal_up=True):
+    corners = np.array([[-2, -1, 0], [2, -1, 0], [2, 1, 0], [-2, 1, 0]], dtype=float)
+    face = np.arange(4) if normal_up else np.arange(4)[::-1]
+    return build_surface(corners, face, np.array([0, 4]))
+
+
+def on_screen(camera, points):
+    clip = np.c_[points, np.ones(len(points))] @ (camera.projection @ camera.view).T
+    return (clip[:, :2] / clip[:, 3:] + 1) / 2 * (camera.width, camera.height)
+
+
+def screen_angles(marks):
+    return np.angle(marks.direction @ [1, 1j])
+
+
+def gap(positions):
+    """The least distance between two of (n, 2) positions."""
+    apart = np.hypot(*(positions[:, None] - positions).transpose(2, 0, 1))
+    return apart[~np.eye(len(positions), dtype=bool)].min()
+
+
+def places(marks):
+    return np.unique(marks.place, axis=0)
+
+
+@pytest.mark.parametrize("normal_up", [True, False])
+@pytest.mark.parametrize("case", ["one", "three", "five", "two without opposites"])
+def test_arrowheads_point_along_the_directions_of_a_field(case, normal_up):
+    """On both sides of a plane, in perspective."""
+    surface = rectangle(normal_up)
+    member = np.array([np.cos(0.4), np.sin(0.4), 0.0])
+    if case == "two without opposites":
+        other = [np.cos(1.5), np.sin(1.5), 0.0]
+        field = field_from_directions(surface, np.array([[member, other]]))
+    else:
+        field = RosyField({"one": 1, "three": 3, "five": 5}[case], member[None])
+    directions = field_directions(surface, field)[0]
+    camera = perspective_camera(look_at((1.5, -2.5, 2.5), (0, 0, 0)), 480, 320, fov=0.9)
+    marks = arrows([MeshInstance(surface, np.eye(4), field)], camera, spacing=50.0)
+    np.testing.assert_allclose(on_screen(camera, marks.anchor), marks.place, atol=1e-6)
+    step = 1e-4
+    ends = [on_screen(camera, marks.anchor + step * direction) for direction in directions]
+    angles = np.angle([(end - marks.place) @ [1, 1j] for end in ends])
+    error = np.abs(np.angle(np.exp(1j * (screen_angles(marks) - angles))))
+    assert len(marks) > 20 and np.degrees(error.min(axis=0)).max() < 0.5
+    # All directions of a place are there.
+    assert (np.unique(error.argmin(axis=0), return_counts=True)[1] > len(marks) / 8).all()
+    assert len(marks) > 0.9 * len(directions) * len(places(marks))
+    if len(directions) > 1:
+        ahead = ((marks.position - marks.place) * marks.direction).sum(axis=1)
+        np.testing.assert_allclose(np.hypot(*(marks.position - marks.place).T), ahead, atol=1e-9)
+        assert case.startswith("two") or gap(marks.position) > 0.8 * WIDTH * marks.size
+    else:
+        np.testing.assert_array_equal(marks.position, marks.place)
+
+
+def test_arrowheads_follow_the_smooth_field_of_curved_surfaces():
+    surface = globe(24, 48)
+    east = np.cross([0.0, 0.0, 1.0], surface.face_center)
+    field = RosyField(
+        1, east - (east * surface.face_normal).sum(axis=1)[:, None] * surface.face_normal
+    )
+    marks = arrows([MeshInstance(surface, np.eye(4), field)])
+    east = np.cross([0.0, 0.0, 1.0], marks.anchor)
+    angles = np.angle((on_screen(CAMERA, marks.anchor + 1e-4 * east) - marks.place) @ [1, 1j])
+    error = np.abs(np.angle(np.exp(1j * (screen_angles(marks) - angles))))
+    assert len(marks) > 60 and np.degrees(error).max() < 1.0
+
+
+@pytest.mark.parametrize("shape", ["fine", "coarse"])
+@pytest.mark.parametrize("is_exact", [True, False])
+def test_places_are_even_and_on_the_side_that_the_camera_sees(shape, is_exact):
+    surface = icosphere({"fine": 5, "coarse": 3}[shape])
+    camera = orthographic_camera(look_at((0, -3, 0.0), (0, 0, 0)), 400, 400, scale=2.2)
+    marks = arrows([instance_of(surface, 1)], camera, spacing=25.0, is_exact=is_exact)
+    assert gap(marks.position) >= 25.0
+    assert (marks.anchor[:, 1] < 0).all()
+    radius = 400 / 2.2
+    y, x = np.mgrid[:400:2, :400:2] + 0.5
+    inside = np.hypot(x - 200, y - 200) < 0.95 * radius
+    points = np.stack([x[inside], y[inside]], axis=1)
+    nearest = np.min([np.hypot(*(points - position).T) for position in marks.position], axis=0)
+    # But for places where the field is undefined or points at the camera.
+    assert np.quantile(nearest, 0.99) < 1.25 * 25.0 and nearest.max() < 2.5 * 25.0
+
+
+def test_nothing_is_drawn_where_a_surface_is_hidden_or_outside():
+    ball, wall = icosphere(4), rectangle()
+    turned = np.array([[1, 0, 0, 0.6], [0, 0, -1, -1.5], [0, 1, 0, 0], [0, 0, 0, 1.0]])
+    marks = arrows([instance_of(ball, 1), MeshInstance(wall, turned, None)])
+    alone = arrows([instance_of(ball, 1)])
+    assert 0 < len(marks) < 0.8 * len(alone)
+    for anchor in marks.anchor:
+        eye = CAMERA.eye
+        share = (-1.5 - anchor[1]) / (eye[1] - anchor[1])
+        x, _, z = anchor + share * (eye - anchor)
+        assert not (0 < share < 1 and -1.4 < x < 2.6 and -1 < z < 1)
+    assert ((marks.place >= 0) & (marks.place <= (480, 400))).all()
+    planes = np.zeros((6, 4))
+    planes[:, 3] = 1.0
+    planes[0] = (1.0, 0.0, 0.0, 0.0)
+    cut = arrows([instance_of(ball, 1)], clip_planes=planes)
+    assert len(cut) and (cut.anchor[:, 0] > -1e-9).all()
+
+
+@pytest.mark.parametrize("degree", [2, 4, 6])
+def test_lines_without_a_direction_have_no_arrowheads(degree):
+    assert not len(arrows([instance_of(icosphere(2), degree)]))
+
+
+def test_undefined_faces_have_no_arrowheads():
+    surface = globe(24, 48)
+    field = generate(surface, GeneratorSettings("smoothest"), 1)
+    is_south = surface.face_center[:, 2] < 0
+    field = replace(field, vectors=np.where(is_south[:, None], 0.0, field.vectors))
+    marks = arrows([MeshInstance(surface, np.eye(4), field)])
+    assert len(marks) and (marks.anchor[:, 2] > -0.01).all()
+    assert not len(
+        arrows([MeshInstance(surface, np.eye(4), replace(field, vectors=0 * field.vectors))])
+    )
+
+
+def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
+    instance = instance_of(torus(96, 48), 1)
+    marks = [
+        arrows([instance], orbit_camera(instance.surface, azimuth, 40, 480, 400))
+        for azimuth in (20.0, 20.0, 20.5)
+    ]
+    np.testing.assert_array_equal(marks[0].position, marks[1].position)
+    before, after = ({tuple(np.round(point, 6)) for point in mark.anchor} for mark in marks[1:])
+    assert len(before) > 60 and len(before & after) > 0.8 * len(before)
+
+
+def test_a_large_floor_around_the_camera_is_covered_evenly():
+    """Places need no more than the part of a face that is in view."""
+    corners = 500.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    floor = build_surface(corners, np.arange(4), np.array([0, 4]))
+    field = RosyField(1, np.array([[0.2, 1.0, 0.0]]))
+    camera = perspective_camera(look_at((0, 0, 1.7), (10, 0, -2)), 480, 320, fov=1.0)
+    marks = arrows([MeshInstance(floor, np.eye(4), field)], camera, spacing=24.0)
+    assert gap(marks.position) >= 24.0
+    lower = np.mgrid[10:470:8, 10:120:8].reshape(2, -1).T
+    nearest = np.min([np.hypot(*(lower - place).T) for place in marks.place], axis=0)
+    assert nearest.max() < 1.5 * 24.0
+
+
+def test_points_are_chosen_in_their_order():
+    """As by taking one after the other."""
+    generator = np.random.default_rng(3)
+    position = generator.random((600, 2)) * (160, 90)
+    expected = []
+    for number, place in enumerate(position):
+        if all(np.hypot(*(place - position[other])) >= 11.0 for other in expected):
+            expected.append(number)
+    assert spaced_points(position, 11.0, (160, 90)).tolist() == expected
+    assert not len(spaced_points(np.empty((0, 2)), 11.0, (160, 90)))
+
+
+def test_an_arrowhead_has_its_shape_and_its_outline():
+    rgba = np.zeros((60, 80, 4), dtype=np.float32)
+    direction = np.array([[np.cos(0.5), np.sin(0.5)]])
+    place = np.array([[40.2, 30.7]])
+    marks = ArrowMarks(np.zeros((1, 3)), place, place, direction, 24.0)
+    picture = run_to_completion(draw_arrows_task(rgba, marks))
+    fill = to_linear(from_hex(FILL_COLOR))[0]
+    dark = np.where(picture[..., 3] > 0, (1 - picture[..., 0]) / (1 - fill), 0)
+    y, x = np.mgrid[:60, :80] + 0.5
+    along = (x - 40.2) * direction[0, 0] + (y - 30.7) * direction[0, 1]
+    # A quadrilateral with a notch; its narrow end is ahead.
+    assert dark.sum() == pytest.approx(24 * 24 * WIDTH * (1 - NOTCH) / 2, rel=0.02)
+    assert (dark * (along < 0)).sum() > 1.8 * (dark * (along > 0)).sum()
+    assert (dark[np.abs(along) > 12.7] == 0).all() and picture[30, 40, 3] == 1
+    sides = 2 * 24 * (np.hypot(1, WIDTH / 2) + np.hypot(NOTCH, WIDTH / 2))
+    assert picture[..., 3].sum() - dark.sum() == pytest.approx(2.4 * sides, rel=0.1)
+    none = ArrowMarks(np.zeros((0, 3)), *np.zeros((3, 0, 2)), 24.0)
+    np.testing.assert_array_equal(run_to_completion(draw_arrows_task(rgba, none)), rgba)
+    beside = replace(marks, position=np.array([[-300.0, 30.0]]))
+    np.testing.assert_array_equal(run_to_completion(draw_arrows_task(rgba, beside)), rgba)
+
+
+def rendered(view, **options):
+    return run_to_completion(CpuRenderer(**options).render_task(view)).rgba
+
+
+def test_processes_and_supersampling_draw_the_same_arrowheads():
+    instance = instance_of(globe(48, 96), 3)
+    looks = [Look(length=8, arrows=40.0, supersampling=samples) for samples in (1, 2)]
+    views = [ViewInput((instance,), CAMERA, look) for look in looks]
+    with BandWorkers(2) as workers:
+        np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=workers))
+    changed = []
+    for view in views:
+        plain = replace(view, look=replace(view.look, arrows=0.0))
+        changed.append((rendered(view) != rendered(plain)).any(axis=2))
+    assert changed[0].sum() > 2000
+    np.testing.assert_array_equal(*changed)
+
+
+def test_sizes_in_blender_units_follow_the_distance():
+    instance = instance_of(icosphere(3), 1)
+    sizes = []
+    for distance in (4.0, 8.0):
+        camera = perspective_camera(look_at((0, -distance, 0), (0, 0, 0)), 400, 400, fov=0.7)
+        look = Look(length=8, unit="world", unit_size=0.01, arrows=20.0, arrow_size=9.0)
+        view = ViewInput((instance,), camera, look)
+        plain = replace(view, look=replace(look, arrows=0.0))
+        sizes.append((rendered(view) != rendered(plain)).any(axis=2).sum())
+    assert 2.5 < sizes[0] / sizes[1] < 4.5  # outlines are a pixel wide at least

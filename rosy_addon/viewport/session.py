@@ -10,11 +10,14 @@ from typing import Any
 
 import bpy
 
+from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..compositor.look import Look, has_flow
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
+from ..progress import run_to_completion
+from ..rendering.arrowheads import view_arrows_task
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.color_inputs import check_colored, color_attribute_of
@@ -22,6 +25,7 @@ from ..scene.lights import read_lights
 from ..scene.look_properties import look_at_frame, read_look
 from ..scene.scene_cache import InstanceState
 from ..scene.tone_inputs import check_tones, make_tone_request
+from .arrowheads import draw_arrowheads
 from .background import view_background
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates
@@ -104,9 +108,12 @@ class ViewportSession:
         #: The lines of text in each view.
         self._lines: dict[ViewPointers, list[str]] = {}
         self.layers = LayerStates(lambda: self._schedule(0.0, "_resolve_topologies"))
-        self._singularities = Cache()
+        #: Stores the singularities of fields, and the fields at corners for arrowheads.
+        self._marks_cache = Cache()
         #: The dots that have labels in each view, and their size.
         self._labeled: dict[ViewPointers, tuple[list[SingularityDots], float]] = {}
+        #: The arrowheads of each view, with a key of what they depend on.
+        self._arrowheads: dict[ViewPointers, tuple[Hashable, ArrowMarks]] = {}
         self._references = ReferenceImages(lambda: self._schedule(0.0, "_load_reference_images"))
         self._draw_handlers = [
             bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
@@ -137,7 +144,7 @@ class ViewportSession:
     def remove(self, space_pointer: int) -> None:
         """Make a view no longer live, given its pointer."""
         self.spaces.discard(space_pointer)
-        for of_views in (self._problems, self._lines, self._labeled):
+        for of_views in (self._problems, self._lines, self._labeled, self._arrowheads):
             for pointers in [pointers for pointers in of_views if pointers[0] == space_pointer]:
                 del of_views[pointers]
         self.progressive.remove_space(space_pointer)
@@ -303,7 +310,30 @@ class ViewportSession:
             editing = context.mode.startswith("EDIT")
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
             self.progressive.renderer.composite(view.texture, view.items, view_input, opacity)
+            self._draw_arrowheads(context, space, region, instances, view_input)
             self._draw_singularities(context, space, region, view_input)
+
+    def _draw_arrowheads(
+        self,
+        context: bpy.types.Context,
+        space: bpy.types.SpaceView3D,
+        region: bpy.types.Region,
+        instances: list[InstanceState],
+        view_input: ViewInput,
+    ) -> None:
+        """Draw arrowheads over the lines of a view, if the look has them."""
+        look = replace(read_look(context.scene.rosy), flow_phase=0.0)
+        pointers = space.as_pointer(), region.as_pointer()
+        if not look.arrows:
+            self._arrowheads.pop(pointers, None)
+            return
+        view = replace(view_input, look=look, lights=(), reference=None)
+        key = _picture_key(instances, view)
+        if pointers not in self._arrowheads or self._arrowheads[pointers][0] != key:
+            task = view_arrows_task(view, self._marks_cache, is_exact=False)
+            self._arrowheads[pointers] = key, run_to_completion(task)
+            self._marks_cache.evict_over_limit()
+        draw_arrowheads(context, self._arrowheads[pointers][1])
 
     def _draw_singularities(
         self,
@@ -317,11 +347,11 @@ class ViewportSession:
         if not shows_singularities(look):
             return
         dots = [
-            singularity_dots(instance, self._singularities, view_input.clip_planes)
+            singularity_dots(instance, self._marks_cache, view_input.clip_planes)
             for instance in view_input.instances
             if instance.field is not None
         ]
-        self._singularities.evict_over_limit()
+        self._marks_cache.evict_over_limit()
         shows_hidden = look.singularity_dots == "all"
         draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden)
         if look.singularity_labels:
@@ -342,8 +372,8 @@ class ViewportSession:
             If no field is visible and nothing else says why, or if the tone or the colors have no
             source.
         """
-        # Their dots are drawn over the picture.
-        look = replace(read_look(context.scene.rosy), singularity_dots="none")
+        # Dots and arrowheads are drawn over the picture.
+        look = replace(read_look(context.scene.rosy), singularity_dots="none", arrows=0.0)
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
         if layer.is_starting:

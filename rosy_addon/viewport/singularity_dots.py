@@ -28,6 +28,7 @@ from ..color import from_hex
 from ..progress import run_to_completion
 from ..projection.clip_planes import is_cut_away
 from ..projection.gbuffer import MeshInstance
+from .pixel_frames import pixel_frames
 
 #: Number of sides of the polygon that approximates a disc.
 DISC_SEGMENTS = 20
@@ -133,20 +134,15 @@ def _disc_triangles(
 
     (K,) radii are in pixels, and so are (K,) offsets toward the camera.
     """
-    view, window = context.region_data, context.region
-    view_to_world = np.array(view.view_matrix.inverted())
-    right, up, back = view_to_world[:3, 0], view_to_world[:3, 1], view_to_world[:3, 2]
-    depth = np.ones(len(points))
-    if view.is_perspective:
-        depth = (view_to_world[:3, 3] - points) @ back
-    pixel = depth * (2 / (view.window_matrix[0][0] * window.width))
+    frames = pixel_frames(context, points)
     angles = np.linspace(0, 2 * np.pi, DISC_SEGMENTS + 1)
-    circle = np.cos(angles)[:, None] * right + np.sin(angles)[:, None] * up
-    triangles = np.stack([np.zeros((DISC_SEGMENTS, 3)), circle[:-1], circle[1:]], axis=1).reshape(
-        -1, 3
+    x, y = (
+        np.stack([np.zeros(DISC_SEGMENTS), values[:-1], values[1:]], axis=1).reshape(-1, 1)
+        for values in (np.cos(angles), np.sin(angles))
     )
-    center = points + (pixel * depth_offset)[:, None] * back
-    vertices = center[:, None] + (pixel * radius)[:, None, None] * triangles
+    center = points + depth_offset[:, None] * frames.nearer
+    circle = x * frames.right[:, None] + y * frames.up[:, None]
+    vertices = center[:, None] + radius[:, None, None] * circle
     return vertices.reshape(-1, 3).astype(np.float32)
 
 

@@ -45,7 +45,7 @@ MIN_FACING, MIN_FACING_OF_SEVERAL = 0.15, 0.35
 
 #: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least distance
 #: between neighbors, in widths.
-REACH, MIN_GAP = 1.0, 1.2
+REACH, MIN_GAP = 1.15, 1.2
 
 #: A place is taken for hidden if another one, next to it in the picture, is nearer by more spacings than this.
 HIDDEN_SPACINGS = 2.5

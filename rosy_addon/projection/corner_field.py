@@ -70,6 +70,18 @@ class CornerField:
     geometric_normal: np.ndarray
     channels: dict[FieldChannel, np.ndarray]
 
+    def part(self, triangle: np.ndarray) -> CornerField:
+        """Return the values of (n,) triangles."""
+        return CornerField(
+            corner_normals=self.corner_normals[..., triangle],
+            reference_tangent=self.reference_tangent[:, triangle],
+            representation=self.representation[:, triangle],
+            normal_dots=self.normal_dots[:, triangle],
+            normal_triple_product=self.normal_triple_product[triangle],
+            geometric_normal=self.geometric_normal[:, triangle],
+            channels={channel: values[:, triangle] for channel, values in self.channels.items()},
+        )
+
     def rotated(self, rotation: np.ndarray) -> CornerField:
         """Return the same values with all vectors rotated by a (3, 3) matrix into another space."""
         return replace(

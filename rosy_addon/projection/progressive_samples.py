@@ -33,6 +33,9 @@ DIGITS, MAX_DIVISIONS = 15, 12
 #: is only partly in the frame, in squares of the spacing.
 MAX_DEPTH_RATIO, MAX_CUT_AREA = 1.4, 16.0
 
+#: Triangles whose sizes on screen are computed at a time.
+TRIANGLES_PER_BLOCK = 1 << 16
+
 #: The corners of the parts of a triangle, in its barycentric coordinates: the middle, then those at its corners.
 PARTS = 0.5 * np.array(
     [
@@ -98,17 +101,20 @@ def progressive_samples(
         The points up to a rank are an even sample of the surface. In points per square unit.
     """
     clip, triangles, _ = all_triangles([instance], camera)
-    area = _rest_areas(instance)
     shuffle = _random_bits(len(triangles))
     # The upper half of the bits is for u, the lower one for the parts.
     offset = (shuffle >> np.uint64(32)).astype(np.float64) / 2.0**32
     index, of_piece = [], []
+    start = _with_points(clip, triangles, camera, spacing, offset)
+    area = np.zeros(len(triangles))
+    area[start] = _rest_areas(instance, start)
+    start = start[area[start] > 0]
     todo = _Pieces(
-        np.arange(len(triangles)),
-        np.broadcast_to(np.eye(3), (len(triangles), 3, 3)),
-        np.zeros(len(triangles), dtype=np.int64),
+        start,
+        np.broadcast_to(np.eye(3), (len(start), 3, 3)),
+        np.zeros(len(start), dtype=np.int64),
         0,
-    ).part(area > 0)
+    )
     while len(todo.triangle):
         corners = clip[triangles[todo.triangle]]
         if todo.depth:
@@ -136,6 +142,40 @@ def progressive_samples(
         _barycentric(number, shuffle[triangle]),
     )
     return points, (number + offset[triangle]) / area[triangle]
+
+
+def _with_points(
+    clip: np.ndarray,
+    triangles: np.ndarray,
+    camera: Camera,
+    spacing: float,
+    offset: np.ndarray,
+) -> np.ndarray:
+    """Return the triangles that may have points: (n,) intp.
+
+    Parameters
+    ----------
+    clip : (V, 4) float64 ndarray
+        Vertices in clip space.
+    triangles : (T, 3) int ndarray
+    camera : Camera
+    spacing : float
+        Pixels.
+    offset : (T,) float64 ndarray
+        u of each triangle.
+    """
+    w = np.where(clip[:, 3] > 0, clip[:, 3], np.nan)
+    x, y = clip[:, 0] / w, clip[:, 1] / w
+    points_per_area = POINTS_PER_SPACING * camera.width * camera.height / (8 * spacing**2)
+    chosen = []
+    for start in range(0, len(triangles), TRIANGLES_PER_BLOCK):
+        a, b, c = triangles[start : start + TRIANGLES_PER_BLOCK].T
+        left, bottom = x[a], y[a]
+        area = (x[b] - left) * (y[c] - bottom) - (x[c] - left) * (y[b] - bottom)
+        # Those that reach behind the eye are not numbers.
+        is_empty = np.abs(area) * points_per_area <= offset[start : start + TRIANGLES_PER_BLOCK]
+        chosen.append(start + np.flatnonzero(~is_empty))
+    return np.concatenate(chosen)
 
 
 def _touches_frame(corners: np.ndarray) -> np.ndarray:
@@ -179,10 +219,11 @@ def _screen_areas(
     )
 
 
-def _rest_areas(instance: MeshInstance) -> np.ndarray:
-    """Return the (T,) areas of the triangles of an instance, before they deform."""
+def _rest_areas(instance: MeshInstance, triangle: np.ndarray) -> np.ndarray:
+    """Return the (n,) areas of triangles of an instance, before they deform."""
     surface = instance.surface
-    corners = surface.in_rest_shape().vertices[surface.triangle_vertex]
+    vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    corners = vertices[surface.triangle_vertex[triangle]]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     a, b, c = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
     scale = np.abs((np.cross(a, b) * c).sum())

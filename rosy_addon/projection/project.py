@@ -247,7 +247,16 @@ def surface_points_task(
     visible_ids = np.flatnonzero(np.bincount(points.instance_id)).tolist()
     visible = _VisiblePixels(fragments, points.instance_id, points.triangle, visible_ids)
     gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.0, 0.1)
-    yield from subtask(_fill_instances_task(gbuffer, visible, display, cache), 0.1, 1.0)
+    for instance_id in visible_ids:
+        chosen = np.flatnonzero(points.instance_id == instance_id)
+        instance = instances[instance_id]
+        task = cached_corner_field_task(
+            instance.surface, instance.matrix, instance.field, display, cache
+        )
+        corner_field = yield from subtask(task, 0.1, 1.0)
+        corner_field = corner_field.part(points.triangle[chosen]).rotated(camera.view[:3, :3])
+        _allocate_channels(gbuffer, corner_field)
+        _fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field, instance.field.degree)
     return gbuffer
 
 

@@ -200,7 +200,8 @@ def _project_task(
     # A triangle nearer than the near plane, or beyond the far one, hides nothing.
     number = np.arange(len(scene.triangles))
     for is_outside in (scene.clip[:, 2] < -scene.clip[:, 3], scene.clip[:, 2] > scene.clip[:, 3]):
-        number = number[~is_outside[scene.triangles[number]].all(axis=1)]
+        if is_outside.any():
+            number = number[~is_outside[scene.triangles[number]].all(axis=1)]
     tolerance = SAME_POINT * float(np.ptp(scene.world, axis=0).max(initial=0.0))
     occluders = _Occluders(
         scene.clip,
@@ -267,13 +268,13 @@ class _Occluders:
         key = 4.0 * point_row + ndc[:, 0]
         order = np.argsort(key, kind="stable")
         key = key[order]
-        corners = self.clip[self.triangles[start:stop]]
+        corners = self.clip[self.triangles[start:stop].T]
         w = corners[..., 3]
-        is_in_front = (w > 0).all(axis=1)[:, None]
+        is_in_front = (w > 0).all(axis=0)[:, None]
         # The projection of a triangle that reaches behind the eye is not bounded by its corners.
-        xy = corners[..., :2] / np.where(is_in_front, w, 1.0)[..., None]
-        low = np.where(is_in_front, xy.min(axis=1), -1.0)
-        high = np.where(is_in_front, xy.max(axis=1), 1.0)
+        xy = corners[..., :2] / np.where(is_in_front[:, 0], w, 1.0)[..., None]
+        low = np.where(is_in_front, xy.min(axis=0), -1.0)
+        high = np.where(is_in_front, xy.max(axis=0), 1.0)
         kept = np.flatnonzero((low <= 1).all(axis=1) & (high >= -1).all(axis=1))
         low, high = np.maximum(low[kept], -1.0), np.minimum(high[kept], 1.0)
         first_row, last_row = (_grid_rows(edge[:, 1], row_count) for edge in (low, high))

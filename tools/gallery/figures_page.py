@@ -46,7 +46,25 @@ def write() -> None:
     save(sheet([panels]), IMAGES / "figures-singularities.png")
     save(_render_with_key(), IMAGES / "figures-key.png")
     save(sheet([_oriented_panels()]), IMAGES / "figures-oriented.png")
+    write_arrowheads()
     _write_figures()
+
+
+def write_arrowheads() -> None:
+    """Draw and save a vector field and a field of three directions with arrowheads."""
+    head = suzanne()
+    wind = generate(head, GeneratorSettings("axis", axis=(1.0, 0.3, 0.4)), 1)
+    three = generate(head, "smoothest", 3)
+    engraving = replace(load_preset("engraving").look, arrows=30.0, arrow_size=12.0)
+    streaks = Look(supersampling=2, density=0.05, grain=2.0, arrows=42.0, arrow_size=9.0)
+    panels = [
+        Panel(display(render_view(head, field, look, ANGLES, SIDE)), text)
+        for field, look, text in (
+            (wind, engraving, "One direction, engraved"),
+            (three, streaks, "Three directions"),
+        )
+    ]
+    save(sheet([panels]), IMAGES / "figures-arrowheads.png")
 
 
 def _write_figures() -> None:

@@ -23,7 +23,14 @@ SIDE, ANGLES, COUNT, RATE = 240, (-26.0, 10.0), 24, 20.0
 
 #: Sparse streaks, with a bright head and a faint tail.
 ORIENTED = Look(
-    supersampling=2, flow=1.5, oriented=True, density=0.03, grain=2.5, length=36, high_pass=0.0, gain=1.8
+    supersampling=2,
+    flow=1.5,
+    oriented=True,
+    density=0.03,
+    grain=2.5,
+    length=36,
+    high_pass=0.0,
+    gain=1.8,
 )
 
 #: Lines of four directions, which drift toward the right of the picture.

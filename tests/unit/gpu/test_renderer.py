@@ -1582,17 +1582,18 @@ def test_clip_planes(card):
     assert (clipped[..., 3] > 0).sum() == visible.sum()
 
 
-def test_singularities_are_drawn_over_the_picture(card):
+@pytest.mark.parametrize(
+    "degree, settings", [(4, {"singularity_dots": "all"}), (3, {"arrows": 30.0, "arrow_size": 8.0})]
+)
+def test_singularities_and_arrowheads_are_drawn_over_the_picture(card, degree, settings):
     """At the same pixels as numpy's."""
     changed = []
     for renderer in (card, CpuRenderer()):
         marked, plain = (
             run_to_completion(
-                renderer.render_task(
-                    ViewInput((ball(4),), view(), replace(LOOK, singularity_dots=shown))
-                )
+                renderer.render_task(ViewInput((ball(degree),), view(), replace(LOOK, **shown)))
             ).rgba
-            for shown in ("all", "none")
+            for shown in (settings, {})
         )
         changed.append((marked != plain).any(axis=2))
     assert changed[0].sum() > 100

@@ -185,7 +185,7 @@ class Look:
     arrows: float = number(
         0.0,
         0.0,
-        8000.0,
+        65536.0,
         "Least distance in pixels between arrowheads over the lines, which show which way they point. For "
         "fields of odd degree. 0: none",
         label="Arrowheads",
@@ -195,9 +195,9 @@ class Look:
     )
     arrow_size: float = number(
         12.0,
-        3.0,
-        4096.0,
-        "Length of the arrowheads in pixels",
+        0.0,
+        65536.0,
+        "Length of the arrowheads in pixels, which is at least 3",
         label="Arrowhead Size",
         is_pixel_length=True,
         panel="streaks",

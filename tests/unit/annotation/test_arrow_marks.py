@@ -254,3 +254,12 @@ def test_sizes_in_blender_units_follow_the_distance():
         plain = replace(view, look=replace(look, arrows=0.0))
         sizes.append((rendered(view) != rendered(plain)).any(axis=2).sum())
     assert 2.5 < sizes[0] / sizes[1] < 4.5  # outlines are a pixel wide at least
+
+
+@pytest.mark.parametrize("sizes", [(65536.0, 65536.0), (1.0, 0.0), (50.0, 65536.0)])
+def test_any_size_and_any_unit_can_be_drawn(sizes):
+    instance = instance_of(icosphere(2), 3)
+    for unit in ("pixels", "world"):
+        look = Look(length=4, unit=unit, arrows=sizes[0], arrow_size=sizes[1])
+        picture = rendered(ViewInput((instance,), CAMERA.resized(60, 50), look))
+        assert np.isfinite(picture).all()

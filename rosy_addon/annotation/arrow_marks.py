@@ -1,7 +1,8 @@
 """Arrowheads over the lines of fields in a picture, where lines have a direction.
 
-Their places belong to the surface: they are chosen from `projection.progressive_samples`, in an order that does
-not depend on the view. Around each place, a field of N directions has N arrowheads.
+Their places belong to the surface; see `surface_places`. Where a view is so near that these are far apart, points of
+`projection.progressive_samples` are between them. All are taken in an order that does not depend on the view, as far
+as they are visible and far enough from those before. Around each place, a field of N directions has N arrowheads.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from ..progress import Progress, Task, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_neighbors import screen_jacobians
-from ..projection.progressive_samples import progressive_samples
+from ..projection.progressive_samples import matrix_scale, progressive_samples
 from ..projection.project import surface_points_task
 from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points_task
 from .even_spacing import spaced_points
+from .surface_places import surface_places_task
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -43,12 +45,15 @@ MIN_FORESHORTENING = 0.3
 #: arrowhead and of several: none reach far beyond silhouettes.
 MIN_FACING, MIN_FACING_OF_SEVERAL = 0.15, 0.35
 
+#: Least distance on the surface of places that are taken, in spacings: on screen most are nearer.
+NEAREST_PLACES = 0.75
+
 #: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least distance
 #: between neighbors, in widths.
 REACH, MIN_GAP = 1.15, 1.2
 
 #: A place is taken for hidden if another one, next to it in the picture, is nearer by more spacings than this.
-HIDDEN_SPACINGS = 2.5
+HIDDEN_SPACINGS = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +127,7 @@ def arrow_marks_task(
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
     cache : Cache, optional
-        Stores corner fields.
+        Stores the places, and corner fields.
     is_exact : bool
         Whether no place is hidden. If not, most hidden ones are left out, which is faster.
 
@@ -139,7 +144,9 @@ def arrow_marks_task(
     degrees = [instance.field.degree for instance in instances if has_arrows(instance)]
     reach = _reach(max(degrees, default=1), size)
     spacing = max(spacing, 2 * reach + size, float(np.sqrt(frame[0] * frame[1] / MAX_COUNT)))
-    points = _samples_in_order(instances, camera, spacing)
+    cache = Cache() if cache is None else cache
+    task = _places_in_order_task(instances, camera, spacing, cache)
+    points = yield from subtask(task, 0.0, 0.2)
     first = np.cumsum([0, *(len(instance.surface.triangles) for instance in instances[:-1])])
     task = project_points_task(
         instances,
@@ -149,7 +156,7 @@ def arrow_marks_task(
         clip_planes,
         finds_hidden=is_exact,
     )
-    projected = yield from subtask(task, 0.0, 0.6)
+    projected = yield from subtask(task, 0.2, 0.6)
     kept = np.flatnonzero(projected.is_visible)
     points, projected = points.part(kept), projected.part(kept)
     if not len(kept):
@@ -161,25 +168,87 @@ def arrow_marks_task(
     if not is_exact:
         is_usable &= ~_seems_hidden(projected, gbuffer, spacing)
     usable = np.flatnonzero(is_usable)
-    chosen = usable[spaced_points(projected.position[usable], spacing, frame)]
+    chosen = usable[spaced_points(projected.position[usable], spacing)]
     return _marks_at(
         instances, points.part(chosen), projected.position[chosen], directions[chosen], size
     )
 
 
-def _samples_in_order(
-    instances: Sequence[MeshInstance], camera: Camera, spacing: float
-) -> SurfacePoints:
-    """Return points of all surfaces with arrowheads that are in the frame, by their ranks."""
+def _places_in_order_task(
+    instances: Sequence[MeshInstance], camera: Camera, spacing: float, cache: Cache
+) -> Task[SurfacePoints]:
+    """Return places on all surfaces with arrowheads, and points between them, in the order of preference.
+
+    The places do not depend on the view. The points are where the view is so near that it needs more.
+    """
     parts = [SurfacePoints(np.empty(0, np.int32), np.empty(0, np.int32), np.empty((0, 3)))]
-    ranks = [np.empty(0)]
+    distances, between, ranks = [np.empty(0)], parts.copy(), [np.empty(0)]
     for number, instance in enumerate(instances):
-        if has_arrows(instance):
-            points, rank = progressive_samples(instance, camera, spacing)
-            parts.append(points._replace(instance_id=points.instance_id + np.int32(number)))
-            ranks.append(rank)
-    order = np.argsort(np.concatenate(ranks), kind="stable")
-    return SurfacePoints.concatenate(parts).part(order)
+        scale = matrix_scale(instance)
+        if not has_arrows(instance) or not scale:
+            continue
+        smallest = NEAREST_PLACES * spacing * _smallest_pixel(instance, camera) / scale
+        places = yield from surface_places_task(instance.surface, smallest, cache)
+        points = SurfacePoints(
+            np.full(len(places.triangle), number, np.int32), places.triangle, places.barycentric
+        )
+        needed = _needed_distances(instance, camera, points, spacing)
+        kept = np.flatnonzero(places.distance * scale >= needed)
+        parts.append(points.part(kept))
+        distances.append(places.distance[kept] * scale)
+        if places.finest <= smallest:
+            continue
+        points, rank = progressive_samples(instance, camera, spacing)
+        needed = _needed_distances(instance, camera, points, spacing)
+        kept = np.flatnonzero(needed < places.finest * scale)
+        points = points._replace(instance_id=points.instance_id + np.int32(number))
+        between.append(points.part(kept))
+        ranks.append(rank[kept])
+    by_distance = np.argsort(-np.concatenate(distances), kind="stable")
+    by_rank = np.argsort(np.concatenate(ranks), kind="stable")
+    return SurfacePoints.concatenate(
+        [
+            SurfacePoints.concatenate(parts).part(by_distance),
+            SurfacePoints.concatenate(between).part(by_rank),
+        ]
+    )
+
+
+def _needed_distances(
+    instance: MeshInstance, camera: Camera, points: SurfacePoints, spacing: float
+) -> np.ndarray:
+    """(P,) float64: how far points have to be from each other, in Blender units; infinite behind the eye."""
+    vertex = instance.surface.triangle_vertex[points.triangle]
+    corners = _to_world(instance, instance.surface.vertices[vertex])
+    world = np.einsum("nk,nki->ni", points.barycentric, corners)
+    result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
+    if camera.is_perspective:
+        depth = _depths(camera, world)
+        result *= np.where(depth > 0, depth, np.inf)
+    return result
+
+
+def _to_world(instance: MeshInstance, points: np.ndarray) -> np.ndarray:
+    """Return (..., 3) points of an instance in world space."""
+    matrix = np.asarray(instance.matrix, dtype=np.float64)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _depths(camera: Camera, points: np.ndarray) -> np.ndarray:
+    """Return the (n,) distances of points in world space along the axis of a camera."""
+    return -(points @ camera.view[2, :3] + camera.view[2, 3])
+
+
+def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
+    """Return the size of a pixel at the nearest point of an instance, in Blender units.
+
+    0 if the instance reaches behind the eye.
+    """
+    pixel = 1 / camera.pixels_per_unit
+    if not camera.is_perspective:
+        return pixel
+    depth = _depths(camera, _to_world(instance, instance.surface.box_corners))
+    return pixel * max(float(depth.min()), 0.0)
 
 
 def _reach(degree: int, size: float) -> float:
@@ -228,8 +297,7 @@ def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) 
 
     Behind a point on a front side, any on a back side seems hidden.
     """
-    side = spacing / 2
-    column, row = (projected.position / side).astype(np.intp).T + 1
+    column, row = (projected.position / spacing).astype(np.intp).T + 1
     shape = int(row.max(initial=0)) + 2, int(column.max(initial=0)) + 2
     nearest, nearest_front = np.full((2, *shape), np.inf)
     np.minimum.at(nearest, (row, column), projected.depth)
@@ -264,8 +332,9 @@ def _marks_at(
     anchor = np.empty((len(place), 3))
     for number in np.unique(points.instance_id).tolist():
         chosen = points.instance_id == number
-        instance = instances[number]
-        corners = instance.world_points()[instance.surface.triangle_vertex[points.triangle[chosen]]]
+        surface = instances[number].surface
+        vertex = surface.triangle_vertex[points.triangle[chosen]]
+        corners = _to_world(instances[number], surface.vertices[vertex])
         anchor[chosen] = np.einsum("nk,nki->ni", points.barycentric[chosen], corners)
     position = place[point] + reach[points.instance_id[point], None] * direction
     return ArrowMarks(anchor[point], place[point], position, direction, size)

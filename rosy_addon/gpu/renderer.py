@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
 from ..compositor.look import colors_magnitude, colors_values
@@ -44,6 +45,9 @@ from .uniforms import NO_CLIP_PLANES, clip_uniforms
 #: How much closer to the eye than the surface its picture is drawn, in normalized depth.
 COMPOSITE_DEPTH_BIAS = 2e-5
 
+#: Bytes of the places of arrowheads, and of what their directions are found with, that are kept.
+MAX_ARROWHEAD_BYTES = 1 << 26
+
 
 class GpuRenderer:
     """Draws pictures on a graphics card. Implements `Renderer` and `ViewportRenderer`.
@@ -65,6 +69,8 @@ class GpuRenderer:
     def __init__(self, device: Device) -> None:
         self.device = device
         self.resources = GpuResources(device)
+        #: Stores the places of arrowheads.
+        self._arrowhead_cache = Cache(MAX_ARROWHEAD_BYTES)
 
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`. The picture has no layers.
@@ -86,7 +92,8 @@ class GpuRenderer:
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
         picture = Picture(rgba, (), color_range=self._color_range(view))
-        picture = yield from with_arrowheads_task(picture, view)
+        picture = yield from with_arrowheads_task(picture, view, self._arrowhead_cache)
+        self._arrowhead_cache.evict_over_limit()
         return (yield from with_singularities_task(picture, view))
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.blocks import concatenated_ranges
+from ..field.surface import Surface
 from .camera import Camera
 from .gbuffer import MeshInstance
 from .project import all_triangles
@@ -102,12 +103,11 @@ def progressive_samples(
     """
     clip, triangles, _ = all_triangles([instance], camera)
     shuffle = _random_bits(len(triangles))
-    # The upper half of the bits is for u, the lower one for the parts.
-    offset = (shuffle >> np.uint64(32)).astype(np.float64) / 2.0**32
+    offset = _random_offsets(shuffle)
     index, of_piece = [], []
     start = _with_points(clip, triangles, camera, spacing, offset)
     area = np.zeros(len(triangles))
-    area[start] = _rest_areas(instance, start)
+    area[start] = rest_areas(instance.surface, start) * matrix_scale(instance) ** 2
     start = start[area[start] > 0]
     todo = _Pieces(
         start,
@@ -219,15 +219,51 @@ def _screen_areas(
     )
 
 
-def _rest_areas(instance: MeshInstance, triangle: np.ndarray) -> np.ndarray:
-    """Return the (n,) areas of triangles of an instance, before they deform."""
-    surface = instance.surface
-    vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
-    corners = vertices[surface.triangle_vertex[triangle]]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+def matrix_scale(instance: MeshInstance) -> float:
+    """Return the factor by which the matrix of an instance scales lengths, as a mean of all directions."""
     a, b, c = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
-    scale = np.abs((np.cross(a, b) * c).sum())
-    return 0.5 * np.sqrt((normal * normal).sum(axis=1)) * scale ** (2 / 3)
+    return float(np.abs((np.cross(a, b) * c).sum()) ** (1 / 3))
+
+
+def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:
+    """Return the (n,) areas of triangles, by default of all, before they deform."""
+    vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    corners = surface.triangle_vertex if triangle is None else surface.triangle_vertex[triangle]
+    a, b, c = (np.ascontiguousarray(vertices[corner].T) for corner in corners.T)
+    (x, y, z), (u, v, w) = b - a, c - a
+    normal = y * w - z * v, z * u - x * w, x * v - y * u
+    return 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+
+
+def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sample all of a surface in its rest shape, evenly.
+
+    Parameters
+    ----------
+    surface : Surface
+    density : float
+        Points per square unit.
+
+    Returns
+    -------
+    triangle : (P,) int32 ndarray
+    barycentric : (P, 3) float64 ndarray
+    rank : (P,) float64 ndarray
+        As of `progressive_samples`, at most the density.
+    """
+    area = rest_areas(surface)
+    shuffle = _random_bits(len(area))
+    offset = _random_offsets(shuffle)
+    count = np.ceil(area * density - offset).astype(np.int64)
+    triangle = np.repeat(np.arange(len(area)), np.maximum(count, 0))
+    number = concatenated_ranges(np.zeros(len(area), dtype=np.intp), np.maximum(count, 0))
+    rank = (number + offset[triangle]) / area[triangle]
+    return triangle.astype(np.int32), _barycentric(number, shuffle[triangle]), rank
+
+
+def _random_offsets(shuffle: np.ndarray) -> np.ndarray:
+    """(n,) float64 from 0 to 1: u of triangles, the upper half of their random bits."""
+    return (shuffle >> np.uint64(32)).astype(np.float64) / 2.0**32
 
 
 def _random_bits(count: int) -> np.ndarray:

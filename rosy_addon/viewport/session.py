@@ -55,6 +55,9 @@ MAX_OBJECT_ERRORS = 4
 #: Opacity of the picture. In edit mode the mesh shows through.
 OPACITY, OPACITY_IN_EDIT_MODE = 1.0, 0.7
 
+#: Most triangles of a view among which hidden places of arrowheads are found exactly. Else they leave gaps.
+MAX_EXACT_TRIANGLES = 200_000
+
 #: Methods of the session that are called by timers.
 TIMER_METHODS = (
     "_drop_closed_views",
@@ -330,7 +333,9 @@ class ViewportSession:
         view = replace(view_input, look=look, lights=(), reference=None)
         key = _picture_key(instances, view)
         if pointers not in self._arrowheads or self._arrowheads[pointers][0] != key:
-            task = view_arrows_task(view, self._marks_cache, is_exact=False)
+            triangles = sum(len(instance.surface.triangles) for instance in view.instances)
+            is_exact = triangles <= MAX_EXACT_TRIANGLES
+            task = view_arrows_task(view, self._marks_cache, is_exact=is_exact)
             self._arrowheads[pointers] = key, run_to_completion(task)
             self._marks_cache.evict_over_limit()
         draw_arrowheads(context, self._arrowheads[pointers][1])

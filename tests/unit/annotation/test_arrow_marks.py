@@ -17,6 +17,8 @@ from rosy_addon.annotation.arrow_marks import (
 )
 from rosy_addon.annotation.draw_arrows import draw_arrows_task
 from rosy_addon.annotation.even_spacing import spaced_points
+from rosy_addon.annotation.surface_places import surface_places_task
+from rosy_addon.cache import Cache
 from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.directional_field import field_directions, field_from_directions
@@ -90,7 +92,7 @@ def test_arrowheads_point_along_the_directions_of_a_field(case, normal_up):
     ends = [on_screen(camera, marks.anchor + step * direction) for direction in directions]
     angles = np.angle([(end - marks.place) @ [1, 1j] for end in ends])
     error = np.abs(np.angle(np.exp(1j * (screen_angles(marks) - angles))))
-    assert len(marks) > 20 and np.degrees(error.min(axis=0)).max() < 0.5
+    assert len(marks) > 15 and np.degrees(error.min(axis=0)).max() < 0.5
     # All directions of a place are there.
     assert (np.unique(error.argmin(axis=0), return_counts=True)[1] > len(marks) / 8).all()
     assert len(marks) > 0.9 * len(directions) * len(places(marks))
@@ -176,7 +178,27 @@ def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
     ]
     np.testing.assert_array_equal(marks[0].position, marks[1].position)
     before, after = ({tuple(np.round(point, 6)) for point in mark.anchor} for mark in marks[1:])
-    assert len(before) > 60 and len(before & after) > 0.8 * len(before)
+    assert len(before) > 60 and len(before & after) > 0.95 * len(before)
+
+
+def test_places_do_not_depend_on_how_a_mesh_is_deformed():
+    surface = icosphere(4)
+    stretched = replace(
+        surface, vertices=surface.vertices * (1.0, 1.0, 1.1), rest_vertices=surface.vertices
+    )
+    cache = Cache()
+    places = [
+        run_to_completion(surface_places_task(shape, 0.1, cache)) for shape in (surface, stretched)
+    ]
+    assert places[0] is places[1] and places[0].distance[-1] == places[0].finest <= 0.1
+    corners = surface.vertices[surface.triangle_vertex[places[0].triangle]]
+    points = np.einsum("nk,nki->ni", places[0].barycentric, corners)
+    for number in range(1, len(points)):
+        nearest = np.linalg.norm(points[:number] - points[number], axis=1).min()
+        assert nearest >= places[0].distance[number]
+    # Even: no point of the surface is far from all places.
+    apart = np.linalg.norm(surface.vertices[:, None] - points, axis=2).min(axis=1)
+    assert apart.max() < 1.5 * places[0].finest
 
 
 def test_a_large_floor_around_the_camera_is_covered_evenly():
@@ -192,16 +214,17 @@ def test_a_large_floor_around_the_camera_is_covered_evenly():
     assert nearest.max() < 1.5 * 24.0
 
 
-def test_points_are_chosen_in_their_order():
+@pytest.mark.parametrize("size", [(160, 90), (60, 20, 40)])
+def test_points_are_chosen_in_their_order(size):
     """As by taking one after the other."""
     generator = np.random.default_rng(3)
-    position = generator.random((600, 2)) * (160, 90)
+    position = generator.random((600, len(size))) * size - 30
     expected = []
     for number, place in enumerate(position):
-        if all(np.hypot(*(place - position[other])) >= 11.0 for other in expected):
+        if all(np.linalg.norm(place - position[other]) >= 11.0 for other in expected):
             expected.append(number)
-    assert spaced_points(position, 11.0, (160, 90)).tolist() == expected
-    assert not len(spaced_points(np.empty((0, 2)), 11.0, (160, 90)))
+    assert spaced_points(position, 11.0).tolist() == expected
+    assert not len(spaced_points(position[:0], 11.0))
 
 
 def test_an_arrowhead_has_its_shape_and_its_outline():

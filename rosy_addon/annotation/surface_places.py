@@ -33,18 +33,31 @@ class SurfacePlaces:
     barycentric : (P, 3) float64 ndarray
     distance : (P,) float64 ndarray
         Least distance to those before, in Blender units of the rest shape.
-    finest : float
-        The least of these distances. There are no farther places in between.
+    level : int
+        The last level; -1 if there is none.
+    extent : float
+        The distance of level 0: the side of a square of the area of the surface.
     """
 
     triangle: np.ndarray
     barycentric: np.ndarray
     distance: np.ndarray
-    finest: float
+    level: int
+    extent: float
+
+    @property
+    def finest(self) -> float:
+        """The distance of the last level. No point of the surface is much farther from all places."""
+        return level_distance(self.extent, self.level)
+
+
+def level_distance(extent: float, level: int) -> float:
+    """Return the least distance between the places of a level, given that of level 0."""
+    return extent * 2 ** (-level / LEVELS_PER_OCTAVE)
 
 
 def surface_places_task(surface: Surface, distance: float, cache: Cache) -> Task[SurfacePlaces]:
-    """Find places on a surface, down to the level at which they are as near as a distance.
+    """Find places on a surface, down to the level at which they are as near as a distance, or further.
 
     Parameters
     ----------
@@ -52,7 +65,8 @@ def surface_places_task(surface: Surface, distance: float, cache: Cache) -> Task
     distance : float
         In Blender units of the rest shape.
     cache : Cache
-        Stores the places. They are the same for all deformations of a mesh.
+        Stores the places. They are the same for all deformations of a mesh, and those of a level for any
+        distance.
 
     Yields
     ------
@@ -64,33 +78,47 @@ def surface_places_task(surface: Surface, distance: float, cache: Cache) -> Task
         Not as near if that is beyond `MAX_LEVEL`.
     """
     key = "places", surface.rest_shape_key
-    first = cache.get_or_create((*key, 0), lambda: _first_level(surface))
-    level, places = 0, first
-    while places.finest > distance and level < MAX_LEVEL:
-        yield Progress(level / MAX_LEVEL, "finding places of arrowheads")
-        level += 1
-        coarser, finest = places, first.finest * 2 ** (-level / LEVELS_PER_OCTAVE)
-        places = cache.get((*key, level))
-        if places is None:
-            places = cache.put((*key, level), _next_level(surface, coarser, finest))
-    return places
-
-
-def _first_level(surface: Surface) -> SurfacePlaces:
-    """Return places whose distance is the side of a square of the area of the surface."""
-    finest = float(np.sqrt(rest_areas(surface).sum()))
-    none = SurfacePlaces(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0), finest)
-    return _next_level(surface, none, finest) if finest else none
-
-
-def _next_level(surface: Surface, places: SurfacePlaces, finest: float) -> SurfacePlaces:
-    """Return places, followed by others at least at a distance from all."""
-    triangle, barycentric, rank = surface_samples(surface, CANDIDATES_PER_PLACE / finest**2)
+    places = cache.get(key)
+    if places is None:
+        extent = float(np.sqrt(rest_areas(surface).sum()))
+        places = SurfacePlaces(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0), -1, extent)
+    last = _wanted_level(places.extent, distance)
+    if places.level >= last:
+        return places
+    yield Progress(0.0, "finding places of arrowheads")
+    density = CANDIDATES_PER_PLACE / level_distance(places.extent, last) ** 2
+    triangle, barycentric, rank = surface_samples(surface, density)
     order = np.argsort(rank, kind="stable")
-    triangle = np.concatenate([places.triangle, triangle[order]])
-    barycentric = np.concatenate([places.barycentric, barycentric[order]])
-    distance = np.concatenate([places.distance, np.full(len(order), finest)])
+    # The samples of a level are the first ones of these.
+    triangle, barycentric, rank = triangle[order], barycentric[order], rank[order]
+    for level in range(places.level + 1, last + 1):
+        yield Progress(level / (last + 1), "finding places of arrowheads")
+        density = CANDIDATES_PER_PLACE / level_distance(places.extent, level) ** 2
+        count = int(np.searchsorted(rank, density))
+        places = _with_level(surface, places, triangle[:count], barycentric[:count])
+    return cache.put(key, places)
+
+
+def _wanted_level(extent: float, distance: float) -> int:
+    """Return the first level with a distance, or the finest; -1 if the surface has no area."""
+    if not extent:
+        return -1
+    levels = level_distance(extent, np.arange(MAX_LEVEL + 1))
+    return min(int(np.count_nonzero(levels > distance)), MAX_LEVEL)
+
+
+def _with_level(
+    surface: Surface, places: SurfacePlaces, triangle: np.ndarray, barycentric: np.ndarray
+) -> SurfacePlaces:
+    """Return places with those of the next level, chosen among points of triangles."""
+    level = places.level + 1
+    finest = level_distance(places.extent, level)
+    distance = np.concatenate([places.distance, np.full(len(triangle), finest)])
+    triangle = np.concatenate([places.triangle, triangle])
+    barycentric = np.concatenate([places.barycentric, barycentric])
     vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
     corners = vertices[surface.triangle_vertex[triangle]]
     chosen = spaced_points(np.einsum("nk,nki->ni", barycentric, corners), finest)
-    return SurfacePlaces(triangle[chosen], barycentric[chosen], distance[chosen], finest)
+    return SurfacePlaces(
+        triangle[chosen], barycentric[chosen], distance[chosen], level, places.extent
+    )

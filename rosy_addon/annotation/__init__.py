@@ -1,1 +1,1 @@
-"""Annotation: what explains a picture, drawn over it: singularities and their indices."""
+"""Annotation: what explains a picture, drawn over it: singularities and their indices, arrowheads, keys."""

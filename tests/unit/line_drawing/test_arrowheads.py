@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import mainly
 from shapes import icosphere, plane, torus
 
 from rosy_addon.field.directional_field import field_directions
@@ -40,10 +41,18 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("shape", [torus(48, 24), icosphere(3)], ids=["torus", "ball"])
-def test_arrowheads_point_along_a_member(shape, case):
-    degree, settings = CASES[case]
+SHAPES = {"torus": torus(48, 24), "ball": icosphere(3)}
+
+
+@pytest.mark.parametrize(
+    ("name", "case"),
+    mainly(
+        [("ball", "one direction"), ("ball", "three directions"), ("torus", "with hidden strokes")],
+        [(name, case) for name in SHAPES for case in CASES],
+    ),
+)
+def test_arrowheads_point_along_a_member(name, case):
+    shape, (degree, settings) = SHAPES[name], CASES[case]
     field = generate(shape, "smoothest", degree)
     _, heads, face = drawn(shape, field, **settings)
     direction = normalize(heads[:, 1] - (heads[:, 0] + heads[:, 2]) / 2)

@@ -48,9 +48,18 @@ def decoded(image, surface, uv):
     return x[:, None] * tangent + y[:, None] * bitangent, texel[:, 2]
 
 
-@pytest.mark.parametrize("degree", mainly([2, 4], [1, 2, 3, 4]))
-@pytest.mark.parametrize("uv", [torus_uv(), patches_uv(2)], ids=["single", "patches"])
-def test_maps_decode_to_the_field(degree, uv):
+UV_MAPS = {"single": torus_uv(), "patches": patches_uv(2)}
+
+
+@pytest.mark.parametrize(
+    ("name", "degree"),
+    mainly(
+        [("single", 2), ("patches", 4)],
+        [(name, degree) for name in UV_MAPS for degree in (1, 2, 3, 4)],
+    ),
+)
+def test_maps_decode_to_the_field(name, degree):
+    uv = UV_MAPS[name]
     """Also in charts that are turned and mirrored; the direction is one of the field."""
     surface = torus()
     kind = GeneratorSettings("curvature" if degree in (2, 4) else "smoothest")

@@ -100,7 +100,7 @@ def check_still(look: Look, still: bool, name: str) -> None:
     if still and not has_flow(look):
         raise RosyError(
             f"{name}: nothing moves: a still camera needs a look whose flow is above 0, with the method "
-            "sheets and gray streaks"
+            "sheets or ibfv and gray streaks"
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..color import from_hex, to_linear
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..progress import Progress, Task
 from .arrow_marks import FILL_COLOR, NOTCH, OUTLINE_COLOR, WIDTH, ArrowMarks
 from .painting import draw_over
@@ -43,19 +43,14 @@ def draw_arrows_task(rgba: np.ndarray, marks: ArrowMarks) -> Task[np.ndarray]:
     head = np.repeat(np.arange(len(marks)), row_count)
     row = concatenated_ranges(low[:, 1], row_count)
     length = (high - low)[head, 0]
-    total = np.cumsum(length)
-    done = 0
-    while done < len(head):
-        yield Progress(done / len(head), "drawing arrowheads")
-        limit = (total[done - 1] if done else 0) + PIXELS_PER_STEP
-        part = slice(done, max(int(np.searchsorted(total, limit, side="right")), done + 1))
+    for part in blocks_by_count(length, PIXELS_PER_STEP):
+        yield Progress(part.start / len(head), "drawing arrowheads")
         column = concatenated_ranges(low[head[part], 0], length[part])
         of_head, of_row = (np.repeat(values[part], length[part]) for values in (head, row))
         x, y = column + 0.5 - marks.position[of_head, 0], of_row + 0.5 - marks.position[of_head, 1]
         nearest = head_distance(x, y, marks.direction[of_head], marks.size).astype(np.float32)
         near = np.flatnonzero(nearest < marks.outline + 0.5)
         np.minimum.at(distance, of_row[near] * width + column[near], nearest[near])
-        done = part.stop
     drawn = np.flatnonzero(distance < marks.outline + 0.5)
     pixels = rgba.reshape(-1, 4)
     part, distance = pixels[drawn], distance[drawn]

@@ -18,11 +18,11 @@ from ..compositor.look import Look
 from ..errors import RosyError, counted
 from ..field.carry import vectors_on_rest_shape
 from ..field.frames import normalize
-from ..field.interpolation import have_same_polygons, interpolate_fields
+from ..field.interpolation import interpolate_fields
 from ..field.representation import face_representation
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface as PolygonMesh
-from ..field.surface import face_area_vectors
+from ..field.surface import face_area_vectors, have_same_polygons
 from ..progress import run_to_completion
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.band_workers import BandWorkers

@@ -94,16 +94,20 @@ def flow_at(look: Look, frame: float, loop_frames: int = 0) -> Look:
     return replace(look, flow_distance=distance, flow_phase=phase)
 
 
+def _channel_positions(phase: float) -> np.ndarray:
+    """Return the (3,) float64 positions of the channels in their cycles, from 0 to 1."""
+    return (phase + np.arange(FLOW_CHANNELS) / FLOW_CHANNELS) % 1.0
+
+
 def channel_weights(phase: float) -> np.ndarray:
     """Return the (3,) float64 weights of the channels. The sum of their squares is 1."""
-    position = (phase + np.arange(FLOW_CHANNELS) / FLOW_CHANNELS) % 1.0
+    position = _channel_positions(phase)
     return math.sqrt(8 / 9) * np.sin(np.pi * position) ** 2
 
 
 def channel_shifts(look: Look) -> np.ndarray:
     """Return the (3,) float64 steps that the streaks of the channels have drifted, either way."""
-    position = (look.flow_phase + np.arange(FLOW_CHANNELS) / FLOW_CHANNELS) % 1.0
-    return (position - 0.5) * (cycle_distance(look) / look.step)
+    return (_channel_positions(look.flow_phase) - 0.5) * (cycle_distance(look) / look.step)
 
 
 def blend_channels(noise: np.ndarray, look: Look) -> np.ndarray:

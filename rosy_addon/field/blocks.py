@@ -19,6 +19,19 @@ def row_blocks(count: int, size: int | None = None) -> Iterator[slice]:
         yield slice(start, min(start + size, count))
 
 
+def blocks_by_count(count: np.ndarray, limit: int) -> Iterator[slice]:
+    """Split entries into consecutive slices whose counts sum up to at most a limit.
+
+    A single entry with a larger count is a slice of its own.
+    """
+    total = np.cumsum(count, dtype=np.int64)
+    start = done = 0
+    while start < len(count):
+        stop = max(int(np.searchsorted(total, done + limit, side="right")), start + 1)
+        yield slice(start, stop)
+        start, done = stop, int(total[stop - 1])
+
+
 def by_rows_task(
     function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
     *arrays: np.ndarray,

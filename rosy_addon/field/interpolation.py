@@ -12,15 +12,6 @@ from .rosy_field import RosyField
 from .surface import Surface
 
 
-def have_same_polygons(first: Surface, second: Surface) -> bool:
-    """Return whether the faces of two meshes have the same vertices, wherever these are."""
-    return (
-        len(first.vertices) == len(second.vertices)
-        and np.array_equal(first.corner_vertex, second.corner_vertex)
-        and np.array_equal(first.face_start, second.face_start)
-    )
-
-
 def interpolate_fields(
     first: tuple[Surface, RosyField],
     second: tuple[Surface, RosyField],

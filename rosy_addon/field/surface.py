@@ -609,3 +609,12 @@ def sum_per_fan(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
     fan_count = int(corner_fan.max()) + 1
     columns = [np.bincount(corner_fan, weights=column, minlength=fan_count) for column in values.T]
     return np.stack(columns, axis=1)
+
+
+def have_same_polygons(first: Surface, second: Surface) -> bool:
+    """Return whether the faces of two meshes have the same vertices, wherever these are."""
+    return (
+        len(first.vertices) == len(second.vertices)
+        and np.array_equal(first.corner_vertex, second.corner_vertex)
+        and np.array_equal(first.face_start, second.face_start)
+    )

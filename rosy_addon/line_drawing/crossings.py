@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..field.frames import normalize
 from ..progress import Progress, Task, run_to_completion, subtask
 from .stroke_set import POINT_COLUMNS, Strokes
@@ -177,15 +178,9 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
 def _ranges(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield each index i with all indices from low[i] to high[i] - 1, in batches."""
     count = np.maximum(high - low, 0)
-    total = np.cumsum(count)
-    start = 0
-    while start < len(count):
-        done = total[start - 1] if start else 0
-        stop = max(int(np.searchsorted(total, done + PAIR_BATCH_SIZE, side="right")), start + 1)
-        index = np.repeat(np.arange(start, stop), count[start:stop])
-        begin = np.cumsum(count[start:stop]) - count[start:stop]
-        yield index, np.arange(len(index)) + np.repeat(low[start:stop] - begin, count[start:stop])
-        start = stop
+    for part in blocks_by_count(count, PAIR_BATCH_SIZE):
+        index = np.repeat(np.arange(part.start, part.stop), count[part])
+        yield index, concatenated_ranges(low[part], count[part])
 
 
 def _intersect_segments(

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..field.blocks import blocks_by_count, concatenated_ranges
 from .camera import Camera
 from .gbuffer import GBuffer
 from .pixel_neighbors import depth_slopes
@@ -101,20 +102,14 @@ def _crossings(
     low, high = (lines[np.arange(len(lines)), order[:, end]] for end in (0, 1))
     first = np.clip(np.ceil(low[:, across] - 0.5), 0, size[across]).astype(np.int64)
     stop = np.clip(np.ceil(high[:, across] - 0.5), 0, size[across]).astype(np.int64)
-    total = np.cumsum(np.maximum(stop - first, 0))
+    count = np.maximum(stop - first, 0)
     slope = (high - low) / np.maximum(high[:, across] - low[:, across], 1e-300)[:, None]
-    line_start = 0
-    while line_start < len(lines):
-        before = total[line_start - 1] if line_start else 0
-        line_stop = int(np.searchsorted(total, before + BLOCK_CROSSINGS, side="right"))
-        line_stop = max(line_stop, line_start + 1)
-        count = np.maximum(stop - first, 0)[line_start:line_stop]
-        line = np.repeat(np.arange(line_start, line_stop), count)
-        index = first[line] + np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
+    for part in blocks_by_count(count, BLOCK_CROSSINGS):
+        line = np.repeat(np.arange(part.start, part.stop), count[part])
+        index = concatenated_ranges(first[part], count[part])
         point = low[line] + slope[line] * (index + 0.5 - low[line, across])[:, None]
         inside = (point[:, along] > -0.5) & (point[:, along] < size[along] + 0.5)
         yield index[inside], point[inside, along], point[inside, 2]
-        line_start = line_stop
 
 
 def _mark_visible(

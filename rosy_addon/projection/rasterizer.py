@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..progress import Progress, Task, run_to_completion, subtask
 
 #: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
@@ -440,7 +440,7 @@ def _rasterize_rows_task(
         corners = tuple(corner[block] for corner in clipped.corners)
         for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
             spans.start[:] -= row_start * width
-            for span_block in _block_slices(spans.count):
+            for span_block in blocks_by_count(spans.count, BLOCK_SIZE):
                 yield Progress(start / len(clipped.triangle), STEP_LABEL)
                 _depth_test(
                     _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
@@ -473,7 +473,7 @@ def _scan_convert(
         _edge_line(middle_corner, top_corner),
     )
     short_edges = tuple(np.concatenate(pair) for pair in zip(lower_edge, upper_edge, strict=True))
-    for block in _block_slices(top - bottom):
+    for block in blocks_by_count(top - bottom, BLOCK_SIZE):
         first, rows = bottom[block], (top - bottom)[block]
         local_triangle = np.repeat(np.arange(block.start, block.stop), rows)
         row = concatenated_ranges(first, rows)
@@ -603,19 +603,6 @@ def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.nda
     # In reverse order, so that of equal depths the first triangle is written last and is kept.
     winners = np.flatnonzero(depth == depth_buffer.take(pixel))[::-1]
     triangle_buffer[pixel.take(winners)] = spans.triangle.take(span.take(winners))
-
-
-def _block_slices(count: np.ndarray) -> Iterator[slice]:
-    """Yield consecutive slices of entries whose counts sum up to at most `BLOCK_SIZE`.
-
-    A single entry with a larger count is a slice of its own.
-    """
-    total = np.cumsum(count, dtype=np.int64)
-    start = done = 0
-    while start < len(count):
-        stop = max(int(np.searchsorted(total, done + BLOCK_SIZE, side="right")), start + 1)
-        yield slice(start, stop)
-        start, done = stop, int(total[stop - 1])
 
 
 def _sorted_by_y(

@@ -8,11 +8,11 @@ and Trey Greer, "Triangle Scan Conversion Using 2D Homogeneous Coordinates", 199
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..field.blocks import concatenated_ranges
+from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..progress import Progress, Task
 from .camera import Camera
 from .clip_planes import is_cut_away
@@ -89,18 +89,17 @@ def project_vertices_task(
         Of the vertices of all instances, in their order.
     """
     yield Progress(0.0, STEP_LABEL)
-    clip, triangles, _ = all_triangles(instances, camera)
-    world = np.concatenate([instance.world_points() for instance in instances])
+    scene = _Scene.of(instances, camera, clip_planes)
     first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances[:-1])])
     vertex = np.concatenate(
         [start + np.asarray(part, np.intp) for start, part in zip(first, vertices, strict=True)]
     )
 
     def touches(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
-        return (triangles[triangle] == vertex[point][:, None]).any(axis=1)
+        return (scene.triangles[triangle] == vertex[point][:, None]).any(axis=1)
 
-    scene = _Scene(clip, world, triangles, camera, clip_planes)
-    return (yield from _project_task(scene, clip[vertex], world[vertex], touches, STEP_LABEL))
+    task = _project_task(scene, scene.clip[vertex], scene.world[vertex], touches, STEP_LABEL)
+    return (yield from task)
 
 
 def project_points_task(
@@ -136,19 +135,18 @@ def project_points_task(
     ProjectedPoints
     """
     yield Progress(0.0, POINTS_LABEL)
-    clip, triangles, _ = all_triangles(instances, camera)
-    world = np.concatenate([instance.world_points() for instance in instances])
-    corners = triangles[triangle]
+    scene = _Scene.of(instances, camera, clip_planes)
+    corners = scene.triangles[triangle]
     point_clip, point_world = (
         sum(barycentric[:, k, None] * values[corners[:, k]] for k in range(3))
-        for values in (clip, world)
+        for values in (scene.clip, scene.world)
     )
 
     def touches(other: np.ndarray, point: np.ndarray) -> np.ndarray:
         return other == triangle[point]
 
-    occluders = triangles if finds_hidden else triangles[:0]
-    scene = _Scene(clip, world, occluders, camera, clip_planes)
+    if not finds_hidden:
+        scene = replace(scene, triangles=scene.triangles[:0])
     return (yield from _project_task(scene, point_clip, point_world, touches, POINTS_LABEL))
 
 
@@ -171,6 +169,15 @@ class _Scene:
     triangles: np.ndarray
     camera: Camera
     clip_planes: np.ndarray | None
+
+    @classmethod
+    def of(
+        cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
+    ) -> _Scene:
+        """Return the scene of some instances, all of which hide points."""
+        clip, triangles, _ = all_triangles(instances, camera)
+        world = np.concatenate([instance.world_points() for instance in instances])
+        return cls(clip, world, triangles, camera, clip_planes)
 
     def distance(self, world: np.ndarray) -> np.ndarray:
         """Return the (n,) distances of (n, 3) points along the axis of the camera."""
@@ -284,15 +291,9 @@ class _Occluders:
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        total = np.cumsum(count)
-        done = 0
-        while done < len(count):
-            limit = (total[done - 1] if done else 0) + PAIRS_PER_STEP
-            until = max(int(np.searchsorted(total, limit, side="right")), done + 1)
-            part = slice(done, until)
+        for part in blocks_by_count(count, PAIRS_PER_STEP):
             triangle = start + kept[np.repeat(box[part], count[part])]
             yield triangle, order[concatenated_ranges(first[part], count[part])]
-            done = until
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """(n,) bool: whether triangles hide points that are not on them.

@@ -20,7 +20,7 @@ import numpy as np
 from ..cache import Cache, content_hash
 from ..errors import REPORTED_ERRORS, RosyError, error_text
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface
+from ..field.surface import Surface, have_same_polygons
 from ..progress import Progress, Task
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
@@ -403,7 +403,7 @@ class SceneCache:
                 return _MeshState(surface, field_in_edit_mode, tone, values)
             original_surface = mesh_surface(original, label, cache=self.cache)
             keeps_field = all(modifier.type != "NODES" for modifier in user_modifiers(owner))
-            if keeps_field and _has_same_topology(surface, original_surface):
+            if keeps_field and have_same_polygons(surface, original_surface):
                 field = read_mesh_field(
                     original,
                     nonfinite=nonfinite,
@@ -488,15 +488,6 @@ class SceneCache:
         surface = yield from surface_task
         field = yield from build_field_task(surface)
         self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
-
-
-def _has_same_topology(surface: Surface, other: Surface) -> bool:
-    """Whether two surfaces have the same vertices and faces, apart from vertex positions."""
-    if len(surface.vertices) != len(other.vertices):
-        return False
-    return np.array_equal(surface.face_start, other.face_start) and np.array_equal(
-        surface.corner_vertex, other.corner_vertex
-    )
 
 
 def _topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:

@@ -78,7 +78,7 @@ CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
 #: Number of states in a strip of the picture, at least; larger pictures are divided. Bounds the
 #: memory.
-STRIP_STATES = 1 << 21
+STRIP_STATES = 1 << 20
 
 #: Rows of a strip, at least, in margins of streamlines: the margins are no large part of the work.
 MIN_STRIP_MARGINS = 6

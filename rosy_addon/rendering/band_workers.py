@@ -49,7 +49,7 @@ ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THR
 
 #: Number of pixels that a process draws at a time, at most, if a picture can be divided so far. Bounds
 #: the memory.
-MAX_PIXELS_AT_A_TIME = 1 << 22
+MAX_PIXELS_AT_A_TIME = 1 << 21
 
 #: Label of the progress while other processes still draw.
 WAITING_LABEL = "waiting for the other processes"

@@ -60,7 +60,7 @@ def _folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("count", [2, 3, 8])
 def test_the_number_of_processes_changes_nothing(count, expected):
     with BandWorkers(count) as workers:
-        assert len(workers.divide(VIEW)) == min(count, 4)
+        assert len(workers.divide(VIEW)) == count
         assert drawn(VIEW, workers).tobytes() == expected.tobytes()
 
 

@@ -81,7 +81,7 @@ CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 STRIP_STATES = 1 << 20
 
 #: Rows of a strip, at least, in margins of streamlines: the margins are no large part of the work.
-MIN_STRIP_MARGINS = 6
+MIN_STRIP_MARGINS = 4
 
 #: Rows at the border of two strips in which their averages are blended, so that no seam is visible.
 OVERLAP_ROWS = 12

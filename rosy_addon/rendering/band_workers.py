@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -26,7 +27,7 @@ import numpy as np
 
 from ..cache import Cache
 from ..compositor.band_division import context_rows, divide_rows
-from ..progress import Progress, Task, subtask
+from ..progress import Progress, Task
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import raise_nothing_in_view
 from .band_jobs import POLL_SECONDS, BandJob, FileExchange, draw_band_task, result_path
@@ -161,41 +162,69 @@ class BandWorkers:
         self._picture_count += 1
         jobs = [BandJob(self._picture_count, *entry, context) for entry in enumerate(rows)]
         rgba = np.zeros((camera.height, camera.width, 4), dtype=np.float32)
-        is_visible = False
-        for first in range(0, len(jobs), self.count):
-            start, stop = first / len(jobs), min(first + self.count, len(jobs)) / len(jobs)
-            task = self._draw_together_task(view, jobs[first : first + self.count], cache)
-            for job, band in (yield from subtask(task, start, stop)):
+        self._start(min(self.count, len(jobs)) - 1)
+        self._write_scene(view.instances)
+        # Bands are begun from the bottom, in the next process that is free. A band only waits for the one
+        # below, so the lowest that is not done never waits.
+        waiting = deque(jobs)
+        given: dict[subprocess.Popen[bytes], BandJob] = {}
+        own: dict[BandJob, Task[np.ndarray]] = {}
+        finished, is_visible = 0, False
+        while finished < len(jobs):
+            if waiting and not own:
+                job = waiting.popleft()
+                own[job] = draw_band_task(view, job, FileExchange(self._folder, job), cache)
+            for process in self._processes:
+                if waiting and process not in given and process.poll() is None:
+                    given[process] = waiting.popleft()
+                    self._send(process, view, given[process])
+            done, failed = self._collect(given)
+            for job in failed:
+                own[job] = draw_band_task(view, job, FileExchange(self._folder, job), cache)
+            progress = Progress(0.0, WAITING_LABEL)
+            if own:
+                job = min(own)
+                try:
+                    progress = next(own[job])
+                except StopIteration as end:
+                    done.append((job, end.value))
+                    del own[job]
+            else:
+                time.sleep(POLL_SECONDS)
+            for job, band in done:
+                finished += 1
                 if len(band):
                     rgba[slice(*job.rows)] = band
                     is_visible = True
+            yield Progress((finished + progress.fraction) / (len(jobs) + 1), progress.label)
         if not is_visible:
             raise_nothing_in_view(view.instances, camera)
         for path in self._folder.glob(f"{self._picture_count}-*"):
             path.unlink()
         return rgba
 
-    def _draw_together_task(
-        self, view: ViewInput, jobs: Sequence[BandJob], cache: Cache | None
-    ) -> Task[list[tuple[BandJob, np.ndarray]]]:
-        """Draw the first band here and each other one in a process of its own."""
-        self._start(len(jobs) - 1)
-        folder = self._folder
-        processes = self._send(view, jobs[1:])
-        task = draw_band_task(view, jobs[0], FileExchange(folder, jobs[0]), cache)
-        bands = [(jobs[0], (yield from subtask(task, 0.0, 0.95)))]
-        for job, process in zip(jobs[1:], processes, strict=True):
-            path = result_path(folder, job)
-            while process is not None and not path.exists() and process.poll() is None:
-                yield Progress(0.95, WAITING_LABEL)
-                time.sleep(POLL_SECONDS)
+    def _collect(
+        self, given: dict[subprocess.Popen[bytes], BandJob]
+    ) -> tuple[list[tuple[BandJob, np.ndarray]], list[BandJob]]:
+        """Take the bands out of `given` that processes have drawn, and those whose process has ended.
+
+        Returns
+        -------
+        done : list of (BandJob, ndarray)
+        failed : list of BandJob
+        """
+        done, failed = [], []
+        for process, job in list(given.items()):
+            has_ended = process.poll() is not None
+            path = result_path(self._folder, job)
             if path.exists():
-                bands.append((job, np.load(path)))
+                done.append((job, np.load(path)))
                 path.unlink()
-            else:
-                task = draw_band_task(view, job, FileExchange(folder, job), cache)
-                bands.append((job, (yield from subtask(task, 0.95, 1.0))))
-        return bands
+                del given[process]
+            elif has_ended:
+                failed.append(job)
+                del given[process]
+        return done, failed
 
     def _start(self, count: int) -> None:
         """Make the folder, and start processes until so many run."""
@@ -232,23 +261,21 @@ class BandWorkers:
         """The file of the mesh instances of the current picture."""
         return self._folder / f"scene-{self._scene_count}"
 
-    def _send(
-        self, view: ViewInput, jobs: Sequence[BandJob]
-    ) -> list[subprocess.Popen[bytes] | None]:
-        """Send a job to each process."""
-        if not _are_same(view.instances, self._instances):
+    def _write_scene(self, instances: tuple[MeshInstance, ...]) -> None:
+        """Write the mesh instances of a picture, unless they are those of the last one."""
+        if not _are_same(instances, self._instances):
             # No process needs the meshes of the pictures before.
             self._scene_path.unlink(missing_ok=True)
-            self._instances = view.instances
+            self._instances = instances
             self._scene_count += 1
-            self._scene_path.write_bytes(pickle.dumps(view.instances, pickle.HIGHEST_PROTOCOL))
+            self._scene_path.write_bytes(pickle.dumps(instances, pickle.HIGHEST_PROTOCOL))
+
+    def _send(self, process: subprocess.Popen[bytes], view: ViewInput, job: BandJob) -> None:
+        """Send a job to a process."""
+        name = f"{job.picture}-{job.index}-job"
         rest = replace(view, instances=())
-        for process, job in zip(self._processes, jobs, strict=False):
-            name = f"{job.picture}-{job.index}-job"
-            (self._folder / name).write_bytes(pickle.dumps((rest, job), pickle.HIGHEST_PROTOCOL))
-            # A process that has ended is noticed later.
-            with suppress(OSError):
-                process.stdin.write(f"{self._scene_path.name} {name}\n".encode())
-                process.stdin.flush()
-        missing = len(jobs) - len(self._processes)
-        return [*self._processes[: len(jobs)], *[None] * missing]
+        (self._folder / name).write_bytes(pickle.dumps((rest, job), pickle.HIGHEST_PROTOCOL))
+        # A process that has ended is noticed later.
+        with suppress(OSError):
+            process.stdin.write(f"{self._scene_path.name} {name}\n".encode())
+            process.stdin.flush()

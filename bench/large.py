@@ -23,6 +23,9 @@ DEGREE, TRIANGLES = 4, 12_000
 #: Sizes of the pictures that workers draw.
 SIZES = (1920, 1080), (3840, 2160)
 
+#: Sides of square pictures that are compared with 512 pixels, and the largest ratios of the times.
+SQUARES = {2048: 16.5, 4096: 66.0}
+
 #: Presets that workers draw.
 WORKER_PRESETS = ("default", "cross-hatch")
 
@@ -59,6 +62,16 @@ def measure(runs: int) -> Iterator[Case]:
                 lambda name=preset: draw(name, 1920, 1080, samples=2),
                 lambda: draw("default", 1920, 1080, samples=2),
                 target=1.4,
+                higher_is_better=False,
+                runs=runs,
+            )
+    for side, target in SQUARES.items():
+        with BandWorkers(1) as pool:
+            yield compare(
+                f"{side} x {side} / 512 x 512 pixels, one process",
+                lambda side=side, pool=pool: draw("default", side, side, pool),
+                lambda pool=pool: draw("default", 512, 512, pool),
+                target=target,
                 higher_is_better=False,
                 runs=runs,
             )

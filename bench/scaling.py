@@ -33,7 +33,7 @@ def measure(runs: int) -> Iterator[Case]:
             higher_is_better=False,
             runs=runs,
         )
-    for size in (256, 1024, 2048):
+    for size in (256, 1024):
         yield compare(
             f"{size} x {size} / 512 x 512 pixels, frame, 12K triangles",
             lambda s=size: cases.frame(12_000, DEGREE, size=s),

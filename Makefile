@@ -45,6 +45,12 @@ BPY42 = .venv-bpy42/$(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 export PYTHONDONTWRITEBYTECODE = 1
 
+# Tests run in a process per core. Threads of these, for linear algebra and for software OpenGL, only wait
+# for each other, which may take ten times as long.
+check test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 test-bpy52 test-long test-numeric \
+test-python test-extras test-notebooks: export OPENBLAS_NUM_THREADS = 1
+check test-unit test-long test-python: export LP_NUM_THREADS = 0
+
 .PHONY: demo check lint format test test-unit test-old-numpy test-bpy42 test-bpy45 test-bpy50 \
         test-bpy52 smoke smoke-bpy45 smoke-bpy50 test-all test-long test-numeric test-python test-wheel \
         test-extras test-notebooks fuzz fuzz-readers monkey zip dist check-tag gallery site \

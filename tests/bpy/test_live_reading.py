@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -50,6 +51,13 @@ def remesh(obj):
 
 
 def skin(obj):
+    # Around all of Suzanne, this modifier takes half a minute.
+    mesh = bmesh.new()
+    mesh.from_mesh(obj.data)
+    mesh.faces.ensure_lookup_table()
+    bmesh.ops.delete(mesh, geom=mesh.faces[40:], context="FACES")
+    mesh.to_mesh(obj.data)
+    mesh.free()
     obj.modifiers.new("Skin", "SKIN")
 
 

@@ -22,7 +22,7 @@ from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
 
-PLAIN = StrokeStyle(spacing=8, outline=True)
+PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
 
 #: Type of a Grease Pencil object, which is another one since Blender 4.3.
@@ -245,7 +245,7 @@ def test_strokes_are_replaced_and_removed(monkey, camera, scene, kind):
         noise = "GREASE_PENCIL_NOISE" if has_grease_pencil_drawings() else "GP_NOISE"
         pencil_modifiers(first).new("Noise", noise)
     first.location.x = 5.0
-    again = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=12, outline=True)).obj
+    again = draw_strokes(scene, kind=kind, style=StrokeStyle(spacing=16, outline=True)).obj
     assert again == first and again.name == "Mine"
     assert kind == "CURVES" or pencil_modifiers(again)[0].name == "Noise"
     assert np.allclose(again.matrix_basis, np.eye(4))
@@ -292,7 +292,7 @@ def test_a_deleted_object_is_created_again(monkey, camera, scene):
 def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
     side = add_camera("Side", (5.0, 0.0, 0.5))
     objects = [
-        draw_strokes(scene, kind=kind, camera=source, style=StrokeStyle(spacing=12)).obj
+        draw_strokes(scene, kind=kind, camera=source, style=StrokeStyle(spacing=30)).obj
         for kind in ("PENCIL", "CURVES")
         for source in (camera, side, camera)
     ]
@@ -319,26 +319,26 @@ def test_chosen_objects_are_drawn_and_others_occlude(monkey, camera, scene):
     instances = read_scene(bpy.context.evaluated_depsgraph_get()).instances
     assert len(instances) == 2
     result = draw_strokes(
-        scene, kind="FILE", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=12)
+        scene, kind="FILE", path="/tmp/unused.svg", objects=[wall], style=StrokeStyle(spacing=20)
     )
     assert np.allclose(result.drawing.strokes.points[:, 1], -2.0)
     monkey_count = len(
         draw_strokes(
-            scene, kind="CURVES", objects=[monkey], style=StrokeStyle(spacing=12)
+            scene, kind="CURVES", objects=[monkey], style=StrokeStyle(spacing=20)
         ).drawing.strokes
     )
     wall.hide_render = True
     assert (
-        len(draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12)).drawing.strokes)
+        len(draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20)).drawing.strokes)
         > monkey_count
     )
 
 
 def test_meshes_from_strokes_do_not_occlude(monkey, camera, scene):
     """Geometry Nodes may turn stroke objects into meshes; these are not read as occluders."""
-    first = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
+    first = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
     thicken(first.obj, 0.3)
-    again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=12))
+    again = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=20))
     np.testing.assert_array_equal(again.drawing.strokes.points, first.drawing.strokes.points)
 
 
@@ -447,7 +447,7 @@ def test_wrong_input_is_one_line_and_changes_nothing(
 def test_meshes_without_faces_are_ignored(camera, scene):
     add_mesh("Points", [(0, 0, 0)], [])
     add_field(add_plane("Square", cuts=4), "axis")
-    result = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=12))
+    result = draw_strokes(scene, kind="PENCIL", style=StrokeStyle(spacing=20))
     assert result.obj.data.layers[0].frames[0].frame_number == min(
         scene.frame_start, scene.frame_current
     )

@@ -24,6 +24,9 @@ TIMEOUT_SECONDS = 40.0
 #: Colors of a picture for the documentation: interfaces have few, and the file is a third of the size.
 PICTURE_COLORS = 128
 
+#: Seconds for which Blender waits for events in each turn of its loop, unless events are simulated.
+LOOP_PAUSE = 0.005
+
 #: Names of the only steps to run; all if there is none.
 ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 
@@ -42,7 +45,15 @@ def run_steps(*steps):
     bpy.context.preferences.view.show_statusbar_stats = False
     bpy.context.preferences.view.smooth_view = 0
     preferences().live_first_field = False
+    if "--enable-event-simulate" in sys.argv:
+        bpy.app.timers.register(_rest, persistent=True)
     bpy.app.timers.register(_resume(_run_all(steps)), first_interval=1.0, persistent=True)
+
+
+def _rest():
+    """Wait in each turn of Blender's loop, which otherwise takes a core while events are simulated."""
+    time.sleep(LOOP_PAUSE)
+    return 0.0
 
 
 def _resume(work):

@@ -111,7 +111,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
     backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
 
-    def blender(verb: str, *command: str, timeout: float = 480.0, **run_options) -> Any:
+    def blender(verb: str, *command: str, timeout: float = 600.0, **run_options) -> Any:
         full_command = [str(options.real_blender), verb, options.which, *command]
         return subprocess.run(
             full_command,
@@ -152,7 +152,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
             results_file = folder / f"{script}.json"
             environment["ROSY_RESULTS"] = str(results_file)
             is_large = width > SCREEN[0] or height > SCREEN[1]
-            time_limit = 900 if is_large or options.many else 420
+            time_limit = 900 if is_large or options.many else 600
             arguments = [
                 *backend, "--window-geometry", "0", "0", str(width), str(height), *further_options,
                 "--python-exit-code", "1", "-P", str(HERE / script),

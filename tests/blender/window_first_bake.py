@@ -1,8 +1,8 @@
 """The five steps of the README in a window, done with the mouse: on the default cube and on Suzanne.
 
-Run by run.py, as window_panel.py is, but with real events: xdotool moves the mouse. A picture of the 3D
-view is saved after each step. Those of the cube, and the last one of Suzanne, are in docs/images, and
-so is that of a live view.
+Run by run.py, as window_panel.py is, but with real events: xdotool moves the mouse. With its option --many,
+a picture of the 3D view is saved after each step. Those of the cube, and the last one of Suzanne, are in
+docs/images, and so is that of a live view.
 """
 
 from __future__ import annotations
@@ -87,7 +87,9 @@ def click_in_panel(distance):
 
 
 def save_picture(name):
-    """Save the 3D view as NAME.png."""
+    """Save the 3D view as NAME.png, for the documentation."""
+    if not MANY:
+        return
     yield 1.0
     _, area, region, _ = view()
     capture(f"window-{name}", region)
@@ -104,7 +106,7 @@ def wait_for_live_view():
     assert is_live()
     yield 1.0
     yield from wait_until(lambda: not session.messages(view()[1]))
-    yield 3.0
+    yield 3.0 if MANY else 0.5
 
 
 def open_tab(name):
@@ -120,7 +122,7 @@ def open_tab(name):
         yield from click(sidebar.x + sidebar.width - 12, top + distance)
     assert sidebar.active_panel_category == "RoSy"
     yield from move_into_view()
-    yield 1.5
+    yield 1.5  # panels that open are animated
     yield from save_picture(f"{name}-1-tab")
 
 
@@ -152,7 +154,7 @@ def follow_steps(name):
     assert not is_live() and view()[1].spaces.active.shading.type == "MATERIAL"
     yield from click_in_panel(STANDARD)
     assert bpy.context.scene.view_settings.view_transform == "Standard"
-    yield 8.0
+    yield 8.0 if MANY else 0.5  # for the shaders of the view
     yield from save_picture(f"{name}-5-shown")
 
     yield from click_in_panel(REMOVE)

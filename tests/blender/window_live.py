@@ -41,7 +41,7 @@ REST_SECONDS, REST_LOAD = (5.0, 0.04) if MANY else (0.8, 0.08)
 MAX_STEP_SECONDS = 0.9
 
 #: Views that are compared, all around, and frames of an animation.
-VIEWS, FRAMES = (24, 24) if MANY else (4, 4)
+VIEWS, FRAMES = (24, 24) if MANY else (3, 3)
 
 
 def session_module():
@@ -282,7 +282,7 @@ def paper_is_behind_everything():
     for device, perspective, backdrop in (
         ("AUTO", "PERSP", False),
         ("AUTO", "PERSP", True),
-        ("AUTO", "ORTHO", True),
+        *([("AUTO", "ORTHO", True)] if MANY else []),
         ("AUTO", "CAMERA", True),
         ("CPU", "PERSP", True),
     ):
@@ -576,14 +576,17 @@ def every_frame_is_drawn():
     handler = bpy.types.SpaceView3D.draw_handler_add(record, (), "WINDOW", "POST_PIXEL")
     with in_view():
         bpy.ops.screen.animation_play()
-    yield 4.0
+    start = time.monotonic()
+    yield from wait_until(lambda: len({frame for frame, _, _ in steps}) >= 3 and len(steps) > 20)
     with in_view():
         bpy.ops.screen.animation_cancel(restore_frame=False)
     bpy.types.SpaceView3D.draw_handler_remove(handler, "WINDOW")
     played = {frame for frame, _, _ in steps}
     assert len(played) >= 3, f"{len(played)} frames were drawn"
     assert all(shows for _, shows, _ in steps)
-    print(f"played: {len(steps)} redraws of {len(played)} frames in 4 s")
+    print(
+        f"played: {len(steps)} redraws of {len(played)} frames in {time.monotonic() - start:.1f} s"
+    )
     switch("OFF")
     yield 0.5
 
@@ -1132,7 +1135,8 @@ def streaks_drift_while_they_are_played():
 
 def nothing_leaks():
     """After toggles, undo steps and opened files, the textures and the memory are freed."""
-    toggles, loads, undos = (500, 200, 100) if MANY else (4, 5, 3)
+    # A few show textures that are not freed; a leak of memory shows only after many.
+    first_toggles, toggles, loads, undos = (4, 500, 200, 100) if MANY else (1, 2, 2, 2)
     yield from fresh_scene(levels=1)
     # On software OpenGL, textures are in the memory of the process, where a leak is visible.
     renderers = []
@@ -1149,7 +1153,7 @@ def nothing_leaks():
         switch("OFF")
         yield 0.02
 
-    for _ in range(4):
+    for _ in range(first_toggles):
         yield from toggle()
     start = count()
     for _ in range(toggles):
@@ -1178,7 +1182,7 @@ def nothing_leaks():
         bpy.ops.wm.open_mainfile(filepath=path)
         yield 0.1
         assert session_module()._session is None
-        if index == 3:
+        if index == min(3, loads - 1):
             opened_first = count()
     opened = count()
     print(

@@ -322,7 +322,7 @@ def texture_with_progress():
     """The view shows the texture with its light, also from a side that no camera sees."""
     yield from fresh_scene()
     make_field()
-    bpy.context.scene.rosy.texture_size = 1024
+    bpy.context.scene.rosy.texture_size = 512
     yield from start_task(bpy.ops.rosy.bake_texture)
     yield from wait_until(lambda: status().current is None, 60.0)
     check_idle()

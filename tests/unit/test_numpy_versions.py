@@ -11,8 +11,14 @@ import version_pictures
 from conftest import ROOT
 
 
+@pytest.fixture(scope="module")
+def pictures():
+    """The pictures that are compared, by name."""
+    return version_pictures.draw()
+
+
 @pytest.mark.slow
-def test_another_numpy_version_draws_the_same(tmp_path):
+def test_another_numpy_version_draws_the_same(tmp_path, pictures):
     other = os.environ.get("ROSY_OTHER_PYTHON")
     if not other:
         pytest.skip("ROSY_OTHER_PYTHON names no other interpreter")
@@ -22,13 +28,13 @@ def test_another_numpy_version_draws_the_same(tmp_path):
     version = subprocess.run([other, "-c", code], check=True, capture_output=True, text=True).stdout
     assert version != np.__version__
     other_pictures = np.load(file)
-    for name, picture in version_pictures.draw().items():
+    for name, picture in pictures.items():
         difference = np.abs(picture.astype(int) - other_pictures[name]).max(axis=2)
         assert difference.max() <= 1, name
         assert (difference > 0).mean() <= 1e-3, name
 
 
 @pytest.mark.slow
-def test_two_runs_draw_the_same():
-    first, second = version_pictures.draw(), version_pictures.draw()
-    assert all(np.array_equal(first[name], second[name]) for name in first)
+def test_two_runs_draw_the_same(pictures):
+    again = version_pictures.draw()
+    assert all(np.array_equal(again[name], picture) for name, picture in pictures.items())

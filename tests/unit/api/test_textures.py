@@ -102,11 +102,11 @@ def test_hatching_for_one_light():
     for cosine, length in ((0.2, 1.0), (0.5, 1e-260), (0.9, 1e200)):
         light = (0, length * np.sqrt(1 - cosine**2), length * cosine)
         ink = rf.texture(
-            square, field, size=512, margin=0, light_direction=light, **settings
+            square, field, size=256, margin=0, light_direction=light, **settings
         ).tiles[1001]
         assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
         clear = rf.texture(
-            square, field, size=512, margin=0, light_direction=light, clear_paper=True, **settings
+            square, field, size=256, margin=0, light_direction=light, clear_paper=True, **settings
         ).tiles[1001]
         assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
         assert clear.rgba[..., :3].max() < 0.01

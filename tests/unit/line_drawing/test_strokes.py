@@ -187,7 +187,7 @@ def test_in_the_plane_strokes_are_straight_and_evenly_spaced(angle, degree, cell
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [3, 4, *long(1, 2, 6)])
+@pytest.mark.parametrize("degree", [3, *long(1, 2, 4, 6)])
 def test_directions_are_those_of_the_field_everywhere(degree):
     surface = icosphere(3)
     instance = instance_of(surface, degree, kind="smoothest")
@@ -304,9 +304,9 @@ def test_straight_ahead_is_a_geodesic():
 @pytest.mark.slow
 @pytest.mark.parametrize("degree", [4, *long(2)])
 def test_spacing_on_a_torus(degree):
-    surface = torus()
+    surface = torus(64, 32)
     instance = instance_of(surface, degree, kind="axis" if degree == 2 else "smoothest")
-    spacing = 0.02 * surface.extent
+    spacing = 0.03 * surface.extent
     gaps = lateral_gaps(build_tangent_mesh(instance), trace_strokes(instance, spacing))
     assert gaps.evenness() >= 0.9
     assert gaps.nearest_distance.min() >= 0.5
@@ -495,7 +495,7 @@ def test_thin_sheets_do_not_interfere():
 
 @pytest.mark.slow
 def test_same_strokes_again():
-    a, b = (trace_strokes(instance_of(icosphere(3), 4, kind="smoothest"), 0.1) for _ in range(2))
+    a, b = (trace_strokes(instance_of(icosphere(3), 4, kind="smoothest"), 0.2) for _ in range(2))
     assert np.array_equal(a.points, b.points) and np.array_equal(a.family, b.family)
 
 
@@ -787,26 +787,27 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("plotter", [False, True])
-def test_closed_strokes_are_closed_paths(plotter):
+def test_closed_strokes_are_closed_paths():
     instance = MeshInstance(icosphere(4), IDENTITY, axis_field(icosphere(4), 4, (0, 0, 1)))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
     strokes = clip_to_visible(trace_strokes(instance, 0.15), [instance], camera)
     assert strokes.closed.any() and not strokes.closed.all()
 
-    def path_data(selected):
+    def path_data(selected, plotter):
         text = svg_text(selected, camera, Pen(plotter=plotter))
         return [path.get("d") for path in ElementTree.fromstring(text).iter() if path.get("d")]
 
-    for closed in (True, False):
-        selected = strokes.select(strokes.closed == closed)
-        assert all(data.endswith("Z") == closed for data in path_data(selected))
-        for data in path_data(selected):
+    for closed, plotter in product((True, False), (True, False)):
+        selected = path_data(strokes.select(strokes.closed == closed), plotter)
+        assert all(data.endswith("Z") == closed for data in selected)
+        for data in selected:
             points = np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", data), dtype=float)
             assert not (points[0] == points[-1]).all()
     # Strokes that are cut are open.
     cut = strokes.runs_where(strokes.points[:, 0] > 0)
-    assert not any(data.endswith("Z") for data in path_data(cut))
+    assert not any(
+        data.endswith("Z") for plotter in (True, False) for data in path_data(cut, plotter)
+    )
 
 
 def test_outlines_hold_as_much_ink_as_their_strokes():

@@ -153,6 +153,7 @@ def test_without_numbers_there_is_one_line():
         drawn([replace(numbered(BALL, BALL.corner_vertex), color_values=None)], FLAT)
 
 
+@pytest.mark.slow
 def test_processes_draw_the_same_bytes():
     """The range of a band is that of the picture."""
     instance = of_vertices(BALL, BALL.vertices[:, 1])

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import long
 from scipy import ndimage
 
 from rosy_addon.compositor.compose import compose_planar
@@ -152,7 +153,8 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
     assert forward_share(np.array([0.0, 1.0, -1.0])).tolist() == [0.5, 1.0, 0.0]
 
 
-@pytest.mark.parametrize("degree", [1, 4])
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [4, *long(1)])
 def test_contrast_is_that_of_still_streaks(degree):
     look = Look(length=20)
     still = np.std([inner(member(0.3, degree, replace(look, seed=seed))) for seed in range(3)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -146,7 +147,7 @@ def render(instance, camera, look, lights=()):
 # --- tone ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", mainly(HATCHED[1::3], HATCHED))
+@pytest.mark.parametrize("name", mainly(["cross-hatch"], HATCHED))
 def test_presets_reproduce_a_ramp(name):
     """A ball under one light, with tones from 0 to 1: the blurred picture has the target tone."""
     look = PRESETS[name]
@@ -216,7 +217,7 @@ def test_crowded_even_lines_are_drawn_last():
     assert abs(first[2] - first[0]) < 1e-6
 
 
-@pytest.mark.parametrize("name", mainly(HATCHED[::3], HATCHED))
+@pytest.mark.parametrize("name", mainly(["pen-and-ink"], HATCHED))
 def test_lines_run_along_the_field(name):
     """The mean orientation on a wall that faces the eye is that of the field within 2 degrees."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
@@ -293,8 +294,13 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     return alpha.reshape(side, side)[40:-40, 40:-40]
 
 
-@pytest.mark.parametrize("kind", UNEVEN_LINES)
-@pytest.mark.parametrize("crispness", [0.1, 0.9])
+@pytest.mark.parametrize(
+    ("crispness", "kind"),
+    mainly(
+        [(0.1, "broken"), (0.9, "wobble"), (0.1, "paper grain"), (0.9, "all three")],
+        product([0.1, 0.9], UNEVEN_LINES),
+    ),
+)
 def test_uneven_lines_have_the_same_coverage(kind, crispness):
     """The mean coverage is that of even lines, from dark to light tones."""
     look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
@@ -698,7 +704,7 @@ def test_lines_keep_their_width_through_a_zoom(grain):
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     widths = []
-    for zoom in 2.0 ** np.array([0, 0.3, 0.7, 1.5, 2.75, 4]):
+    for zoom in 2.0 ** np.array([0, 0.7, 1.5, 4]):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
@@ -715,7 +721,7 @@ def test_lines_in_blender_units_scale_with_the_zoom():
     look = replace(INK, light="scene", shading=0.4)
     world_look = replace(look, unit="world", unit_size=4 / SIZE)
     widths = []
-    for zoom in (1.0, 1.6, 4.0):
+    for zoom in (1.0, 4.0):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=4 / zoom
         )

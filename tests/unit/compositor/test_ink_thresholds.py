@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import mainly
 from shapes import torus
 
 from rosy_addon.color import to_linear
@@ -82,8 +83,17 @@ def random_lines(lines: int, count: int = 200_000, seed: int = 1):
     return rng.random((lines, count), dtype=np.float32), cyclic_places(first)
 
 
-@pytest.mark.parametrize("lines, layers", [(2, 1), (2, 2), (3, 3), (5, 2), (5, 3)])
-@pytest.mark.parametrize("layering", [0, 0.3, 0.8])
+@pytest.mark.parametrize(
+    "lines, layers, layering",
+    mainly(
+        [(2, 1, 0.3), (2, 2, 0.8), (3, 3, 0), (3, 3, 0.8), (5, 2, 0.3), (5, 3, 0.8)],
+        [
+            (*counts, layering)
+            for counts in ((2, 1), (2, 2), (3, 3), (5, 2), (5, 3))
+            for layering in (0, 0.3, 0.8)
+        ],
+    ),
+)
 def test_ordered_thresholds_transmit_what_the_tone_asks(lines, layers, layering):
     """Also where lines swap."""
     look = replace(INK, layers=layers, layering=layering)
@@ -126,10 +136,10 @@ def test_ink_of_lines_in_equal_places_is_that_of_both():
 
 def test_ordered_thresholds_are_continuous():
     """Neither where two lines swap, nor where one of them begins before the other, is there a jump."""
-    count = 200_001
+    count = 100_001
     share = np.linspace(0, 1, count, dtype=np.float32)
     undefined = np.zeros(count, dtype=bool)
-    for first, second, third in np.random.default_rng(5).random((20, 3), dtype=np.float32) * 0.9:
+    for first, second, third in np.random.default_rng(5).random((10, 3), dtype=np.float32) * 0.9:
         thresholds = np.broadcast_to(np.array([[first], [second], [third]]), (3, count))
         places = cyclic_places(np.stack([share, 1 - share, 0 * share]))
         ordered = ordered_thresholds(thresholds, places, undefined, INK)

@@ -64,6 +64,6 @@ def steps_by_label(look: Look, side: int) -> Counter[str]:
 )
 def test_a_step_is_at_most_two_blocks_of_pixels(look, more):
     """So the longest step does not grow with the picture."""
-    steps = steps_by_label(replace(look, supersampling=1), side=512)
-    least = 512**2 / (2 * BLOCK_PIXELS)
+    steps = steps_by_label(replace(look, supersampling=1), side=384)
+    least = 384**2 / (2 * BLOCK_PIXELS)
     assert not {label: steps[label] for label in ALWAYS | more if steps[label] < least}

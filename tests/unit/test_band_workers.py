@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, long
 from shapes import torus
 
 from rosy_addon.compositor.look import Look
@@ -57,7 +57,7 @@ def _folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [2, 3, 8])
+@pytest.mark.parametrize("count", [3, *long(2, 8)])
 def test_the_number_of_processes_changes_nothing(count, expected):
     with BandWorkers(count) as workers:
         assert len(workers.divide(VIEW)) == count

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import long
 from shapes import cylinder, globe, icosphere, torus
 
 from rosy_addon.errors import RosyError
@@ -34,7 +35,8 @@ def test_what_is_missing_costs_as_much_as_at_the_opposite_point():
     assert energy_of(ball, 1, vertex, index) < 1.03 * energy_of(ball, 1, [7, opposite], [1, 1])
 
 
-@pytest.mark.parametrize("degree", [2, 4, 6])
+@pytest.mark.slow
+@pytest.mark.parametrize("degree", [4, *long(2, 6)])
 def test_given_ones_stay_and_the_sum_is_right(degree):
     """Also where the smoothest field wants one of the others at the vertex of a given one."""
     random = np.random.default_rng(degree)
@@ -49,7 +51,7 @@ def test_given_ones_stay_and_the_sum_is_right(degree):
             assert index.sum() == degree * characteristic
 
 
-@pytest.mark.parametrize("degree, count", [(4, 8), (6, 12)])
+@pytest.mark.parametrize("degree, count", [(4, 8), *long((6, 12))])
 def test_one_given_costs_no_more_than_the_smoothest_field(degree, count):
     """The sphere can be turned so that one of its singularities is there."""
     ball = icosphere(4)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import mainly
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
 from rosy_addon.field.connection import connection_task, laplacian_task
@@ -70,8 +71,17 @@ def salient(surface: Surface) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("share", "bound"), [(0.0, 0.5), (0.0005, 2.0), (0.002, 4.0)])
-@pytest.mark.parametrize("form", ["torus", "ellipsoid"])
+@pytest.mark.parametrize(
+    ("form", "share", "bound"),
+    mainly(
+        [("torus", 0.002, 4.0), ("ellipsoid", 0.0, 0.5)],
+        [
+            (form, *case)
+            for form in ("torus", "ellipsoid")
+            for case in ((0.0, 0.5), (0.0005, 2.0), (0.002, 4.0))
+        ],
+    ),
+)
 def test_principal_directions_with_noise(form, share, bound):
     surface = torus(200, 100) if form == "torus" else ellipsoid()
     surface = with_noise(surface, share) if share else surface

@@ -43,7 +43,7 @@ def stroke_error(surface, field, stroke):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [1, 2, 4, 6])
+@pytest.mark.parametrize("degree", [1, 4, *long(2, 6)])
 def test_strokes_on_a_sphere_are_followed(degree):
     strokes = great_circles(5)
     field = generate(BALL, GeneratorSettings("guided", strokes=strokes), degree)

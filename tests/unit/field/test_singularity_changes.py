@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import long
 from shapes import cylinder, globe, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
@@ -40,7 +41,7 @@ def pole_field(degree, pairs):
     return prescribed_field(BALL, degree, vertex, index), poles
 
 
-@pytest.mark.parametrize("degree", [2, 4, 6])
+@pytest.mark.parametrize("degree", [4, *long(2, 6)])
 def test_near_pairs_are_cancelled_and_nothing_else(degree):
     pairs = [((1, 0, 0), (1, 0.2, 0)), ((0, 1, 0.3), (0, 1, -0.3)), ((0, -1, 0), (-1, 0, 0))]
     field, poles = pole_field(degree, pairs)
@@ -139,7 +140,7 @@ def test_pairs_are_the_nearest_along_edges():
     assert pairs(30) == {(1, 2), (4, 5)}
 
 
-@pytest.mark.parametrize("degree", [1, 2, 4])
+@pytest.mark.parametrize("degree", [1, 4, *long(2)])
 def test_guides_bend_a_field_with_the_same_singularities(degree):
     """Near the guides the field follows them, and no singularity comes or goes."""
     last = pole_field(degree, [])[1]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import mainly
+from conftest import long, mainly
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -231,7 +231,7 @@ ANYTHING = st.recursive(
 
 
 @pytest.mark.slow
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.fixed_dictionaries(
         {
@@ -450,7 +450,7 @@ def test_shipped_previews_show_their_looks(name):
     [
         Look(method="brute", length=8000),
         Look(method="members", length=8000, step=0.05, noise="colour"),
-        Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4),
+        *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
         Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
         Look(light="scene", hue="families", display="flat", magnitude="both"),
     ],

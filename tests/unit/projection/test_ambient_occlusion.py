@@ -67,7 +67,7 @@ def test_a_floor_beside_a_wall():
         assert actual[selected].std() < 0.01
 
 
-@pytest.mark.parametrize("degrees", [60, 150, *long(90, 135)])
+@pytest.mark.parametrize("degrees", [60, *long(90, 135, 150)])
 def test_the_edge_of_two_planes(degrees):
     """At the edge, 1/2 - cos(angle)/2 is open for both planes."""
     angle = np.radians(degrees)
@@ -88,9 +88,9 @@ def test_the_smooth_edge_of_two_planes():
 
 def test_a_plane_below_a_sphere():
     """A ball of radius r hides cos(a) (r / l)^2, at distance l and angle a (Nusselt)."""
-    ground, ball = plane(24, 24, 6.0), icosphere(4)
+    ground, ball = plane(20, 20, 6.0), icosphere(4)
     instances = [instance_at(ground), instance_at(ball, 0, 0, 1.6)]
-    actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 600, 400))
+    actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 300, 400))
     distance = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
     expected = 1 - 1.6 / distance**3
     assert expected.min() < 0.65

@@ -102,7 +102,7 @@ def test_distances_are_measured_after_the_stretch():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("degree", [1, 3, 4, *long(2, 5, 6)])
 def test_distances_on_a_sphere(degree):
     """There are singularities, and lines end because they converge."""
     surface = icosphere(3)
@@ -183,7 +183,7 @@ def test_directions_that_are_not_evenly_distributed():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", AWKWARD)
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, *long(5, 6)])
+@pytest.mark.parametrize("degree", [1, 4, *long(2, 3, 5, 6)])
 def test_awkward_meshes(name, degree):
     points, faces = AWKWARD[name]()
     starts = np.cumsum([0, *map(len, faces)])
@@ -287,7 +287,7 @@ def test_rest_matrices_measure_lengths():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("degree", [3, 4])
+@pytest.mark.parametrize("degree", [4, *long(3)])
 def test_steps_are_short(degree):
     """No step does more than a small part of the work."""
     surface = icosphere(5)

@@ -156,6 +156,7 @@ def test_processes_and_supersampling_draw_the_same_dots():
     np.testing.assert_array_equal(*dots)
 
 
+@pytest.mark.slow
 def test_drawings_have_the_same_dots_as_pictures():
     instance = view_of(torus(48, 24), 4).instances[0]
     sphere = MeshInstance(icosphere(3), np.eye(4), None)

@@ -44,6 +44,7 @@ CASES = {
 SHAPES = {"torus": torus(48, 24), "ball": icosphere(3)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "case"),
     mainly(

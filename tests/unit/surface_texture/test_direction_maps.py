@@ -51,6 +51,7 @@ def decoded(image, surface, uv):
 UV_MAPS = {"single": torus_uv(), "patches": patches_uv(2)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "degree"),
     mainly(

@@ -198,6 +198,7 @@ def test_overlapping_charts_are_counted():
     )
 
 
+@pytest.mark.slow
 def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch):
     """Where all charts lie on each other, a texel shows little of the surface."""
     counts = []
@@ -208,7 +209,7 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
         return lines
 
     monkeypatch.setattr(hatching, "cached_surface_lines_task", counted_task)
-    grid = plane(1, 100)
+    grid = plane(1, 200)
     surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))
     look = Look(grain=1.0).with_settings({"ink": "hatch", "lines": "even"})

@@ -104,6 +104,8 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
         ROSY_BLENDER_LANE=str(folder),
         ROSY_ZIP=str(zipped),
         PYTHONDONTWRITEBYTECODE="1",
+        # Beside other runs, threads of linear algebra only wait for each other.
+        OPENBLAS_NUM_THREADS="1",
     )
 
     environment["ROSY_STEPS"] = options.steps

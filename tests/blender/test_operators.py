@@ -391,8 +391,9 @@ def test_store(suzanne, form):
     assert "energy" not in names_of_readable_field(suzanne)
 
 
-def test_store_refuses_a_name_of_another_type(suzanne):
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
+def test_store_refuses_a_name_of_another_type(scene):
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.rosy.field_generate(kind="axis", degree=4)
     before = contents()
     message = error_of(bpy.ops.rosy.field_store, form="TANGENT", attribute="rosy")
     assert "'rosy'" in message and contents() == before

@@ -93,7 +93,7 @@ def test_renders_show_ink_where_the_file_has_it(
 
 
 def test_hidden_strokes_are_not_rendered(with_stroke_settings, scene, tmp_path):
-    scene.rosy.strokes.outline, scene.rosy.strokes.spacing = False, 2.0
+    scene.rosy.strokes.outline, scene.rosy.strokes.spacing = False, 3.0
     corners = [Vector((x, -2.0, z)) for x in (-0.5, 0.5) for z in (0.1, 1.1)]
     at = np.array([world_to_camera_view(scene, scene.camera, corner)[:2] for corner in corners])
     left, bottom = at.min(axis=0) * (160, 120)

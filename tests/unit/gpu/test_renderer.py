@@ -1348,7 +1348,7 @@ MIXED = {
 }
 
 
-@pytest.mark.parametrize("hue", ["one", "families"])
+@pytest.mark.parametrize("hue", ["families", *long("one")])
 @pytest.mark.parametrize("name", MIXED)
 def test_fields_of_different_degrees_are_independent(card, name, hue):
     instances = [
@@ -1388,7 +1388,7 @@ UNDEFINED_LOOKS = {
         ["soft", "hatched", "hatched, all effects", "drifting, hatched", "carried"], UNDEFINED_LOOKS
     ),
 )
-@pytest.mark.parametrize("degree", [3, 4])
+@pytest.mark.parametrize("degree", [3, *long(4)])
 def test_where_the_field_is_undefined(card, degree, name):
     look = replace(
         LOOK, **{key: value for key, value in UNDEFINED_LOOKS[name].items() if key != "degree"}

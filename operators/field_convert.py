@@ -211,7 +211,7 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
             tangents = yield from self.each_mesh_task(
-                context, lambda mesh: mesh_tangents_task(mesh, guiding_angle)
+                context, lambda mesh: mesh_tangents_task(mesh, guiding_angle, self.attribute)
             )
             assign_tangents(tangents, self.attribute)
             return len(tangents)

@@ -20,7 +20,9 @@ from .write_field import check_writable
 DEFAULT_TANGENT_NAME = "rosy_tangent"
 
 
-def mesh_tangents_task(mesh: bpy.types.Mesh, guiding_angle: float) -> Task[np.ndarray]:
+def mesh_tangents_task(
+    mesh: bpy.types.Mesh, guiding_angle: float, name: str = ""
+) -> Task[np.ndarray]:
     """Compute one direction of a mesh's field on each corner.
 
     Parameters
@@ -28,6 +30,8 @@ def mesh_tangents_task(mesh: bpy.types.Mesh, guiding_angle: float) -> Task[np.nd
     mesh : bpy.types.Mesh
     guiding_angle : float
         Angle from the horizontal direction, in radians, of the line that the direction is near to.
+    name : str
+        Name of the attribute that is to store them, as for `assign_tangents`.
 
     Yields
     ------
@@ -41,8 +45,9 @@ def mesh_tangents_task(mesh: bpy.types.Mesh, guiding_angle: float) -> Task[np.nd
     Raises
     ------
     RosyError
-        If there is no field.
+        If there is no field, or no attribute of this name can store tangents.
     """
+    _check_storable(mesh, name)
     surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.1)
     field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.1, 0.2)
     instance = MeshInstance(surface, np.eye(4), field)
@@ -68,11 +73,17 @@ def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "
         If a mesh is linked from a library or in edit mode, or has an attribute of the name with
         another type or domain. Nothing is changed in this case.
     """
-    name = name or DEFAULT_TANGENT_NAME
     for mesh in tangents:
-        check_writable(mesh)
-        check_attribute_type(mesh, name, VECTOR_TYPE, "CORNER")
+        _check_storable(mesh, name)
     for mesh, vectors in tangents.items():
-        attribute = get_or_create_attribute(mesh, name, VECTOR_TYPE, "CORNER")
+        attribute = get_or_create_attribute(
+            mesh, name or DEFAULT_TANGENT_NAME, VECTOR_TYPE, "CORNER"
+        )
         attribute.data.foreach_set("vector", vectors.ravel())
         mesh.update()
+
+
+def _check_storable(mesh: bpy.types.Mesh, name: str) -> None:
+    """Raise an error if tangents cannot be stored on a mesh."""
+    check_writable(mesh)
+    check_attribute_type(mesh, name or DEFAULT_TANGENT_NAME, VECTOR_TYPE, "CORNER")

@@ -336,10 +336,10 @@ def texture_with_progress():
 def workers_stopped_with_escape():
     """The processes that draw a large picture together end, and their files are removed."""
     module = rosy("rosy_addon.rendering.band_workers")
-    draw_together, started = module.BandWorkers._draw_together_task, []
+    draw_task, started = module.BandWorkers._draw_task, []
 
-    def noted(pool, view, jobs, cache):
-        task = draw_together(pool, view, jobs, cache)
+    def noted(pool, view, rows, cache):
+        task = draw_task(pool, view, rows, cache)
         next(task)
         started.append((pool._folder, list(pool._processes)))
         return (yield from task)
@@ -352,11 +352,11 @@ def workers_stopped_with_escape():
         preferences().workers = 2
         yield from start_bake()
 
-    module.BandWorkers._draw_together_task = noted
+    module.BandWorkers._draw_task = noted
     try:
         yield from check_interruption(press_escape, start)
     finally:
-        module.BandWorkers._draw_together_task = draw_together
+        module.BandWorkers._draw_task = draw_task
         preferences().workers = 0
     ((folder, processes),) = started
     assert processes and all(process.poll() is not None for process in processes)

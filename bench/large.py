@@ -77,11 +77,11 @@ def measure(runs: int) -> Iterator[Case]:
             )
     for width, height in SIZES:
         for preset in WORKER_PRESETS:
-            with BandWorkers(2) as pool:
+            with BandWorkers(1) as one, BandWorkers(2) as two:
                 yield compare(
                     f"one process / two, {preset}, {width} x {height} pixels",
-                    lambda name=preset, size=(width, height): draw(name, *size),
-                    lambda name=preset, size=(width, height), pool=pool: draw(name, *size, pool),
+                    lambda name=preset, size=(width, height), pool=one: draw(name, *size, pool),
+                    lambda name=preset, size=(width, height), pool=two: draw(name, *size, pool),
                     target=1.75,
                     runs=runs,
                 )

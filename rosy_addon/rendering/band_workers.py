@@ -171,15 +171,14 @@ class BandWorkers:
         own: dict[BandJob, Task[np.ndarray]] = {}
         finished, is_visible = 0, False
         while finished < len(jobs):
-            if waiting and not own:
-                job = waiting.popleft()
-                own[job] = draw_band_task(view, job, FileExchange(self._folder, job), cache)
+            done, begun = self._collect(given)
+            if waiting and not own and not begun:
+                begun.append(waiting.popleft())
             for process in self._processes:
                 if waiting and process not in given and process.poll() is None:
                     given[process] = waiting.popleft()
                     self._send(process, view, given[process])
-            done, failed = self._collect(given)
-            for job in failed:
+            for job in begun:
                 own[job] = draw_band_task(view, job, FileExchange(self._folder, job), cache)
             progress = Progress(0.0, WAITING_LABEL)
             if own:
@@ -220,10 +219,11 @@ class BandWorkers:
             if path.exists():
                 done.append((job, np.load(path)))
                 path.unlink()
-                del given[process]
             elif has_ended:
                 failed.append(job)
-                del given[process]
+            else:
+                continue
+            del given[process]
         return done, failed
 
     def _start(self, count: int) -> None:

@@ -97,13 +97,14 @@ COMMON = "color noise, by families", "cross-hatch", "wide paper grain", "flow"
         *long(*((name, 1) for name in LOOKS if name != "default")),
     ],
 )
-def test_bands_are_parts_of_the_picture(name, samples):
+@pytest.mark.parametrize("count", [3, *long(2)])
+def test_bands_are_parts_of_the_picture(name, samples, count):
     view = ViewInput(instances(), CAMERA, replace(LOOKS[name], supersampling=samples))
     gbuffer = project(view.instances, CAMERA, view.look.display, samples=view.samples_per_side)
     whole = compose(gbuffer, view.look).rgba
     context = context_rows(view.look, CAMERA, view.instances)
-    rows = divide_rows(view.look, CAMERA, view.instances, 3)
-    assert len(rows) == 3 and rows[0][0] == 0 and rows[-1][1] == HEIGHT
+    rows = divide_rows(view.look, CAMERA, view.instances, count)
+    assert len(rows) == count and rows[0][0] == 0 and rows[-1][1] == HEIGHT
     assert drawn(view, rows, context).tobytes() == whole.tobytes()
 
 

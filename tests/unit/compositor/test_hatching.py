@@ -704,7 +704,7 @@ def test_lines_keep_their_width_through_a_zoom(grain):
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     widths = []
-    for zoom in 2.0 ** np.array([0, 0.7, 1.5, 4]):
+    for zoom in 2.0 ** np.array([0, 0.3, 0.7, 1.5, 2.75, 4]):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
@@ -721,7 +721,7 @@ def test_lines_in_blender_units_scale_with_the_zoom():
     look = replace(INK, light="scene", shading=0.4)
     world_look = replace(look, unit="world", unit_size=4 / SIZE)
     widths = []
-    for zoom in (1.0, 4.0):
+    for zoom in (1.0, 1.6, 4.0):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=4 / zoom
         )

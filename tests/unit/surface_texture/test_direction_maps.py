@@ -60,8 +60,8 @@ UV_MAPS = {"single": torus_uv(), "patches": patches_uv(2)}
     ),
 )
 def test_maps_decode_to_the_field(name, degree):
-    uv = UV_MAPS[name]
     """Also in charts that are turned and mirrored; the direction is one of the field."""
+    uv = UV_MAPS[name]
     surface = torus()
     kind = GeneratorSettings("curvature" if degree in (2, 4) else "smoothest")
     field = generate(surface, kind, degree)

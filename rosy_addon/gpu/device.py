@@ -185,10 +185,13 @@ class BlenderDevice:
             state.depth_test_set("LESS")
             state.depth_mask_set(True)
             state.blend_set("NONE")
-            state.face_culling_set("NONE")
             try:
-                self._draw_batches(shader, batches, {}, uniforms)
+                # Front faces first: cards skip what is hidden behind them.
+                for culled in ("BACK", "FRONT"):
+                    state.face_culling_set(culled)
+                    self._draw_batches(shader, batches, {}, uniforms)
             finally:
+                state.face_culling_set("NONE")
                 state.depth_test_set(saved_state[0])
                 state.depth_mask_set(saved_state[1])
                 state.blend_set(saved_state[2])

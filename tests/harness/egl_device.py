@@ -95,10 +95,12 @@ class EglDevice:
         framebuffer = self.context.framebuffer([color], depth)
         framebuffer.use()
         framebuffer.clear(depth=1.0)
-        self.context.enable_only(moderngl.DEPTH_TEST)
-        for batch, item_uniforms in batches:
-            program = self._bind(shader, {}, {**uniforms, **item_uniforms})
-            self.context.vertex_array(program, [(batch, "4f", "vertex_data")]).render()
+        self.context.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
+        for culled in ("back", "front"):
+            self.context.cull_face = culled
+            for batch, item_uniforms in batches:
+                program = self._bind(shader, {}, {**uniforms, **item_uniforms})
+                self.context.vertex_array(program, [(batch, "4f", "vertex_data")]).render()
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
         """As `Device.read`."""

@@ -2,7 +2,8 @@
 
 A frame is the work after the camera has moved: from triangles and fields on the card to the picture
 on the card. Nothing is uploaded or read back, and a frame ends when the card is done. The card's own
-time, by its timer, does not contain that of Python, which sends the commands. Needs numpy, moderngl
+time is that between its first and its last command, by its timer. It contains that of Python, which sends
+the commands, only where the card waits for them. Needs numpy, moderngl
 and a driver with EGL, but neither Blender nor a display.
 """
 
@@ -23,6 +24,7 @@ from rosy_addon.compositor.flow import flow_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
+from rosy_addon.presets.store import load_preset, preset_keys
 from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -92,6 +94,40 @@ def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, 
     return run_to_completion(renderer.render_texture_task(items, ViewInput((), camera, look)))
 
 
+class QueriedDevice:
+    """A device that records the card's own time for each pass."""
+
+    def __init__(self, device: Any) -> None:
+        self._device = device
+        self._queries: list[tuple[str, Any]] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._device, name)
+
+    def compute(self, shader: Any, *rest: Any) -> None:
+        """As `Device.compute`."""
+        self._queried(self._device.compute, shader, *rest)
+
+    def draw(self, shader: Any, *rest: Any) -> None:
+        """As `Device.draw`."""
+        self._queried(self._device.draw, shader, *rest)
+
+    def take_seconds(self) -> dict[str, float]:
+        """Wait for the card. Return the time of the passes since the last call, by their names."""
+        self._device.finish()
+        seconds: dict[str, float] = {}
+        for name, query in self._queries:
+            seconds[name] = seconds.get(name, 0.0) + query.elapsed * 1e-9
+        self._queries.clear()
+        return seconds
+
+    def _queried(self, work: Any, shader: Any, *rest: Any) -> None:
+        query = self._device.context.query(time=True)
+        with query:
+            work(shader, *rest)
+        self._queries.append((shader.name, query))
+
+
 class Frames:
     """Repeated frames of one object at one size."""
 
@@ -101,7 +137,7 @@ class Frames:
         self.device = device
         self.size = size
         self.look = look
-        self.renderer = GpuRenderer(device)
+        self.renderer = GpuRenderer(self.device)
         self.items: list[DrawItem] = self.renderer.upload(
             [cases.instance(TRIANGLES, degree)], "smooth"
         )
@@ -120,9 +156,9 @@ class Frames:
         return time.perf_counter() - start, timer.elapsed * 1e-9
 
     def warm_up(self) -> None:
-        """Draw frames until the clocks have risen."""
-        start = time.perf_counter()
+        """Draw frames until all is prepared and the clocks have risen."""
         self.draw()
+        start = time.perf_counter()
         while time.perf_counter() - start < WARM_UP:
             self.draw()
 
@@ -134,33 +170,6 @@ class Frames:
         while len(seconds) < frames and (not seconds or time.perf_counter() - start < SECONDS):
             seconds.append(self.draw())
         return np.array(seconds) * 1e3
-
-
-class TimedDevice:
-    """A device that waits after each pass and records its time."""
-
-    def __init__(self, device: Any) -> None:
-        self._device = device
-        self.seconds: dict[str, float] = {}
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._device, name)
-
-    def compute(self, shader: Any, *rest: Any) -> None:
-        """As `Device.compute`."""
-        self._timed(self._device.compute, shader, *rest)
-
-    def draw(self, shader: Any, *rest: Any) -> None:
-        """As `Device.draw`."""
-        self._timed(self._device.draw, shader, *rest)
-
-    def _timed(self, work: Any, shader: Any, *rest: Any) -> None:
-        self._device.finish()
-        start = time.perf_counter()
-        work(shader, *rest)
-        self._device.finish()
-        elapsed = time.perf_counter() - start
-        self.seconds[shader.name] = self.seconds.get(shader.name, 0.0) + elapsed
 
 
 def measure_rows(
@@ -197,22 +206,37 @@ def measure_comparison(
             yield row
 
 
+def measure_presets(
+    device: Any, sizes: Sequence[tuple[int, int]], frames: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the times of each preset with one sample in a pixel and with 2 x 2."""
+    for size in sizes:
+        for preset in preset_keys():
+            row: dict[str, Any] = {"width": size[0], "height": size[1], "preset": preset}
+            for samples in (1, 2):
+                look = replace(load_preset(preset).look, supersampling=samples)
+                times, card_times = Frames(device, size, STAGES_DEGREE, look).times(frames).T
+                row[f"{samples}"] = float(np.median(times))
+                row[f"{samples} card"] = float(card_times.min())
+            yield row
+
+
 def measure_stages(device: Any, frame_count: int) -> dict[str, float]:
-    """Return the median time of each stage in milliseconds, with a wait after each pass."""
-    timed_device = TimedDevice(device)
-    frames_of_case = Frames(timed_device, STAGES_SIZE, STAGES_DEGREE)
-    frames_of_case.warm_up()
+    """Return the median of the card's own time for each stage in milliseconds."""
+    queried = QueriedDevice(device)
+    renderer = GpuRenderer(queried)
+    items = renderer.upload([cases.instance(TRIANGLES, STAGES_DEGREE)], "smooth")
+    camera = cases.camera(*STAGES_SIZE)
     stage_seconds = []
     start = time.perf_counter()
-    while len(stage_seconds) < frame_count and (
-        not stage_seconds or time.perf_counter() - start < SECONDS
+    while len(stage_seconds) <= frame_count and (
+        len(stage_seconds) < 2 or time.perf_counter() - start < SECONDS
     ):
-        timed_device.seconds.clear()
-        frames_of_case.draw()
-        stage_seconds.append(
-            [sum(timed_device.seconds[name] for name in names) for names in STAGES.values()]
-        )
-    return dict(zip(STAGES, (np.median(stage_seconds, axis=0) * 1e3).tolist(), strict=True))
+        draw_texture(renderer, items, camera, cases.LOOK)
+        passes = queried.take_seconds()
+        stage_seconds.append([sum(passes[name] for name in names) for names in STAGES.values()])
+    medians = np.median(stage_seconds[1:], axis=0) * 1e3
+    return dict(zip(STAGES, medians.tolist(), strict=True))
 
 
 def format_row(row: dict[str, Any]) -> str:
@@ -244,6 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             dest="comparison",
             help=f"time only {' and '.join(looks)} streaks",
         )
+    parser.add_argument("--presets", action="store_true", help="time only the presets")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the numbers to a file")
     options = parser.parse_args(arguments)
     device = open_device()
@@ -251,7 +276,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     report: dict[str, Any] = {"renderer": device.name, "triangles": TRIANGLES, "rows": []}
     print(device.name)
-    if options.comparison:
+    if options.presets:
+        _print_presets(device, options, report)
+    elif options.comparison:
         _print_comparison(device, options, report)
     else:
         _print_all(device, options, report)
@@ -275,6 +302,16 @@ def _print_comparison(device: Any, options: argparse.Namespace, report: dict[str
         print(f"{size:>11}  {row['degree']:>2}  {times}  ratio {ratio:.2f}", flush=True)
 
 
+def _print_presets(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:
+    """Time the presets, and print and store the rows."""
+    print("milliseconds a frame and the card's own least: one sample in a pixel, and 2 x 2")
+    for row in measure_presets(device, options.sizes, options.frames):
+        report["rows"].append(row)
+        size = f"{row['width']} x {row['height']}"
+        times = "  ".join(f"{row[key]:9.2f} {row[f'{key} card']:9.2f}" for key in ("1", "2"))
+        print(f"{size:>11}  {row['preset']:16}  {times}", flush=True)
+
+
 def _print_all(device: Any, options: argparse.Namespace, report: dict[str, Any]) -> None:
     """Time all degrees and the stages, and print and store the rows."""
     print(
@@ -290,7 +327,7 @@ def _print_all(device: Any, options: argparse.Namespace, report: dict[str, Any])
     if not options.no_stages:
         report["stages"] = measure_stages(device, options.frames)
         width, height = STAGES_SIZE
-        print(f"of {width} x {height}, N = {STAGES_DEGREE}, waiting after each pass")
+        print(f"the card's own of {width} x {height}, N = {STAGES_DEGREE}")
         for name, milliseconds in report["stages"].items():
             print(f"  {name:34} {milliseconds:9.2f}", flush=True)
 

@@ -17,7 +17,7 @@ from ..compositor.drifting_averages import MIN_EFFECTIVE_SAMPLES
 from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOUNT
 from ..compositor.filter_kernel import Kernel
 from ..compositor.flow import ONE_WAY_COSINE
-from ..compositor.hatching import MIN_COVERAGE, RANK_BLEND
+from ..compositor.hatching import MIN_COVERAGE, PIXEL_SOFTNESS, RANK_BLEND
 from ..compositor.ibfv import MAX_PARTING, OWN_WEIGHT
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
@@ -45,6 +45,7 @@ from ..compositor.surface_noise import (
 from ..compositor.undirected import SAMPLE_COUNT as DISC_SAMPLE_COUNT
 from ..compositor.wobble import UNIT_VARIANCE_SCALE, WAVE_COUNT, WOBBLE_STD
 from ..projection.crease_pixels import LINE_TOLERANCE, MIN_RELATIVE_DEPTH
+from ..projection.pixel_coverage import MIN_NORMAL_COSINE
 from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLERANCE
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.shadow_maps import PCF_WIDTH
@@ -123,6 +124,8 @@ FLOAT_CONSTANTS = {
     "DEPTH_TOLERANCE": DEPTH_TOLERANCE,
     "SLOPE_TOLERANCE": SLOPE_TOLERANCE,
     "MIN_FACING_COSINE": MIN_FACING_COSINE,
+    "MIN_SAMPLE_COSINE": MIN_NORMAL_COSINE,
+    "PIXEL_SOFTNESS": PIXEL_SOFTNESS,
 }
 
 VECTOR_CONSTANTS = {

@@ -22,7 +22,7 @@ def even_lines_task(frame: Frame) -> Task[None]:
         return
     line_count = max((kind.line_count for kind in frame.kinds), default=1)
     image = resources.image("line_image", *frame.size, "RGBA16F", 2 * line_count)
-    look, camera = frame.pixel_look, frame.camera
+    look, camera = frame.look, frame.camera
     for instance_id, item, box in frame.fields_in_view():
         spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
         uniforms = even_line_uniforms(look, item, camera)

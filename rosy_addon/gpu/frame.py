@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..compositor.look import Look
-from ..compositor.look_units import supersampled_look
 from ..compositor.shading import Light
 from ..compositor.target_tone import ReferenceRender
 from ..projection.camera import Camera
@@ -36,12 +35,14 @@ class Frame:
         The device, and what stays on it.
     items : sequence of DrawItem
     camera : Camera
-        Of the supersampled frame.
+        Of the pixels of the frame: those of the picture, or its samples.
     look : Look
-        Its lengths are in pixels of the finished picture.
+        Its lengths are in these pixels. Its supersampling is their number in one of the picture, along a side.
     lights : sequence of Light
     reference : ReferenceRender or None
     clip_planes : (6, 4) ndarray
+    samples : Frame or None
+        The samples of the pixels, if these have several. The pixels are shaded once.
     textures : dict of str to texture
         Results of the passes so far, by their names in shaders.
     """
@@ -53,25 +54,42 @@ class Frame:
     lights: Sequence[Light]
     reference: ReferenceRender | None
     clip_planes: np.ndarray
+    samples: Frame | None = None
     textures: dict[str, Any] = field(default_factory=dict)
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the supersampled frame, in pixels."""
+        """Width and height of the frame, in pixels."""
         return self.camera.width, self.camera.height
 
     @property
-    def pixel_look(self) -> Look:
-        """The look with lengths in pixels of the supersampled frame."""
-        return supersampled_look(self.look)
+    def samples_per_side(self) -> int:
+        """Samples along each side of a pixel."""
+        return 1 if self.samples is None else self.samples.look.supersampling
 
     @cached_property
     def first_triangle_ids(self) -> list[int]:
         """The id of the first triangle of each item in the id buffer."""
-        counts = [item.mesh.buffers.triangle_count for item in self.items]
+        ids = dict(zip(self._items_by_id, self._id_ends, strict=False))
+        return [ids[index] for index in range(len(self.items))]
+
+    @cached_property
+    def occluder_id(self) -> int:
+        """The first id of triangles without a field, which only occlude. All others are before."""
+        return self._id_ends[sum(item.field is not None for item in self.items)]
+
+    @cached_property
+    def _items_by_id(self) -> list[int]:
+        """The items in the order of their ids: those with a field first."""
+        return sorted(range(len(self.items)), key=lambda index: self.items[index].field is None)
+
+    @cached_property
+    def _id_ends(self) -> list[int]:
+        """The first id of each item in that order, and the end of the last one."""
+        counts = [self.items[index].mesh.buffers.triangle_count for index in self._items_by_id]
         # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
         spans = [count + count // MAX_TRIANGLES for count in counts]
-        return list(accumulate(spans, initial=FIRST_TRIANGLE_ID))[:-1]
+        return list(accumulate(spans, initial=FIRST_TRIANGLE_ID))
 
     @property
     def kinds(self) -> list[FieldKind]:

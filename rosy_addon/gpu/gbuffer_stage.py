@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from ..compositor.hatching import has_outline
 from . import passes
 from .frame import Frame
 from .uniforms import NO_CLIP_PLANES, clip_uniforms, uniform_scale
@@ -13,25 +16,60 @@ def render_gbuffer(frame: Frame) -> None:
     """Render the G-buffer: the triangle that each pixel sees, and the surface and field there.
 
     The images are put into ``frame.textures``: ``visibility``, ``normals``, ``field_values``,
-    ``depth_slopes`` and ``field_channels``.
+    ``depth_slopes`` and ``field_channels``. If pixels have several samples, there is also
+    ``sample_entries``, the pixel whose surface each sample shows; see `projection.pixel_coverage`.
+    The samples have a G-buffer of their own only if outlines need it.
     """
-    image, camera, size = frame.resources.image, frame.camera, frame.size
+    samples = frame.samples
+    if samples is None:
+        _render_surfaces(frame, _visibility(frame))
+        return
+    samples.textures["visibility"] = _visibility(samples)
+    _render_surfaces(frame, _pixel_visibility(frame, samples))
+    if has_outline(samples.look):
+        _render_surfaces(samples, samples.textures["visibility"])
+    frame.textures["sample_entries"] = _sample_entries(frame, samples)
+
+
+def _visibility(frame: Frame) -> Any:
+    """Return the id of the triangle that is visible at the center of each pixel."""
     batches = [
         (
             item.mesh.batch,
             {
                 "first_triangle_id": first_triangle_id,
-                **clip_uniforms(item, camera, frame.clip_planes),
+                **clip_uniforms(item, frame.camera, frame.clip_planes),
             },
         )
         for first_triangle_id, item in zip(frame.first_triangle_ids, frame.items, strict=True)
     ]
     is_clipped = not np.array_equal(frame.clip_planes, NO_CLIP_PLANES)
     shader = passes.VISIBILITY_CLIPPED if is_clipped else passes.VISIBILITY
-    visibility = image("visibility", *size, "R32F")
-    frame.resources.device.draw(
-        shader, batches, (visibility, frame.resources.depth_image(*size)), {}
+    visibility = frame.resources.image("visibility", *frame.size, "R32F")
+    depth = frame.resources.depth_image(*frame.size)
+    frame.resources.device.draw(shader, batches, (visibility, depth), {})
+    return visibility
+
+
+def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
+    """Return the id of the triangle that each pixel sees, at its center or else at a sample."""
+    visibility = frame.resources.image("pixel_visibility", *frame.size, "R32F")
+    frame.run(
+        passes.PIXEL_VISIBILITY,
+        (0, 0, *frame.size),
+        {
+            "center_visibility": _visibility(frame),
+            "sample_visibility": samples.textures["visibility"],
+        },
+        {"visibility": visibility},
+        {"samples_per_side": frame.samples_per_side, "stop_id": frame.occluder_id},
     )
+    return visibility
+
+
+def _render_surfaces(frame: Frame, visibility: Any) -> None:
+    """Render the surface and field at each pixel, given the ids of visible triangles."""
+    image, camera, size = frame.resources.image, frame.camera, frame.size
     channel_count = max((item.mesh.buffers.channel_count for item in frame.items), default=0)
     channel_size = size if channel_count else (1, 1)
     gbuffer = {
@@ -50,3 +88,22 @@ def render_gbuffer(frame: Frame) -> None:
         }
         frame.run_on_instance(passes.RESOLVE, instance_id, box, gbuffer, uniforms)
     frame.textures.update(gbuffer)
+
+
+def _sample_entries(frame: Frame, samples: Frame) -> Any:
+    """Return the pixel whose surface each sample shows."""
+    entries = samples.resources.image("sample_entries", *samples.size, "R32F")
+    samples.clear(entries, "R32F")
+    textures = {**frame.textures, "sample_visibility": samples.textures["visibility"]}
+    for instance_id, item, box in samples.fields_in_view():
+        samples.run(
+            passes.SAMPLE_ENTRIES,
+            box,
+            {**textures, "triangle_records": item.mesh.records_texture},
+            {"sample_entries": entries},
+            {
+                **samples.instance_uniforms(instance_id),
+                "samples_per_side": frame.samples_per_side,
+            },
+        )
+    return entries

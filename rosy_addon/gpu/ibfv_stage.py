@@ -59,7 +59,7 @@ def states_fit(size: tuple[int, int], degree: int) -> bool:
     Parameters
     ----------
     size : (int, int)
-        Width and height of the supersampled frame, in pixels.
+        Width and height of the frame, in pixels.
     degree : int
         N, which is also the number of sheets that streaks come along.
     """
@@ -77,8 +77,7 @@ def check_states(look: Look, size: tuple[int, int], degree: int) -> None:
     """
     if is_carried(look) and not states_fit(size, degree):
         raise RosyError(
-            f"a frame of {size[0]} x {size[1]} pixels, including supersampling, with {degree} directions "
-            "takes too much memory of the graphics card with the method 'ibfv': choose a smaller size, "
+            f"a frame of {size[0]} x {size[1]} pixels with {degree} directions takes too much memory of the graphics card with the method 'ibfv': choose a smaller size, "
             "another method, or the processor"
         )
 
@@ -122,7 +121,7 @@ def carry_task(
     frame.run(passes.IBFV_LINKS, box, textures, {"links": links}, uniforms)
     textures = {**textures, "links": links}
     frame.run(passes.IBFV_START, box, textures, pairs[0], uniforms, layers=kind.degree)
-    look = look_for_symmetry(frame.pixel_look, kind.symmetry)
+    look = look_for_symmetry(frame.look, kind.symmetry)
     for doubling in range(doublings):
         yield Progress(doubling / doublings, STEP_LABEL)
         if contents.get(place) is not task_mark:

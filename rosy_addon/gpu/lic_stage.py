@@ -1,4 +1,4 @@
-"""Line integral convolution: the covering of a field, and streamlines on it."""
+"""Line integral convolution: the covering of a field, streamlines on it, and their ink."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
-from ..compositor.look import Look
+from ..compositor.look import Look, is_hatched
 from ..progress import Progress, Task, subtask
 from . import lookup_tables, passes
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
 from .field_kind import FieldKind
 from .frame import Frame
 from .ibfv_stage import carry_task, is_carried, states_fit
-from .passes import WORKGROUP_SIZE
+from .passes import WORKGROUP_SIZE, ComputePass
 from .resources import GpuResources
 from .screen_box import Box
 from .uniforms import (
@@ -24,6 +24,10 @@ from .uniforms import (
     direction_uniforms,
     look_uniforms,
 )
+
+#: Factor of the contrast of streaks whose noise is interpolated between pixels, which makes them a little
+#: stronger. Smooth streaks do not need it.
+INTERPOLATED_CONTRAST = 0.96
 
 #: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers abort runs that
 #: take too long.
@@ -49,44 +53,92 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     look, resources = frame.look, frame.resources
     covering = covering_uniforms(kind, look)
     uniforms = {**covering, **look_uniforms(kind, look)}
+    uniforms["is_antialiased"] = int(frame.samples is not None)
     if is_carried(look) and states_fit(frame.size, kind.degree):
-        uniforms |= carried_uniforms(kind, look_for_symmetry(frame.pixel_look, kind.symmetry))
+        uniforms |= carried_uniforms(kind, look_for_symmetry(frame.look, kind.symmetry))
     traces_lines = not uniforms["is_carried"] or uniforms["overshoot_steps"] > 0
     unfold_task = _unfold_task(frame, kind, box, covering, traces_lines)
     textures = {**frame.textures, **(yield from unfold_task)}
     yield Progress(0.0, "measuring streaks")
     textures |= {
+        "noise_gradients": textures["directions"],
         "max_magnitude": _max_magnitude(frame, textures, kind, look),
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
-        "ink_thresholds": lookup_tables.thresholds(
-            resources, look_for_symmetry(frame.pixel_look, kind.symmetry)
-        ),
-        "disc_offsets": lookup_tables.undirected_offsets(resources, frame.pixel_look),
-        "ink_table": lookup_tables.ink_table(resources, kind, look),
     }
-    if "outline_widths" not in textures:
-        textures["outline_widths"] = textures["depth_slopes"]
-    if "paper_grain" not in textures:
-        textures["paper_grain"] = lookup_tables.picture_grain(
-            resources, *frame.size, look, kind.line_count
-        )
     if uniforms["is_carried"]:
         task = carry_task(frame, kind, box, textures, uniforms)
         textures["line_image"] = yield from subtask(task, 0.0, 0.0)
+    if frame.samples is not None and traces_lines:
+        textures["noise_gradients"] = _noise_gradients(frame, box, textures)
+    if frame.samples is not None and not uniforms["is_carried"]:
+        uniforms["gain"] *= INTERPOLATED_CONTRAST
+    if not is_hatched(look):
+        yield from _trace_task(
+            frame, kind, box, passes.LIC, textures, {"picture": picture}, uniforms
+        )
+        return
+    textures["line_means"] = textures["directions"]
+    has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
+    if has_streaks or uniforms["overshoot_steps"]:
+        means = resources.image("line_means", *frame.size, "RGBA16F", kind.line_count)
+        images = {"line_means": means}
+        yield from _trace_task(frame, kind, box, passes.STREAKS, textures, images, uniforms)
+        textures["line_means"] = means
+    if has_streaks and frame.samples is not None:
+        smooth = resources.image("smooth_means", *frame.size, "RGBA16F", kind.line_count)
+        images = {"smooth_means": smooth}
+        frame.run(passes.SMOOTH_STREAKS, box, textures, images, uniforms, kind.line_count)
+        textures["line_means"] = smooth
+    textures |= _ink_textures(frame, kind, textures)
+    yield Progress(1.0, "drawing the ink")
+    yield from resources.device.compile_task([passes.INK.variant(uniforms)])
+    frame.run(passes.INK, box, textures, {"picture": picture}, uniforms)
+
+
+def _ink_textures(frame: Frame, kind: FieldKind, textures: dict[str, Any]) -> dict[str, Any]:
+    """Return the lookup tables of the ink, and images that the look does not have."""
+    resources, look = frame.resources, frame.look
+    result = {
+        "ink_thresholds": lookup_tables.thresholds(
+            resources, look_for_symmetry(frame.look, kind.symmetry)
+        ),
+        "disc_offsets": lookup_tables.undirected_offsets(resources, frame.look),
+        "ink_table": lookup_tables.ink_table(resources, kind, look),
+    }
+    if "outline_coverage" not in textures:
+        result["outline_coverage"] = textures["depth_slopes"]
+    if "paper_grain" not in textures:
+        result["paper_grain"] = lookup_tables.picture_grain(
+            resources, *frame.size, look, kind.line_count
+        )
+    return result
+
+
+def _trace_task(
+    frame: Frame,
+    kind: FieldKind,
+    box: Box,
+    shader: ComputePass,
+    textures: dict[str, Any],
+    images: dict[str, Any],
+    uniforms: dict[str, Any],
+) -> Task[None]:
+    """Run a pass that traces streamlines, in bands: all lines of a pixel, or a layer for each line."""
     yield Progress(0.0, "measuring streaks")
-    yield from frame.resources.device.compile_task([passes.LIC.variant(uniforms)])
+    yield from frame.resources.device.compile_task([shader.variant(uniforms)])
     yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
     is_traced = uniforms["half_length"] and not uniforms["is_carried"]
-    half_steps = streamline_reach(frame.pixel_look) if is_traced else 0
+    half_steps = streamline_reach(frame.look) if is_traced else 0
     row_steps = (right - left) * kind.line_count * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
     band_rows = groups * WORKGROUP_SIZE[1]
+    layers = kind.line_count if "line_means" in images else 1
     for start in range(bottom, top, band_rows):
         band = left, start, right, min(start + band_rows, top)
-        frame.run(passes.LIC, band, textures, {"picture": picture}, uniforms)
+        frame.run(shader, band, textures, images, uniforms, layers)
         yield Progress((start + band_rows - bottom) / (top - bottom), "tracing streamlines")
 
 
@@ -99,7 +151,7 @@ def _unfold_task(
     """
     yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
-    has_color_noise = noise_args(frame.pixel_look)["channels"] > 1
+    has_color_noise = noise_args(frame.look)["channels"] > 1
     shader = passes.COLOR_DIRECTIONS if has_color_noise else passes.DIRECTIONS
     cells = image("cells", *frame.size, dict(shader.images)["cells"])
     directions = image("directions", *frame.size, "RGBA16F", lines)
@@ -121,6 +173,15 @@ def _unfold_task(
     images = {"angle_gradients": image("angle_gradients", *frame.size, "RGBA16F", lines)}
     frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
     return {**textures, **images}
+
+
+def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
+    """Return the derivatives of the noise, two channels in a layer."""
+    layers = 2 if noise_args(frame.look)["channels"] > 1 else 1
+    gradients = frame.resources.image("noise_gradients", *frame.size, "RGBA16F", layers)
+    images, uniforms = {"noise_gradients": gradients}, {"noise_layers": layers}
+    frame.run(passes.NOISE_GRADIENTS, box, textures, images, uniforms)
+    return gradients
 
 
 def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look: Look) -> Any:

@@ -15,7 +15,6 @@ from ..compositor.image_noise import image_noise
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
 from ..compositor.look import Look, is_hatched
-from ..compositor.look_units import supersampled_look
 from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
@@ -84,7 +83,7 @@ def picture_grain(
     """
     if not has_paper_grain(look):
         return palette(resources)
-    width = width // look.supersampling + (line_count - 1) * line_offset(look.grain)
+    width += (line_count - 1) * line_offset(look.grain)
 
     def create(width: int, height: int) -> np.ndarray:
         pixel = np.arange(width * height, dtype=np.int32)
@@ -98,7 +97,7 @@ def picture_grain(
 
 def picture_noise(resources: GpuResources, width: int, height: int, look: Look) -> Any:
     """Return the noise of `image_noise.image_noise` for a frame of this size."""
-    settings = noise_args(supersampled_look(look))
+    settings = noise_args(look)
 
     def create(width: int, height: int) -> np.ndarray:
         pixel = np.arange(width * height, dtype=np.int32)

@@ -35,7 +35,7 @@ def _noise_task(frame: Frame) -> Task[None]:
     """Render the noise of the picture or of the surfaces, as ``frame.textures["noise"]``."""
     look = frame.look
     if look.anchor == "surface":
-        settings = noise_args(frame.pixel_look) | cell_size_args(frame.pixel_look)
+        settings = noise_args(frame.look) | cell_size_args(frame.look)
         settings["detail"] = look.detail
         frame.textures["noise"] = yield from _surface_noise_task(frame, settings, "noise")
     else:
@@ -49,7 +49,7 @@ def _paper_grain_task(frame: Frame) -> Task[None]:
     and `lic_stage.lic_task` looks it up.
     """
     if has_paper_grain(frame.look) and frame.look.anchor == "surface":
-        settings = surface_paper_grain_args(frame.pixel_look) | cell_size_args(frame.pixel_look)
+        settings = surface_paper_grain_args(frame.look) | cell_size_args(frame.look)
         frame.textures["paper_grain"] = yield from _surface_noise_task(
             frame, settings, "paper_grain"
         )

@@ -1,4 +1,4 @@
-"""The outline of a picture: the widths of lines at the pixels at silhouettes, borders and creases."""
+"""The outline of a picture: lines at silhouettes, borders and creases."""
 
 from __future__ import annotations
 
@@ -20,17 +20,38 @@ STEP_LABEL = "drawing outlines"
 
 
 def outline_task(frame: Frame) -> Task[None]:
-    """Render the outline of a look that has one, as ``frame.textures["outline_widths"]``.
+    """Render the outline of a look that has one: the share of pixels that it covers.
 
-    The method is that of `compositor.outline`.
+    It is ``frame.textures["outline_coverage"]``. The method is that of `compositor.outline`. If pixels
+    have several samples, it is drawn at these.
     """
-    look = frame.pixel_look
-    if not has_outline(look):
+    if not has_outline(frame.look):
         return
+    if frame.samples is None:
+        frame.textures["outline_coverage"] = yield from _coverage_task(frame)
+        return
+    coverage = yield from _coverage_task(frame.samples)
+    mean = frame.resources.image("outline_coverage", *frame.size, "R32F")
+    frame.run(
+        passes.OUTLINE_MEAN,
+        (0, 0, *frame.size),
+        {**frame.textures, "sample_coverage": coverage},
+        {"outline_coverage": mean},
+        {"samples_per_side": frame.samples_per_side},
+    )
+    frame.textures["outline_coverage"] = mean
+
+
+def _coverage_task(frame: Frame) -> Task[Any]:
+    """Return the share of each pixel, or sample, that outlines cover."""
+    look = frame.look
     image, size = frame.resources.image, frame.size
-    crease_marks, edges = image("crease_marks", *size, "RGBA16F"), image("outline_edges", *size)
-    frame.clear(crease_marks, "RGBA16F")
-    frame.clear(edges)
+    crease_marks, edges = (
+        image("crease_marks", *size, "R32F"),
+        image("outline_edges", *size, "RG32F"),
+    )
+    frame.clear(crease_marks, "R32F")
+    frame.clear(edges, "RG32F")
     crease_angle = None if look.cross_creases else look.crease_angle
     for instance_id, item, box in frame.fields_in_view():
         yield Progress(0.01, STEP_LABEL)
@@ -42,15 +63,19 @@ def outline_task(frame: Frame) -> Task[None]:
     block_side = look.supersampling
     width, height = (side // block_side for side in size)
     blocks, widths = (
-        image("outline_blocks", width, height, "RGBA16F"),
-        image("outline_widths", *size),
+        image("outline_blocks", width, height, "R32F"),
+        image("outline_widths", *size, "R32F"),
     )
     box = 0, 0, width, height
     textures = {"outline_edges": edges, "outline_blocks": blocks}
     uniforms = {"outline": look.outline, "supersampling": block_side}
     frame.run(passes.OUTLINE_BLOCKS, box, textures, {"outline_blocks": blocks}, uniforms)
     frame.run(passes.OUTLINE_WIDTHS, box, textures, {"outline_widths": widths}, uniforms)
-    frame.textures["outline_widths"] = widths
+    coverage = image("outline_coverage", *size, "R32F")
+    textures = {**frame.textures, "outline_widths": widths}
+    images = {"outline_coverage": coverage}
+    frame.run(passes.OUTLINE_COVERAGE, (0, 0, *size), textures, images, uniforms)
+    return coverage
 
 
 def _mark_creases(
@@ -80,7 +105,7 @@ def _render_edges(
     edges: Any,
 ) -> None:
     """Render the edges of an instance: the width of the line, and what begins there."""
-    look, has_parts = frame.pixel_look, found.triangle_parts is not None
+    look, has_parts = frame.look, found.triangle_parts is not None
     parts = found.triangle_parts if has_parts else frame.textures["visibility"]
     frame.run(
         passes.OUTLINE_EDGES,

@@ -40,8 +40,9 @@ _COVERING: Uniforms = (("degree", "int"), ("line_count", "int"), ("sheet_count",
 _GUIDING: Uniforms = (("guiding_angle", "float"),)
 
 #: Settings of a look that shaders read unchanged, as uniforms of the same names. Lengths are in
-#: pixels of the supersampled frame.
-LIC_SETTINGS = ("grain", "clear_paper", "layers", "layering", "breaks", "outline")
+#: pixels of the frame.
+LIC_SETTINGS = ("grain",)
+INK_SETTINGS = ("clear_paper", "layers", "layering", "breaks", "outline")
 TONE_SETTINGS = ("shading", "tone_lit")
 
 
@@ -119,6 +120,7 @@ def _with_constants(shader: ComputePass, constants: tuple[tuple[str, int], ...])
     if not shader.switches:
         return shader
     uniforms = tuple(uniform for uniform in shader.uniforms if uniform[0] not in shader.switches)
+    constants = (*shader.constants, *constants)
     return replace(shader, uniforms=uniforms, switches=(), constants=constants)
 
 
@@ -208,6 +210,29 @@ RESOLVE = ComputePass(
         ("instance_id", "float"),
         ("model_scale", "float"),
         ("channel_count", "int"),
+    ),
+    includes=("triangle_record",),
+)
+
+#: The triangle that each pixel sees, at its center or else at the nearest sample.
+PIXEL_VISIBILITY = ComputePass(
+    "pixel_visibility",
+    ("center_visibility", "sample_visibility"),
+    (("visibility", "R32F"),),
+    (*_BOX_ORIGIN, ("samples_per_side", "int"), ("stop_id", "int")),
+)
+
+#: The pixel whose surface each sample of an instance shows.
+SAMPLE_ENTRIES = ComputePass(
+    "sample_entries",
+    ("visibility", "sample_visibility", "triangle_records", "field_values", "depth_slopes"),
+    (("sample_entries", "R32F"),),
+    (
+        *_BOX_ORIGIN,
+        *_CAMERA,
+        *_INSTANCE,
+        ("instance_id", "float"),
+        ("samples_per_side", "int"),
     ),
     includes=("triangle_record",),
 )
@@ -328,7 +353,7 @@ COLOR_DIRECTIONS = replace(DIRECTIONS, images=(("cells", "RGBA32F"), *DIRECTIONS
 OUTLINE_CREASES = ComputePass(
     "outline_creases",
     ("crease_points", "field_values", "depth_slopes"),
-    (("crease_marks", "RGBA16F"),),
+    (("crease_marks", "R32F"),),
     (
         ("clip_x", "vec4"),
         ("clip_y", "vec4"),
@@ -343,7 +368,7 @@ OUTLINE_CREASES = ComputePass(
 OUTLINE_EDGES = ComputePass(
     "outline_edges",
     ("visibility", "normals", "field_values", "depth_slopes", "crease_marks", "triangle_parts"),
-    (("outline_edges", "RGBA32F"),),
+    (("outline_edges", "RG32F"),),
     (
         *_BOX_ORIGIN,
         ("instance_id", "float"),
@@ -359,15 +384,32 @@ OUTLINE_EDGES = ComputePass(
 OUTLINE_BLOCKS = ComputePass(
     "outline_blocks",
     ("outline_edges",),
-    (("outline_blocks", "RGBA16F"),),
+    (("outline_blocks", "R32F"),),
     (*_BOX_ORIGIN, ("supersampling", "int")),
 )
 
 OUTLINE_WIDTHS = ComputePass(
     "outline_widths",
     ("outline_edges", "outline_blocks"),
-    (("outline_widths", "RGBA32F"),),
+    (("outline_widths", "R32F"),),
     (*_BOX_ORIGIN, *setting_uniforms(("outline",)), ("supersampling", "int")),
+)
+
+#: The share of each pixel that outlines cover.
+OUTLINE_COVERAGE = ComputePass(
+    "outline_coverage",
+    ("outline_widths", "field_values", "depth_slopes"),
+    (("outline_coverage", "R32F"),),
+    (*_BOX_ORIGIN, *setting_uniforms(("outline",))),
+)
+
+#: The same for pixels, from that of their samples.
+OUTLINE_MEAN = ComputePass(
+    "outline_mean",
+    ("sample_entries", "sample_coverage"),
+    (("outline_coverage", "R32F"),),
+    (*_BOX_ORIGIN, ("samples_per_side", "int")),
+    includes=("sample_entry",),
 )
 
 ANGLE_GRADIENT = ComputePass(
@@ -375,6 +417,14 @@ ANGLE_GRADIENT = ComputePass(
     ("cells", "directions[]"),
     (("angle_gradients[]", "RGBA16F"),),
     (*_BOX_ORIGIN, *_COVERING[1:]),
+)
+
+#: The derivatives of the noise, for streaks of pixels that have several samples.
+NOISE_GRADIENTS = ComputePass(
+    "noise_gradients",
+    ("cells",),
+    (("noise_gradients[]", "RGBA16F"),),
+    (*_BOX_ORIGIN, ("noise_layers", "int")),
 )
 
 #: Uniforms of passes over the states of `ibfv`.
@@ -497,21 +547,105 @@ TONE = ComputePass(
 #: `TONE` with the places of numbers in the color map, in the last component.
 TONE_AND_VALUES = replace(TONE, constants=(("HAS_VALUES", 1),))
 
-#: The picture. Its array ``line_image`` is that of `EVEN_LINES`, or the sums of `IBFV_DOUBLE`. Some cards
-#: read no more than 16 textures.
+#: Uniforms of the wobble of lines.
+_WOBBLE: Uniforms = (*_GUIDING, ("wobble_strength", "float"))
+
+_MAGNITUDE: Uniforms = (("magnitude_mode", "int"), ("magnitude_range", "float"))
+
+_FLOW: Uniforms = (("flow_mode", "int"), ("flow_shifts", "vec4"), ("flow_weights", "vec4"))
+
+#: Textures and uniforms of `lic_lines.glsl`, for lines without breaks and overshoot. The array ``line_image`` is
+#: that of the sums of `IBFV_DOUBLE`.
+_LINE_TEXTURES = (
+    *("cells", "angle_gradients[]", "tones", "field_values", "max_magnitude", "wobble_angles"),
+    *("line_image[]", "noise_gradients[]"),
+)
+_LINES: Uniforms = (
+    *_BOX_ORIGIN,
+    *_COVERING,
+    *_WOBBLE,
+    *setting_uniforms(LIC_SETTINGS),
+    *_MAGNITUDE,
+    *_FLOW,
+    ("kernel", "int"),
+    ("is_carried", "int"),
+    ("decay", "float"),
+    ("break_decay", "float"),
+    ("carried_contrast", "float"),
+    ("sharpening", "float"),
+    ("wave_phase", "vec2"),
+    ("half_length", "int"),
+    ("full_samples", "float"),
+    ("step_length", "float"),
+    ("noise_channels", "int"),
+    ("family_count", "int"),
+    ("break_samples", "float"),
+    ("is_antialiased", "int"),
+)
+_LINE_FILES = (
+    *("magnitude", "line_angle", "pixel_tone", "full_samples", "lic_trace", "ibfv_source"),
+    *("ibfv_decay", "lic_carried", "lic_lines"),
+)
+_LINE_SWITCHES = (
+    *("kernel", "flow_mode", "is_carried", "magnitude_mode", "noise_channels", "is_antialiased"),
+)
+
+#: The picture of a look without ink.
 LIC = ComputePass(
     "lic",
+    (*_LINE_TEXTURES, "field_channels[]", "color_map", "palette"),
+    (("picture", "RGBA32F"),),
+    (
+        *_LINES,
+        ("crossing_correlation", "float"),
+        ("gain", "float"),
+        ("family_channel", "int"),
+        ("hue_sharpness", "float"),
+        ("colors_values", "int"),
+    ),
+    includes=(*_LINE_FILES, "mapped_color"),
+    switches=(*_LINE_SWITCHES, "colors_values", "family_count"),
+    constants=(("break_steps", 0), ("overshoot_steps", 0), ("even_lines", 0)),
+)
+
+#: The streaks of a look with ink, a layer for each line.
+STREAKS = ComputePass(
+    "streaks",
+    _LINE_TEXTURES,
+    (("line_means[]", "RGBA16F"),),
+    (
+        *_LINES,
+        ("break_steps", "int"),
+        ("overshoot_steps", "int"),
+        ("even_lines", "int"),
+    ),
+    includes=_LINE_FILES,
+    switches=(*_LINE_SWITCHES, "even_lines"),
+)
+
+#: The same of pixels that have several samples, smoother.
+SMOOTH_STREAKS = ComputePass(
+    "smooth_streaks",
+    ("cells", "directions[]", "line_means[]"),
+    (("smooth_means[]", "RGBA16F"),),
+    (*_BOX_ORIGIN, *_COVERING[1:]),
+    includes=("line_neighbor",),
+)
+
+#: The picture of a look with ink. Its array ``line_image`` is that of `EVEN_LINES`. Some cards read no more
+#: than 16 textures.
+INK = ComputePass(
+    "ink",
     (
         "cells",
-        "angle_gradients[]",
+        "directions[]",
+        "line_means[]",
         "tones",
         "field_values",
-        "depth_slopes",
-        "outline_widths",
+        "outline_coverage",
         "field_channels[]",
         "max_magnitude",
         "color_map",
-        "palette",
         "ink_thresholds",
         "disc_offsets",
         "ink_table",
@@ -523,48 +657,30 @@ LIC = ComputePass(
     (
         *_BOX_ORIGIN,
         *_COVERING,
-        *_GUIDING,
-        *setting_uniforms(LIC_SETTINGS),
-        ("kernel", "int"),
+        *_WOBBLE,
+        *setting_uniforms(INK_SETTINGS),
+        *_MAGNITUDE,
         ("flow_mode", "int"),
-        ("flow_shifts", "vec4"),
         ("flow_weights", "vec4"),
-        ("is_carried", "int"),
-        ("decay", "float"),
-        ("break_decay", "float"),
-        ("carried_contrast", "float"),
-        ("sharpening", "float"),
-        ("wave_phase", "vec2"),
-        ("half_length", "int"),
-        ("full_samples", "float"),
-        ("step_length", "float"),
-        ("crossing_correlation", "float"),
-        ("gain", "float"),
         ("noise_channels", "int"),
         ("family_count", "int"),
         ("family_channel", "int"),
-        ("hue_sharpness", "float"),
-        ("magnitude_mode", "int"),
-        ("magnitude_range", "float"),
         ("colors_values", "int"),
         ("paper_color", "vec4"),
         ("ink_count", "int"),
         ("ink_mid_tone", "float"),
         ("min_transmittance", "float"),
-        ("is_hatched", "int"),
         ("is_light_ink", "int"),
+        ("is_antialiased", "int"),
         ("softness", "float"),
         ("streak_std", "float"),
         ("break_steps", "int"),
         ("overshoot_steps", "int"),
-        ("break_samples", "float"),
         ("break_std", "float"),
         ("disc_std", "float"),
-        ("wobble_strength", "float"),
         ("paper_grain_depth", "float"),
         ("paper_grain_shift", "int"),
         ("paper_grain_channels", "int"),
-        ("supersampling", "int"),
         ("onset_range", "float"),
         ("onset_lead", "float"),
         ("even_lines", "int"),
@@ -573,13 +689,12 @@ LIC = ComputePass(
         ("crowded_pixels", "vec2"),
     ),
     includes=(
-        *("magnitude", "full_samples", "line_member", "lic_trace"),
-        *("ibfv_source", "ibfv_decay", "lic_carried"),
-        *("lic_inks", "lic_even_lines", "lic_outline"),
+        *("magnitude", "line_angle", "line_member", "pixel_tone", "mapped_color"),
+        *("inks", "ink_even_lines", "line_neighbor"),
     ),
     switches=(
-        *("kernel", "flow_mode", "is_carried", "magnitude_mode", "colors_values", "noise_channels"),
-        *("family_count", "is_hatched", "is_light_ink", "even_lines", "ink_count"),
+        *("flow_mode", "magnitude_mode", "colors_values", "noise_channels", "family_count"),
+        *("is_light_ink", "is_antialiased", "even_lines", "ink_count"),
     ),
 )
 
@@ -590,8 +705,13 @@ MAX_REDUCE = ComputePass(
     (("degree", "int"), ("is_first", "int")),
 )
 
-DOWNSAMPLE = ComputePass(
-    "downsample", ("fine_picture",), (("picture", "RGBA32F"),), (("block_side", "int"),)
+#: The picture, from the colors of pixels and the shares of them that its samples show.
+BLEND_SAMPLES = ComputePass(
+    "blend_samples",
+    ("sample_entries", "shaded_picture"),
+    (("picture", "RGBA32F"),),
+    (("samples_per_side", "int"),),
+    includes=("sample_entry",),
 )
 
 COMPOSITE = RasterPass(
@@ -627,7 +747,9 @@ ALL_PASSES = (
     clear_pass("RGBA32F"),
     VISIBILITY,
     VISIBILITY_CLIPPED,
+    PIXEL_VISIBILITY,
     RESOLVE,
+    SAMPLE_ENTRIES,
     SURFACE_NOISE,
     WOBBLE,
     BOX_BLUR,
@@ -638,7 +760,10 @@ ALL_PASSES = (
     OUTLINE_EDGES,
     OUTLINE_BLOCKS,
     OUTLINE_WIDTHS,
+    OUTLINE_COVERAGE,
+    OUTLINE_MEAN,
     ANGLE_GRADIENT,
+    NOISE_GRADIENTS,
     IBFV_LINKS,
     IBFV_START,
     IBFV_DOUBLE,
@@ -647,8 +772,11 @@ ALL_PASSES = (
     LIGHTING,
     TONE,
     LIC,
+    STREAKS,
+    SMOOTH_STREAKS,
+    INK,
     MAX_REDUCE,
-    DOWNSAMPLE,
+    BLEND_SAMPLES,
     COMPOSITE,
     BACKGROUND,
 )

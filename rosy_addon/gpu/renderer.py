@@ -7,6 +7,7 @@ is traced from every pixel and line: unlike `fast_lic`, no averages are shared b
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
-from ..compositor.look import colors_magnitude, colors_values
-from ..compositor.look_units import look_in_pixels
+from ..compositor.look import Look, colors_magnitude, colors_values
+from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
@@ -86,7 +87,7 @@ class GpuRenderer:
         check_instances(instances, view.sample_camera, look.display)
         items = self.upload(instances, look.display)
         for degree in {item.kind.degree for item in items if item.kind is not None}:
-            check_states(look, (view.sample_camera.width, view.sample_camera.height), degree)
+            check_states(look, (camera.width, camera.height), degree)
         texture = yield from self.render_texture_task(items, view)
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
@@ -125,24 +126,21 @@ class GpuRenderer:
         RosyError
             If the picture is too large for the device.
         """
-        camera = view.sample_camera
-        if max(camera.width, camera.height) > self.device.max_texture_size:
+        sample_camera = view.sample_camera
+        if max(sample_camera.width, sample_camera.height) > self.device.max_texture_size:
             raise RosyError(
-                f"a frame of {camera.width} x {camera.height} pixels, including supersampling, is "
+                f"a frame of {sample_camera.width} x {sample_camera.height} pixels, including supersampling, is "
                 f"too large for this graphics card (at most {self.device.max_texture_size}): choose "
                 "a smaller size, or the processor"
             )
         yield Progress(0.0, "finding visible pixels")
-        look = look_in_pixels(view.look, camera, [item.instance for item in items])
-        clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
-        frame = Frame(self.resources, items, camera, look, view.lights, view.reference, clip_planes)
-        single_sampled = look.supersampling == 1
-        fine_picture = self.resources.image(
-            ("picture", target_key if single_sampled else None), *frame.size
-        )
+        frame = self._frame(items, view)
+        look = frame.look
+        name = ("picture", target_key) if frame.samples is None else "shaded_picture"
+        picture = self.resources.image(name, *frame.size)
         render_gbuffer(frame)
         yield from outline_task(frame)
-        frame.clear(fine_picture)
+        frame.clear(picture)
         yield from noise_task(frame)
         yield from even_lines_task(frame)
         yield Progress(0.15, "finding tones")
@@ -155,12 +153,28 @@ class GpuRenderer:
             box = frame.box_of_kind(kind)
             if is_empty(box):
                 continue
-            task = lic_task(frame, kind, box, fine_picture)
+            task = lic_task(frame, kind, box, picture)
             start, stop = index / len(kinds), (index + 1) / len(kinds)
             yield from subtask(task, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
-        if single_sampled:
-            return fine_picture
-        return self._downsampled(fine_picture, camera, look.supersampling, target_key)
+        if frame.samples is None:
+            return picture
+        return self._blended(frame, picture, target_key)
+
+    def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
+        """Return the frame of the pixels, and of their samples, if these are several."""
+        look = look_in_pixels(view.look, view.sample_camera, [item.instance for item in items])
+        clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
+
+        def frame_of(camera: Camera, look: Look, samples: Frame | None = None) -> Frame:
+            return Frame(
+                *(self.resources, items, camera, look, view.lights, view.reference, clip_planes),
+                samples,
+            )
+
+        if look.supersampling == 1:
+            return frame_of(view.camera, look)
+        samples = frame_of(view.sample_camera, supersampled_look(look))
+        return frame_of(view.camera, replace(look, supersampling=1), samples)
 
     def composite(
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
@@ -207,7 +221,7 @@ class GpuRenderer:
 
     def _color_range(self, view: ViewInput) -> tuple[float, float] | None:
         """Return `Picture.color_range` of the last picture."""
-        look, camera = view.look, view.sample_camera
+        look, camera = view.look, view.camera
         if not colors_magnitude(look) or look.magnitude_range:
             return fixed_color_range(look, view.instances)
         field_values = self.resources.image("field_values", camera.width, camera.height)
@@ -220,17 +234,14 @@ class GpuRenderer:
             tops.add(float(self.read(texture, 1, 1)[0, 0, 0]))
         return common_color_range(tops - {0.0})  # 0: no field of this degree is visible
 
-    def _downsampled(
-        self, fine_picture: Any, camera: Camera, supersampling: int, target_key: Hashable
-    ) -> Any:
-        """Return a picture with blocks of subpixels averaged."""
-        size = camera.width // supersampling, camera.height // supersampling
-        picture = self.resources.image(("picture", target_key), *size)
+    def _blended(self, frame: Frame, shaded_picture: Any, target_key: Hashable) -> Any:
+        """Return the picture of pixels that have several samples."""
+        picture = self.resources.image(("picture", target_key), *frame.size)
         self.device.compute(
-            passes.DOWNSAMPLE,
-            size,
-            {"fine_picture": fine_picture},
+            passes.BLEND_SAMPLES,
+            frame.size,
+            {**frame.textures, "shaded_picture": shaded_picture},
             {"picture": picture},
-            {"block_side": supersampling},
+            {"samples_per_side": frame.samples_per_side},
         )
         return picture

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.contrast import expected_std, streak_args, supersampling_gain
+from ..compositor.contrast import expected_std, streak_args
 from ..compositor.even_lines import (
     FADE_PIXELS,
     MAX_EDGE_WIDTH,
@@ -42,7 +42,6 @@ from ..compositor.look import Look, colors_values, has_flow, is_hatched
 from ..compositor.look_units import (
     cell_size_args,
     instance_line_spacing,
-    supersampled_look,
 )
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -73,7 +72,7 @@ from .defines import (
     SUN_LIGHT,
 )
 from .field_kind import FieldKind
-from .passes import LIC_SETTINGS, TONE_SETTINGS
+from .passes import INK_SETTINGS, LIC_SETTINGS, TONE_SETTINGS
 from .resources import DrawItem
 
 #: The uniforms of `carried_uniforms` for streaks that are traced.
@@ -119,31 +118,30 @@ def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
 
 
 def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the uniforms of the LIC pass that depend on the look.
+    """Return the uniforms of line integral convolution and ink that depend on the look.
 
-    Lengths are in pixels of the supersampled frame.
+    Lengths are in pixels of the frame.
     """
     look = look_for_symmetry(look, kind.symmetry)
-    pixel_look, kernel = supersampled_look(look), kernel_of(look)
-    _, crossing = streak_moments(*streak_args(pixel_look), kind.line_count, kernel=kernel)
-    gain = supersampling_gain(pixel_look) if look.supersampling > 1 else 1.0
+    kernel = kernel_of(look)
+    _, crossing = streak_moments(*streak_args(look), kind.line_count, kernel=kernel)
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
-    statistics = look_streak_statistics(pixel_look) if is_hatched(look) else None
+    statistics = look_streak_statistics(look) if is_hatched(look) else None
     return {
-        **setting_values(pixel_look, LIC_SETTINGS),
+        **setting_values(look, (*LIC_SETTINGS, *INK_SETTINGS)),
         "kernel": KERNELS[kernel],
-        **_flow_uniforms(kind, pixel_look),
+        **_flow_uniforms(kind, look),
         **NOT_CARRIED,
-        "half_length": 0 if has_even_lines(look) else pixel_look.length,
-        "full_samples": full_sample_count(pixel_look),
-        "step_length": pixel_look.step,
+        "half_length": 0 if has_even_lines(look) else look.length,
+        "full_samples": full_sample_count(look),
+        "step_length": look.step,
         "crossing_correlation": crossing,
-        "gain": look.gain * gain,
+        "gain": look.gain,
         # The streaks that drift have one channel, unlike their noise.
-        "noise_channels": 1 if has_flow(look) else noise_args(pixel_look)["channels"],
+        "noise_channels": 1 if has_flow(look) else noise_args(look)["channels"],
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
-        "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(pixel_look),
+        "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(look),
         "magnitude_mode": MAGNITUDE_MODES[look.magnitude],
         "magnitude_range": look.magnitude_range,
         "colors_values": int(colors_values(look)),
@@ -151,36 +149,32 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "ink_count": len(inks.dark),
         "ink_mid_tone": inks.mid_tone,
         "min_transmittance": inks.min_transmittance,
-        "is_hatched": int(is_hatched(look)),
         "is_light_ink": int(inks.is_light),
         "softness": softness(look.crispness),
         "streak_std": statistics.std if statistics else 1.0,
-        "break_steps": break_steps(pixel_look) if has_breaks(look) else 0,
-        "overshoot_steps": max(round(pixel_look.overshoot / pixel_look.step), 1)
-        if has_overshoot(look)
-        else 0,
-        "break_samples": full_sample_count(replace(pixel_look, length=break_steps(pixel_look))),
+        "break_steps": break_steps(look) if has_breaks(look) else 0,
+        "overshoot_steps": max(round(look.overshoot / look.step), 1) if has_overshoot(look) else 0,
+        "break_samples": full_sample_count(replace(look, length=break_steps(look))),
         "break_std": statistics.break_std if statistics else 1.0,
         "disc_std": statistics.disc_std if statistics else 1.0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
         "paper_grain_depth": _paper_grain_depth(look, statistics),
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
         "paper_grain_shift": line_offset(look.grain),
-        "supersampling": look.supersampling,
         # Not defines: compilers reorder sums with constants, and the result would change.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
         "even_lines": int(has_even_lines(look)),
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
-        "fade_pixels": tuple(pixels * look.supersampling for pixels in FADE_PIXELS),
-        "crowded_pixels": crowded_pixels(pixel_look),
+        "fade_pixels": FADE_PIXELS,
+        "crowded_pixels": crowded_pixels(look),
     }
 
 
 def carried_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     """Return the uniforms of streaks that are carried, beside those of the LIC pass; see `ibfv`.
 
-    `look` is in pixels of the supersampled frame, and for the symmetry of the kind.
+    `look` is in pixels of the frame, and for the symmetry of the kind.
     """
     two_sided = is_two_sided(kind.symmetry, look)
     comes_against = not kind.symmetry.has_opposites and not look.oriented
@@ -352,7 +346,7 @@ def screen_direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> di
 def even_line_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that evaluates the even lines of one instance.
 
-    `look` is in pixels of the supersampled frame, whose camera is `camera`.
+    `look` is in pixels of the frame, whose camera is `camera`.
     """
     spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
     asked_pixels = SPACING_GRAINS * look.grain if look.unit == "pixels" else 0.0
@@ -401,14 +395,13 @@ def surface_cell_uniforms(
 
 def wobble_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the wavelength of the wobble, in pixels or in the units of a surface."""
-    pixel_look = supersampled_look(look)
-    wavelength = pixel_look.grain * MEAN_WAVELENGTH_GRAINS
-    cell_size = cell_size_args(pixel_look)
+    wavelength = look.grain * MEAN_WAVELENGTH_GRAINS
+    cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"
     pixels_per_object_unit = camera.pixels_per_unit * item.object_scale if on_surface else 1.0
     return {
         "on_surface": int(on_surface),
         "pixel_size": wavelength / pixels_per_object_unit,
         "cell_size": wavelength * cell_size["pixel"] * on_surface / item.object_scale,
-        "min_cell_scale": cell_size["smallest"] / pixel_look.grain,
+        "min_cell_scale": cell_size["smallest"] / look.grain,
     }

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .drifting_brute import one_streamline_per_pixel
+from .one_streamline import one_streamline_per_pixel
 
 #: Largest distance between two points that count as equal, in pixels. OpenGL rounds the vertices of
 #: triangles to 1/256 of a pixel, and on steep parts the depth changes by many pixels per pixel.
@@ -125,11 +125,12 @@ def draw_pair(
     items = card.upload(instances, look.display)
     texture = rosy.run_to_completion(card.render_texture_task(items, view))
     card_picture = card.read(texture, width, height)
-    images = card.read_gbuffer(camera)
-    gbuffer = rosy.project(instances, camera, look.display)
+    images = card.read_gbuffer(view.camera)
+    gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
+    has_flow = module_of(rosy.package, "compositor.look").has_flow
     if look.method == "ibfv":
         numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
-    elif module_of(rosy.package, "compositor.look").has_flow(look):
+    elif has_flow(look) or supersampling > 1:
         with one_streamline_per_pixel(rosy.package):
             numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
     else:

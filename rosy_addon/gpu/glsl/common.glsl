@@ -40,6 +40,12 @@ vec2 signed_power(vec2 value, int order)
   return result;
 }
 
+float smooth_unit_step(float x)
+{
+  x = clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
 // The angle of 0 is 0; GLSL leaves it undefined.
 float angle_of(vec2 a)
 {

@@ -1,5 +1,6 @@
 // Streaks that are carried along the covering, as `ibfv`: the sums of all states are in `line_image`.
-// Included by lic.comp.glsl.
+// Included by
+// lic.comp.glsl and streaks.comp.glsl.
 
 // The mean of a line, and its effective samples.
 struct Carried {

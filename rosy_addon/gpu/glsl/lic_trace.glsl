@@ -1,4 +1,5 @@
-// Streamlines on the covering and their filtered noise. Included by lic.comp.glsl.
+// Streamlines on the covering and their filtered noise. Included by lic.comp.glsl
+// and streaks.comp.glsl.
 
 // Sums over the samples of a streamline: of the weighted noise, of the weights and of their squares.
 // Of kernels that move, the weighted noise is around 0 and in all components. `full_square_sum` is what
@@ -114,18 +115,26 @@ float effective_samples(Sums sums, Drift drift)
   return sums.weight * sums.weight / sums.square_sum;
 }
 
-// The target tone of a pixel.
-float tone_at(ivec2 pixel)
-{
-  vec3 light = texelFetch(tones, pixel, 0).xyz;
-  return clamp((light.x + light.y + light.z) / 3.0, 0.0, 1.0);
-}
-
 // How much the weights of the samples of half a streamline fall over its length (`filter_kernel`).
 // `along` is 1 along the directions of a field without opposites, and -1 against them.
 float weight_slope(float along)
 {
   return kernel == KERNEL_TAPER ? 1.0 : kernel == KERNEL_RAMP ? along : 0.0;
+}
+
+// The noise at a position relative to the center of a pixel.
+vec3 noise_near(ivec2 pixel, vec4 cell, vec2 offset)
+{
+  if (is_antialiased == 0) {
+    return cell.yzw;
+  }
+  vec4 gradient = texelFetch(noise_gradients, ivec3(pixel, 0), 0);
+  vec3 change = vec3(dot(gradient.xy, offset), 0.0, 0.0);
+  if (noise_channels > 1 || flow_mode != FLOW_NONE) {
+    vec2 third = texelFetch(noise_gradients, ivec3(pixel, 1), 0).xy;
+    change.yz = vec2(dot(gradient.zw, offset), dot(third, offset));
+  }
+  return cell.yzw + change;
 }
 
 // Trace half a streamline from a pixel on a sheet. Its state is a pixel and a sheet of the covering;
@@ -172,22 +181,23 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
       sheet = wrap_once(sheet + int(round(phase - cell.x)), sheet_count);
     }
     float distance_steps = float(step_index + 1);
+    vec3 noise_value = noise_near(pixel, cell, offset);
     if (flow_mode != FLOW_NONE) {
       if (step_index < step_count) {
-        add_drifting(result.all, cell.yzw, drifting_weights(side * distance_steps, drift));
+        add_drifting(result.all, noise_value, drifting_weights(side * distance_steps, drift));
       }
       if (step_index < near_step_count) {
-        add_drifting(result.near, cell.yzw, drifting_weights(side * distance_steps, near_drift));
+        add_drifting(result.near, noise_value, drifting_weights(side * distance_steps, near_drift));
       }
     }
     else if (step_index < step_count) {
-      add(result.all, cell.yzw, 1.0 - distance_steps * weight_step);
+      add(result.all, noise_value, 1.0 - distance_steps * weight_step);
     }
     if (step_index < overshoot_count) {
       result.tones += vec2(tone_at(pixel), 1.0);
     }
     if (flow_mode == FLOW_NONE && step_index < near_step_count) {
-      add(result.near, cell.yzw, 1.0 - distance_steps * near_weight_step);
+      add(result.near, noise_value, 1.0 - distance_steps * near_weight_step);
     }
   }
   if (flow_mode != FLOW_NONE) {

@@ -1,4 +1,4 @@
-// Evenly spaced lines in place of streaks, as `even_lines`. Included by lic.comp.glsl.
+// Evenly spaced lines in place of streaks, as `even_lines`. Included by ink.comp.glsl.
 
 // The coverage of an interval of the length `edge` by lines with the distance 1, as
 // `even_lines._box_filtered`.

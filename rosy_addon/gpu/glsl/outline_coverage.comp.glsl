@@ -1,16 +1,20 @@
-// The outline along silhouettes and creases. Included by lic.comp.glsl.
+// The share of each pixel that outlines along silhouettes and creases cover.
 
-// The share of a pixel that outlines cover.
-float outline_coverage(ivec2 pixel, vec4 value)
+void main()
 {
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  ivec2 frame = imageSize(outline_coverage);
+  if (any(greaterThanEqual(pixel, frame))) {
+    return;
+  }
+  vec4 value = texelFetch(field_values, pixel, 0);
   float inverse_depth = texelFetch(depth_slopes, pixel, 0).x, coverage = 0.0;
-  int radius = int(ceil(outline));
+  int radius = value.w == 0.0 ? -1 : int(ceil(outline));
   for (int dy = -radius; dy <= radius; ++dy) {
     for (int dx = -radius; dx <= radius; ++dx) {
       ivec2 neighbor = pixel + ivec2(dx, dy);
       float distance_pixels = length(vec2(dx, dy));
-      bool inside =
-          all(greaterThanEqual(neighbor, ivec2(0))) && all(lessThan(neighbor, imageSize(picture)));
+      bool inside = all(greaterThanEqual(neighbor, ivec2(0))) && all(lessThan(neighbor, frame));
       if (!inside || outline - distance_pixels <= coverage) {
         continue;
       }
@@ -25,5 +29,5 @@ float outline_coverage(ivec2 pixel, vec4 value)
       }
     }
   }
-  return coverage;
+  imageStore(outline_coverage, pixel, vec4(coverage));
 }

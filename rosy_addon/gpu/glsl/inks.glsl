@@ -1,10 +1,4 @@
-// Hatching: which lines are drawn at a tone, and in which ink. Included by lic.comp.glsl.
-
-float smooth_unit_step(float x)
-{
-  x = clamp(x, 0.0, 1.0);
-  return x * x * (3.0 - 2.0 * x);
-}
+// Hatching: which lines are drawn at a tone, and in which ink. Included by ink.comp.glsl.
 
 // How many lines are closer to the guiding angle than this one, as `hatching._line_ranks`. `first` is
 // the angle from the guiding angle to line 0.
@@ -98,7 +92,7 @@ float ink_coverage(float target, vec3 ink)
 float grain_height(int member, ivec2 pixel)
 {
   if (paper_grain_channels == 0) {
-    ivec2 texel = pixel / supersampling + ivec2(member * paper_grain_shift, 0);
+    ivec2 texel = pixel + ivec2(member * paper_grain_shift, 0);
     return texelFetch(paper_grain, texel, 0).x;
   }
   vec3 heights = texelFetch(paper_grain, pixel, 0).xyz - NOISE_MEAN;
@@ -116,6 +110,20 @@ float coverage_threshold(float coverage, int row)
   float low = texelFetch(ink_thresholds, ivec2(low_index, row), 0).x;
   float high = texelFetch(ink_thresholds, ivec2(low_index + 1, row), 0).x;
   return mix(low, high, position - float(low_index));
+}
+
+// The share of a pixel that has ink, where a streak exceeds a threshold. The edges are soft: over a slope,
+// in streaks per pixel, at least as soft as the mean over a pixel; as `hatching`.
+float ink_above_threshold(float streak, float threshold, float slope)
+{
+  float half_width = softness;
+  if (is_antialiased != 0) {
+    slope *= PIXEL_SOFTNESS;
+    slope *= slope;
+    threshold *= sqrt(1.0 + slope / 5.0);
+    half_width = sqrt(half_width * half_width + slope);
+  }
+  return smooth_unit_step((streak - threshold) / (2.0 * half_width) + 0.5);
 }
 
 // The mean of the noise over a disc around a pixel, around 0, as `undirected_texture_task`.

@@ -1,0 +1,114 @@
+// The filtered noise of the lines through a pixel. Included by lic.comp.glsl and streaks.comp.glsl.
+
+// How far the noise is filtered at a pixel: over how many steps in each direction, or with which decay, and
+// what has drifted.
+struct Reach {
+  int overshoot_count;
+  float decay_of_line;
+  float decay_of_breaks;
+  Drift drift;
+  Drift break_drift;
+};
+
+// The filtered noise of a line, that of its breaks, and the mean tone along its overshoot.
+struct FilteredLine {
+  vec3 mean;
+  float samples;
+  vec3 break_mean;
+  float tone;
+};
+
+float gray(vec3 mean)
+{
+  return noise_channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
+}
+
+// `relative_magnitude` is 1 if the magnitude is not drawn.
+Reach reach_at(float relative_magnitude)
+{
+  Reach reach;
+  int step_count = half_length, break_step_count = break_steps;
+  reach.overshoot_count = overshoot_steps;
+  if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
+    step_count = int(round(float(step_count) * relative_magnitude));
+    break_step_count = int(round(float(break_step_count) * relative_magnitude));
+    reach.overshoot_count = int(round(float(overshoot_steps) * relative_magnitude));
+  }
+  // Even lines have no streaks, but breaks.
+  step_count = even_lines != 0 ? break_steps : step_count;
+  reach.decay_of_line = decay;
+  reach.decay_of_breaks = break_decay;
+  if (is_carried != 0) {
+    if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
+      reach.decay_of_line = decay_of_steps(step_count);
+      reach.decay_of_breaks = decay_of_steps(break_step_count);
+    }
+    // Nothing is traced but overshoot.
+    step_count = break_step_count = 0;
+  }
+  reach.drift.half_steps = step_count;
+  reach.break_drift.half_steps = break_step_count;
+  reach.drift.shifts = reach.break_drift.shifts = vec3(0.0);
+  if (flow_mode != FLOW_NONE) {
+    // Relative to the steps of lines of the largest magnitude.
+    int largest_count = max(even_lines != 0 ? break_steps : half_length, 1);
+    reach.drift.shifts = flow_shifts.xyz * (float(step_count) / float(largest_count));
+    reach.break_drift.shifts =
+        flow_shifts.xyz * (float(break_step_count) / float(max(break_steps, 1)));
+  }
+  return reach;
+}
+
+// `line_angle` is that of line 0, and `source` is `sharpened_source` if streaks are carried.
+FilteredLine filtered_line(ivec2 pixel, int line, vec4 cell, Reach reach, float line_angle, vec3 source)
+{
+  bool has_opposite_sheet = sheet_count == 2 * line_count;
+  int backward_sheet = has_opposite_sheet ? line + line_count : line;
+  float backward_sign = has_opposite_sheet ? 1.0 : -1.0;
+  // For odd N, every other sheet is the opposite half of a member.
+  float along = has_opposite_sheet && (line & 1) == 1 ? -1.0 : 1.0;
+  Drift drift = reach.drift, break_drift = reach.break_drift;
+  drift.forward_share = 0.0;
+  if (flow_mode == FLOW_ALONG) {
+    drift.forward_share = along > 0.0 ? 1.0 : 0.0;
+  }
+  else if (flow_mode == FLOW_TO_ANGLE) {
+    float cosine = cos(line_angle + TAU * float(line) / float(sheet_count));
+    drift.forward_share = smooth_unit_step(0.5 + cosine * (0.5 / ONE_WAY_COSINE));
+  }
+  break_drift.forward_share = drift.forward_share;
+  Half forward, backward;
+  forward.tones = backward.tones = vec2(0.0);
+  if (is_carried == 0 || overshoot_steps > 0) {
+    forward = traced_half(pixel, line, 1.0, cell, 1.0, drift, break_drift, reach.overshoot_count,
+                          weight_slope(along));
+    backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
+                           reach.overshoot_count, weight_slope(-along));
+  }
+  FilteredLine result;
+  result.break_mean = vec3(0.0);
+  result.tone = 0.0;
+  if (overshoot_steps > 0) {
+    vec2 tone_sum = vec2(tone_at(pixel), 1.0) + forward.tones + backward.tones;
+    result.tone = tone_sum.x / tone_sum.y;
+  }
+  if (is_carried != 0) {
+    float forward_share = flow_mode == FLOW_NONE ? 0.5 : drift.forward_share;
+    SheetSums sums = sums_of_line(pixel, line, forward_share, source);
+    Carried carried = carried_mean(sums, reach.decay_of_line, full_samples);
+    result.mean = carried.mean;
+    result.samples = carried.samples;
+    if (break_steps > 0) {
+      result.break_mean = carried_mean(sums_of_breaks(sums), reach.decay_of_breaks, break_samples).mean;
+    }
+    return result;
+  }
+  Sums sums = both_halves(cell.yzw, forward.all, backward.all, drift);
+  result.mean = normalized_mean(sums, full_samples, drift);
+  result.samples = effective_samples(sums, drift);
+  if (break_steps > 0) {
+    Sums near_sums = both_halves(cell.yzw, forward.near, backward.near, break_drift);
+    result.break_mean = normalized_mean(near_sums, break_samples, break_drift);
+  }
+  return result;
+}

@@ -1,0 +1,26 @@
+// The derivatives of the noise on screen, by differences over connected neighbors: along x and y for each channel,
+// two channels in a layer.
+
+vec3 noise_at(ivec2 pixel, ivec2 offset, vec4 cell)
+{
+  int bit = offset.x + 3 * offset.y + 4;
+  return ((neighbor_mask(cell.x) >> bit) & 1) == 0 ? cell.yzw : texelFetch(cells, pixel + offset, 0).yzw;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  if (any(greaterThanEqual(pixel, imageSize(noise_gradients).xy))) {
+    return;
+  }
+  vec4 cell = texelFetch(cells, pixel, 0);
+  if (cell.x == 0.0) {
+    return;
+  }
+  vec3 right = 0.5 * (noise_at(pixel, ivec2(1, 0), cell) - noise_at(pixel, ivec2(-1, 0), cell));
+  vec3 up = 0.5 * (noise_at(pixel, ivec2(0, 1), cell) - noise_at(pixel, ivec2(0, -1), cell));
+  imageStore(noise_gradients, ivec3(pixel, 0), vec4(right.x, up.x, right.y, up.y));
+  if (noise_layers > 1) {
+    imageStore(noise_gradients, ivec3(pixel, 1), vec4(right.z, up.z, 0.0, 0.0));
+  }
+}

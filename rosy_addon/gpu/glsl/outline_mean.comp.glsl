@@ -1,0 +1,28 @@
+// The share of the surface that a pixel sees that outlines cover: the mean of the samples that show it. They are
+// in the pixel, and some in those around it.
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  ivec2 frame = imageSize(outline_coverage);
+  if (any(greaterThanEqual(pixel, frame))) {
+    return;
+  }
+  float total = 0.0, count = 0.0;
+  for (int bit = 0; bit < 9; ++bit) {
+    ivec2 home = pixel + ivec2(bit % 3 - 1, bit / 3 - 1);
+    if (any(lessThan(home, ivec2(0))) || any(greaterThanEqual(home, frame))) {
+      continue;
+    }
+    for (int index = 0; index < samples_per_side * samples_per_side; ++index) {
+      ivec2 sample_ =
+          home * samples_per_side + ivec2(index % samples_per_side, index / samples_per_side);
+      ivec2 offset;
+      if (entry_of_sample(sample_, offset) && home + offset == pixel) {
+        total += texelFetch(sample_coverage, sample_, 0).x;
+        count += 1.0;
+      }
+    }
+  }
+  imageStore(outline_coverage, pixel, vec4(total / max(count, 1.0)));
+}

@@ -1,0 +1,23 @@
+// The streaks of hatching, one thread for each line through a pixel: their filtered noise, that of their
+// breaks, and the tone along the line.
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;
+  int line = int(gl_GlobalInvocationID.z);
+  if (any(greaterThanEqual(pixel, imageSize(line_means).xy))) {
+    return;
+  }
+  vec4 cell = texelFetch(cells, pixel, 0);
+  if (cell.x == 0.0) {
+    return;
+  }
+  vec4 value = texelFetch(field_values, pixel, 0);
+  float relative_magnitude = magnitude_mode != 0 ? magnitude_share(value.xy) : 1.0;
+  vec3 source = is_carried != 0 ? sharpened_source(pixel, cell) : vec3(0.0);
+  float line_angle = flow_mode == FLOW_TO_ANGLE ? line_angle_of(pixel, value.xy) : 0.0;
+  FilteredLine filtered =
+      filtered_line(pixel, line, cell, reach_at(relative_magnitude), line_angle, source);
+  vec4 means = vec4(gray(filtered.mean), gray(filtered.break_mean), filtered.tone, 0.0);
+  imageStore(line_means, ivec3(pixel, line), means);
+}

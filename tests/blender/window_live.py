@@ -668,13 +668,13 @@ def fallback_to_the_processor():
         assert "cannot compile the shader" in session.fallback_reason
         yield from wait_for_final_pictures()
         seen, drawn = capture("live-processor", view()[2]), bake_of_view(method="sheets")
-        # The picture has another size, and so another noise.
-        check_agreement("processor", seen, drawn, -1.0)
+        # The picture has another size, and so another noise, whose mean differs a little.
+        check_agreement("processor", seen, drawn, -1.0, max_difference=0.02)
         assert seen[drawn[..., 3] > 0].std() > 0.08
         look_from(0.9, 0.1)
         yield from wait_for_final_pictures()
         seen, drawn = capture("live-processor-turned", view()[2]), bake_of_view(method="sheets")
-        check_agreement("processor", seen, drawn, -1.0)
+        check_agreement("processor", seen, drawn, -1.0, max_difference=0.02)
         switch("OFF")
     finally:
         sources.source = original_source

@@ -9,7 +9,15 @@ import numpy as np
 from ..compositor.hatching import has_outline
 from . import passes
 from .frame import Frame
+from .passes import ComputePass
+from .resources import DrawItem
 from .uniforms import NO_CLIP_PLANES, clip_uniforms, uniform_scale
+
+
+def gbuffer_shaders(frame: Frame) -> list[ComputePass]:
+    """Return the shaders of `render_gbuffer` that depend on the frame."""
+    items = [item for item in frame.items if item.field is not None]
+    return [passes.RESOLVE.variant(_surface_uniforms(frame, item)) for item in items]
 
 
 def render_gbuffer(frame: Frame) -> None:
@@ -69,7 +77,7 @@ def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
 
 def _render_surfaces(frame: Frame, visibility: Any) -> None:
     """Render the surface and field at each pixel, given the ids of visible triangles."""
-    image, camera, size = frame.resources.image, frame.camera, frame.size
+    image, size = frame.resources.image, frame.size
     channel_count = max((item.mesh.buffers.channel_count for item in frame.items), default=0)
     channel_size = size if channel_count else (1, 1)
     gbuffer = {
@@ -81,13 +89,18 @@ def _render_surfaces(frame: Frame, visibility: Any) -> None:
     frame.clear(gbuffer["field_values"])
     frame.textures["visibility"] = visibility
     for instance_id, item, box in frame.fields_in_view():
-        uniforms = {
-            "pixels_per_unit": camera.pixels_per_unit,
-            "channel_count": item.mesh.buffers.channel_count,
-            "model_scale": uniform_scale(item.model_matrix),
-        }
+        uniforms = _surface_uniforms(frame, item)
         frame.run_on_instance(passes.RESOLVE, instance_id, box, gbuffer, uniforms)
     frame.textures.update(gbuffer)
+
+
+def _surface_uniforms(frame: Frame, item: DrawItem) -> dict[str, Any]:
+    """Return the uniforms of the surface of an item."""
+    return {
+        "pixels_per_unit": frame.camera.pixels_per_unit,
+        "channel_count": item.mesh.buffers.channel_count,
+        "model_scale": uniform_scale(item.model_matrix),
+    }
 
 
 def _sample_entries(frame: Frame, samples: Frame) -> Any:

@@ -153,6 +153,9 @@ def _unfold_task(
     image, lines = frame.resources.image, kind.line_count
     has_color_noise = noise_args(frame.look)["channels"] > 1
     shader = passes.COLOR_DIRECTIONS if has_color_noise else passes.DIRECTIONS
+    uniforms = {**covering, **direction_uniforms(kind, frame.look, frame.camera)}
+    variants = [shader.variant(uniforms), passes.ANGLE_GRADIENT.variant(covering)]
+    yield from frame.resources.device.compile_task(variants)
     cells = image("cells", *frame.size, dict(shader.images)["cells"])
     directions = image("directions", *frame.size, "RGBA16F", lines)
     frame.run(
@@ -160,11 +163,7 @@ def _unfold_task(
         box,
         frame.textures,
         {"cells": cells, "directions": directions},
-        {
-            **camera_uniforms(frame.camera),
-            **covering,
-            **direction_uniforms(kind, frame.look, frame.camera),
-        },
+        {**camera_uniforms(frame.camera), **uniforms},
     )
     yield Progress(0.0, "finding directions")
     textures = {"cells": cells, "directions": directions}

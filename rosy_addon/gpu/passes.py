@@ -212,6 +212,7 @@ RESOLVE = ComputePass(
         ("channel_count", "int"),
     ),
     includes=("triangle_record",),
+    switches=("channel_count",),
 )
 
 #: The triangle that each pixel sees, at its center or else at the nearest sample.
@@ -344,6 +345,14 @@ DIRECTIONS = ComputePass(
         ("wobble_strength", "float"),
     ),
     includes=("surface_continuity", "screen_direction"),
+    switches=(
+        "degree",
+        "line_count",
+        "sheet_count",
+        "harmonic_count",
+        "first_harmonic",
+        "foreshorten",
+    ),
 )
 
 #: `DIRECTIONS` for noise of three channels.
@@ -417,6 +426,7 @@ ANGLE_GRADIENT = ComputePass(
     ("cells", "directions[]"),
     (("angle_gradients[]", "RGBA16F"),),
     (*_BOX_ORIGIN, *_COVERING[1:]),
+    switches=("line_count", "sheet_count"),
 )
 
 #: The derivatives of the noise, for streaks of pixels that have several samples.
@@ -514,6 +524,7 @@ LIGHTING = ComputePass(
         ("is_shadowed", "int"),
         ("is_first", "int"),
     ),
+    switches=("light_kind", "is_shadowed", "is_first"),
 )
 
 TONE = ComputePass(
@@ -541,6 +552,7 @@ TONE = ComputePass(
         ("values_scale", "float"),
     ),
     includes=("triangle_record",),
+    switches=("tone_source", "curve_light", "tone_lit"),
     constants=(("HAS_VALUES", 0),),
 )
 
@@ -587,6 +599,7 @@ _LINE_FILES = (
     *("ibfv_decay", "lic_carried", "lic_lines"),
 )
 _LINE_SWITCHES = (
+    *("degree", "line_count", "sheet_count"),
     *("kernel", "flow_mode", "is_carried", "magnitude_mode", "noise_channels", "is_antialiased"),
 )
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
-from ..compositor.look import Look, colors_magnitude, colors_values
+from ..compositor.look import Look, colors_magnitude
 from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
@@ -33,14 +33,14 @@ from .background import draw_background
 from .device import Device
 from .even_lines_stage import even_lines_task
 from .frame import Frame
-from .gbuffer_stage import render_gbuffer
+from .gbuffer_stage import gbuffer_shaders, render_gbuffer
 from .ibfv_stage import check_states
 from .lic_stage import largest_magnitude, lic_task
 from .noise_stage import noise_task
 from .outline_stage import outline_task
 from .resources import DrawItem, GpuResources
 from .screen_box import box_size, is_empty, screen_box, union_box
-from .tone_stage import render_target_tones
+from .tone_stage import render_target_tones, tone_shaders
 from .uniforms import NO_CLIP_PLANES, clip_uniforms
 
 #: How much closer to the eye than the surface its picture is drawn, in normalized depth.
@@ -135,7 +135,8 @@ class GpuRenderer:
             )
         yield Progress(0.0, "finding visible pixels")
         frame = self._frame(items, view)
-        look = frame.look
+        shaders = [*gbuffer_shaders(frame), *tone_shaders(frame)]
+        yield from subtask(self.device.compile_task(shaders), 0.0, 0.0)
         name = ("picture", target_key) if frame.samples is None else "shaded_picture"
         picture = self.resources.image(name, *frame.size)
         render_gbuffer(frame)
@@ -144,9 +145,6 @@ class GpuRenderer:
         yield from noise_task(frame)
         yield from even_lines_task(frame)
         yield Progress(0.15, "finding tones")
-        if colors_values(look):
-            compile_task = self.device.compile_task([passes.TONE_AND_VALUES])
-            yield from subtask(compile_task, 0.15, 0.2)
         render_target_tones(frame)
         kinds = frame.kinds
         for index, kind in enumerate(kinds):

@@ -12,6 +12,8 @@ from ..projection.shadow_maps import light_cameras
 from . import passes
 from .defines import HEADLIGHT, SUN_LIGHT, TONE_SOURCES
 from .frame import Frame
+from .passes import ComputePass
+from .resources import DrawItem
 from .screen_box import Box, is_empty, screen_box, union_box
 from .uniforms import (
     camera_uniforms,
@@ -20,6 +22,17 @@ from .uniforms import (
     shadow_uniforms,
     tone_uniforms,
 )
+
+
+def tone_shaders(frame: Frame) -> list[ComputePass]:
+    """Return the shaders of `render_target_tones` that depend on the frame."""
+    shared_uniforms = tone_uniforms(frame.look, frame.camera, frame.reference)
+    sources = {_tone_source(frame, item) for _, item, _ in frame.fields_in_view()}
+    shader = _tone_pass(frame)
+    return [
+        *(passes.LIGHTING.variant(light) for light in _lights(frame)),
+        *(shader.variant({**shared_uniforms, "tone_source": source}) for source in sources),
+    ]
 
 
 def render_target_tones(frame: Frame) -> None:
@@ -36,19 +49,18 @@ def render_target_tones(frame: Frame) -> None:
         "values_bottom": low,
         "values_scale": scale,
     }
-    shader = passes.TONE_AND_VALUES if colors_values(look) else passes.TONE
+    shader = _tone_pass(frame)
     reference_atlas = None if reference is None else frame.resources.reference_atlas(reference)
     lighting = frame.textures["lighting"] = _lighting(frame)
     for instance_id, item, box in frame.fields_in_view():
         atlas = item.mesh.tone_atlas if look.tone == "image" else reference_atlas
-        has_own_tone = look.tone == "picture" or item.mesh.buffers.has_tone
         level = 0 if atlas is None else atlas.max_level
         if atlas is not None and look.tone == "picture":
             requested_level = round(reference.mip_level(frame.camera)) - atlas.skipped_levels
             level = min(max(requested_level, 0), atlas.max_level)
         uniforms = {
             **shared_uniforms,
-            "tone_source": TONE_SOURCES[look.tone] if has_own_tone else 0,
+            "tone_source": _tone_source(frame, item),
             "image_size": (1, 1) if atlas is None else atlas.size,
             "image_level": level,
             "values_texel": item.mesh.buffers.values_texel,
@@ -58,24 +70,39 @@ def render_target_tones(frame: Frame) -> None:
     frame.textures["tones"] = tones
 
 
+def _tone_pass(frame: Frame) -> ComputePass:
+    return passes.TONE_AND_VALUES if colors_values(frame.look) else passes.TONE
+
+
+def _tone_source(frame: Frame, item: DrawItem) -> int:
+    """Return where the tone of an item comes from: the light, if it has none of its own."""
+    has_own_tone = frame.look.tone == "picture" or item.mesh.buffers.has_tone
+    return TONE_SOURCES[frame.look.tone if has_own_tone else "light"]
+
+
+def _lights(frame: Frame) -> list[dict[str, Any]]:
+    """Return the uniforms of the passes that add one light after the other."""
+    return [
+        {
+            **light,
+            "is_shadowed": int(frame.look.shadows and light["light_kind"] != HEADLIGHT),
+            "is_first": int(index == 0),
+        }
+        for index, light in enumerate(light_uniforms(frame.look, frame.lights))
+    ]
+
+
 def _lighting(frame: Frame) -> Any:
     """Return the light of all light sources together, as `shading.diffuse` at full strength."""
     boxes = [screen_box(item, frame.camera) for item in frame.items if item.field is not None]
     box = union_box(boxes)
     images = [frame.resources.image(f"lighting {index}", *frame.size) for index in range(2)]
     normals = frame.textures["normals"]
-    for index, light in enumerate(light_uniforms(frame.look, frame.lights)):
+    for light in _lights(frame):
         if is_empty(box):
             break
-        visibility = normals
-        if frame.look.shadows and light["light_kind"] != HEADLIGHT:
-            visibility = _shadow_visibility(frame, light, box)
-        uniforms = {
-            **camera_uniforms(frame.camera),
-            **light,
-            "is_shadowed": int(visibility is not normals),
-            "is_first": int(index == 0),
-        }
+        visibility = _shadow_visibility(frame, light, box) if light["is_shadowed"] else normals
+        uniforms = {**camera_uniforms(frame.camera), **light}
         textures = {
             "normals": normals,
             "shadow_visibility": visibility,

@@ -74,17 +74,20 @@ class Pair:
         The G-buffer of the card.
     card, numpy : (H, W, 4) float32 ndarray
         The pictures, linear.
+    is_center : (P,) bool ndarray or None
+        The pixels of the G-buffer whose centers show a surface with a field; None if all do.
     """
 
     gbuffer: Any
     images: dict[str, np.ndarray]
     card: np.ndarray
     numpy: np.ndarray
+    is_center: np.ndarray | None = None
 
     @property
     def agreement(self) -> float:
         """See `agreement`."""
-        return agreement(self.gbuffer, self.images)
+        return agreement(self.gbuffer, self.images, self.is_center)
 
     @property
     def likeness(self) -> float:
@@ -127,6 +130,10 @@ def draw_pair(
     card_picture = card.read(texture, width, height)
     images = card.read_gbuffer(view.camera)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
+    is_center = None
+    if supersampling > 1:
+        centers = rosy.project(instances, view.camera, look.display)
+        is_center = np.isin(gbuffer.pixel, centers.pixel)
     has_flow = module_of(rosy.package, "compositor.look").has_flow
     if look.method == "ibfv":
         numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
@@ -141,6 +148,7 @@ def draw_pair(
         {name: np.array(image) for name, image in images.items()},
         card_picture,
         numpy_picture,
+        is_center,
     )
 
 
@@ -154,7 +162,9 @@ def draw_on_card(
     return card.read(texture, camera.width, camera.height)
 
 
-def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
+def agreement(
+    gbuffer: Any, images: dict[str, np.ndarray], is_center: np.ndarray | None = None
+) -> float:
     """Return the fraction of pixels at which both G-buffers agree.
 
     The pixels are those that at least one of the G-buffers covers with a field. They agree if
@@ -167,12 +177,17 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
     - the representations z differ by at most `MAX_DIFFERENCE` times the greater modulus; 0 agrees
       only with 0.
 
+    Where only samples beside the center show a surface, the two take other points of the triangle. There,
+    the instance has to agree.
+
     Parameters
     ----------
     gbuffer : GBuffer
         The G-buffer of numpy.
     images : dict of str to (H, W, 4) ndarray
         The G-buffer of the card; see `GpuRenderer.read_gbuffer`.
+    is_center : (P,) bool ndarray, optional
+        As of `Pair`.
     """
     camera, pixel = gbuffer.camera, gbuffer.pixel
     normals, values = (images[name].reshape(-1, 4) for name in ("normals", "field_values"))
@@ -192,6 +207,8 @@ def agreement(gbuffer: Any, images: dict[str, np.ndarray]) -> float:
     z = values[:, 0] + 1j * values[:, 1]
     expected = gbuffer.representation.astype(np.complex128)
     same &= np.abs(z - expected) <= MAX_DIFFERENCE * np.maximum(np.abs(z), np.abs(expected))
+    if is_center is not None:
+        same |= ~is_center & (values[:, 3] == gbuffer.instance_id + 1)
     return np.count_nonzero(same) / either
 
 

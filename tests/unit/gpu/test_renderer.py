@@ -493,12 +493,7 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
 def assert_parity(
     card, instances, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, reference=None
 ):
-    """Compare the picture of the card with numpy's, and return both.
-
-    If pixels have several samples, the two take other points of triangles beside their centers.
-    """
-    if look.supersampling > 1:
-        agreement -= 0.02
+    """Compare the picture of the card with numpy's, and return both."""
     pair = draw_pair(ROSY, card, instances, camera, look, lights, reference)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)

@@ -3,8 +3,8 @@
 A frame is the work after the camera has moved: from triangles and fields on the card to the picture
 on the card. Nothing is uploaded or read back, and a frame ends when the card is done. The card's own
 time is that between its first and its last command, by its timer. It contains that of Python, which sends
-the commands, only where the card waits for them. Needs numpy, moderngl
-and a driver with EGL, but neither Blender nor a display.
+the commands, only where the card waits for them. Needs numpy, moderngl and a driver with EGL, but neither
+Blender nor a display.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class Frames:
         self.device = device
         self.size = size
         self.look = look
-        self.renderer = GpuRenderer(self.device)
+        self.renderer = GpuRenderer(device)
         self.items: list[DrawItem] = self.renderer.upload(
             [cases.instance(TRIANGLES, degree)], "smooth"
         )

@@ -24,6 +24,9 @@ from .uniforms import camera_uniforms, instance_uniforms
 #: The smallest id in the id buffer. Ids are the bits of floats, which are then neither 0 nor subnormal.
 FIRST_TRIANGLE_ID = 0x00800000
 
+#: Above all ids: the bits of infinity.
+STOP_ID = 0x7F800000
+
 
 @dataclass(eq=False)
 class Frame:
@@ -69,27 +72,19 @@ class Frame:
 
     @cached_property
     def first_triangle_ids(self) -> list[int]:
-        """The id of the first triangle of each item in the id buffer."""
-        ids = dict(zip(self._items_by_id, self._id_ends, strict=False))
-        return [ids[index] for index in range(len(self.items))]
-
-    @cached_property
-    def occluder_id(self) -> int:
-        """The first id of triangles without a field, which only occlude. All others are before."""
-        return self._id_ends[sum(item.field is not None for item in self.items)]
-
-    @cached_property
-    def _items_by_id(self) -> list[int]:
-        """The items in the order of their ids: those with a field first."""
-        return sorted(range(len(self.items)), key=lambda index: self.items[index].field is None)
-
-    @cached_property
-    def _id_ends(self) -> list[int]:
-        """The first id of each item in that order, and the end of the last one."""
-        counts = [self.items[index].mesh.buffers.triangle_count for index in self._items_by_id]
+        """The id of the first triangle of each item in the id buffer; those that only occlude are last."""
+        order = sorted(range(len(self.items)), key=lambda index: self.items[index].field is None)
+        counts = [self.items[index].mesh.buffers.triangle_count for index in order]
         # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
         spans = [count + count // MAX_TRIANGLES for count in counts]
-        return list(accumulate(spans, initial=FIRST_TRIANGLE_ID))
+        ids = accumulate(spans, initial=FIRST_TRIANGLE_ID)
+        return [first_id for _, first_id in sorted(zip(order, ids, strict=False))]
+
+    @property
+    def occluder_id(self) -> int:
+        """The first id of triangles without a field, which only occlude. All others are before."""
+        ids = zip(self.first_triangle_ids, self.items, strict=True)
+        return min((first_id for first_id, item in ids if item.field is None), default=STOP_ID)
 
     @property
     def kinds(self) -> list[FieldKind]:

@@ -70,7 +70,7 @@ def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
             "sample_visibility": samples.textures["visibility"],
         },
         {"visibility": visibility},
-        {"samples_per_side": frame.samples_per_side, "stop_id": frame.occluder_id},
+        {"samples_per_side": frame.samples_per_side, "occluder_id": frame.occluder_id},
     )
     return visibility
 

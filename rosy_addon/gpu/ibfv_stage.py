@@ -77,8 +77,9 @@ def check_states(look: Look, size: tuple[int, int], degree: int) -> None:
     """
     if is_carried(look) and not states_fit(size, degree):
         raise RosyError(
-            f"a frame of {size[0]} x {size[1]} pixels with {degree} directions takes too much memory of the graphics card with the method 'ibfv': choose a smaller size, "
-            "another method, or the processor"
+            f"a frame of {size[0]} x {size[1]} pixels with {degree} directions takes too much memory of "
+            "the graphics card with the method 'ibfv': choose a smaller size, another method, or the "
+            "processor"
         )
 
 

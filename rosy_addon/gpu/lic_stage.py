@@ -52,8 +52,8 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     """
     look, resources = frame.look, frame.resources
     covering = covering_uniforms(kind, look)
-    uniforms = {**covering, **look_uniforms(kind, look)}
-    uniforms["is_antialiased"] = int(frame.samples is not None)
+    is_antialiased = int(frame.samples is not None)
+    uniforms = {**covering, **look_uniforms(kind, look), "is_antialiased": is_antialiased}
     if is_carried(look) and states_fit(frame.size, kind.degree):
         uniforms |= carried_uniforms(kind, look_for_symmetry(frame.look, kind.symmetry))
     traces_lines = not uniforms["is_carried"] or uniforms["overshoot_steps"] > 0
@@ -78,22 +78,30 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
             frame, kind, box, passes.LIC, textures, {"picture": picture}, uniforms
         )
         return
-    textures["line_means"] = textures["directions"]
-    has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
-    if has_streaks or uniforms["overshoot_steps"]:
-        means = resources.image("line_means", *frame.size, "RGBA16F", kind.line_count)
-        images = {"line_means": means}
-        yield from _trace_task(frame, kind, box, passes.STREAKS, textures, images, uniforms)
-        textures["line_means"] = means
-    if has_streaks and frame.samples is not None:
-        smooth = resources.image("smooth_means", *frame.size, "RGBA16F", kind.line_count)
-        images = {"smooth_means": smooth}
-        frame.run(passes.SMOOTH_STREAKS, box, textures, images, uniforms, kind.line_count)
-        textures["line_means"] = smooth
+    textures["line_means"] = yield from _streaks_task(frame, kind, box, textures, uniforms)
     textures |= _ink_textures(frame, kind, textures)
     yield Progress(1.0, "drawing the ink")
     yield from resources.device.compile_task([passes.INK.variant(uniforms)])
     frame.run(passes.INK, box, textures, {"picture": picture}, uniforms)
+
+
+def _streaks_task(
+    frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
+) -> Task[Any]:
+    """Return the means along the lines of a look with ink; another texture if it needs none."""
+    image, layers = frame.resources.image, kind.line_count
+    has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
+    if not (has_streaks or uniforms["overshoot_steps"]):
+        return textures["directions"]
+    means = image("line_means", *frame.size, "RGBA16F", layers)
+    images = {"line_means": means}
+    yield from _trace_task(frame, kind, box, passes.STREAKS, textures, images, uniforms, layers)
+    if frame.samples is None or not has_streaks:
+        return means
+    smooth = image("smooth_means", *frame.size, "RGBA16F", layers)
+    textures, images = {**textures, "line_means": means}, {"smooth_means": smooth}
+    frame.run(passes.SMOOTH_STREAKS, box, textures, images, uniforms, layers)
+    return smooth
 
 
 def _ink_textures(frame: Frame, kind: FieldKind, textures: dict[str, Any]) -> dict[str, Any]:
@@ -123,6 +131,7 @@ def _trace_task(
     textures: dict[str, Any],
     images: dict[str, Any],
     uniforms: dict[str, Any],
+    layers: int = 1,
 ) -> Task[None]:
     """Run a pass that traces streamlines, in bands: all lines of a pixel, or a layer for each line."""
     yield Progress(0.0, "measuring streaks")
@@ -135,7 +144,6 @@ def _trace_task(
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
     band_rows = groups * WORKGROUP_SIZE[1]
-    layers = kind.line_count if "line_means" in images else 1
     for start in range(bottom, top, band_rows):
         band = left, start, right, min(start + band_rows, top)
         frame.run(shader, band, textures, images, uniforms, layers)

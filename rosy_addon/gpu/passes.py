@@ -220,7 +220,7 @@ PIXEL_VISIBILITY = ComputePass(
     "pixel_visibility",
     ("center_visibility", "sample_visibility"),
     (("visibility", "R32F"),),
-    (*_BOX_ORIGIN, ("samples_per_side", "int"), ("stop_id", "int")),
+    (*_BOX_ORIGIN, ("samples_per_side", "int"), ("occluder_id", "int")),
 )
 
 #: The pixel whose surface each sample of an instance shows.
@@ -426,6 +426,7 @@ ANGLE_GRADIENT = ComputePass(
     ("cells", "directions[]"),
     (("angle_gradients[]", "RGBA16F"),),
     (*_BOX_ORIGIN, *_COVERING[1:]),
+    includes=("line_neighbor",),
     switches=("line_count", "sheet_count"),
 )
 
@@ -590,12 +591,11 @@ _LINES: Uniforms = (
     ("full_samples", "float"),
     ("step_length", "float"),
     ("noise_channels", "int"),
-    ("family_count", "int"),
     ("break_samples", "float"),
     ("is_antialiased", "int"),
 )
 _LINE_FILES = (
-    *("magnitude", "line_angle", "pixel_tone", "full_samples", "lic_trace", "ibfv_source"),
+    *("magnitude", "line_angle", "pixel_tone", "gray", "full_samples", "lic_trace", "ibfv_source"),
     *("ibfv_decay", "lic_carried", "lic_lines"),
 )
 _LINE_SWITCHES = (
@@ -612,11 +612,12 @@ LIC = ComputePass(
         *_LINES,
         ("crossing_correlation", "float"),
         ("gain", "float"),
+        ("family_count", "int"),
         ("family_channel", "int"),
         ("hue_sharpness", "float"),
         ("colors_values", "int"),
     ),
-    includes=(*_LINE_FILES, "mapped_color"),
+    includes=(*_LINE_FILES, "line_family", "mapped_color"),
     switches=(*_LINE_SWITCHES, "colors_values", "family_count"),
     constants=(("break_steps", 0), ("overshoot_steps", 0), ("even_lines", 0)),
 )
@@ -702,7 +703,15 @@ INK = ComputePass(
         ("crowded_pixels", "vec2"),
     ),
     includes=(
-        *("magnitude", "line_angle", "line_member", "pixel_tone", "mapped_color"),
+        *(
+            "magnitude",
+            "line_angle",
+            "line_family",
+            "line_member",
+            "pixel_tone",
+            "gray",
+            "mapped_color",
+        ),
         *("inks", "ink_even_lines", "line_neighbor"),
     ),
     switches=(

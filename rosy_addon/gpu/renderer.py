@@ -15,7 +15,7 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
-from ..compositor.look import Look, colors_magnitude
+from ..compositor.look import colors_magnitude
 from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
@@ -162,17 +162,13 @@ class GpuRenderer:
         """Return the frame of the pixels, and of their samples, if these are several."""
         look = look_in_pixels(view.look, view.sample_camera, [item.instance for item in items])
         clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
-
-        def frame_of(camera: Camera, look: Look, samples: Frame | None = None) -> Frame:
-            return Frame(
-                *(self.resources, items, camera, look, view.lights, view.reference, clip_planes),
-                samples,
-            )
-
+        lights, reference = view.lights, view.reference
+        frame = Frame(self.resources, items, view.camera, look, lights, reference, clip_planes)
         if look.supersampling == 1:
-            return frame_of(view.camera, look)
-        samples = frame_of(view.sample_camera, supersampled_look(look))
-        return frame_of(view.camera, replace(look, supersampling=1), samples)
+            return frame
+        fine_look = supersampled_look(look)
+        samples = replace(frame, camera=view.sample_camera, look=fine_look, textures={})
+        return replace(frame, look=replace(look, supersampling=1), samples=samples)
 
     def composite(
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0

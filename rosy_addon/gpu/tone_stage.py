@@ -27,7 +27,7 @@ from .uniforms import (
 def tone_shaders(frame: Frame) -> list[ComputePass]:
     """Return the shaders of `render_target_tones` that depend on the frame."""
     shared_uniforms = tone_uniforms(frame.look, frame.camera, frame.reference)
-    sources = {_tone_source(frame, item) for _, item, _ in frame.fields_in_view()}
+    sources = {_tone_source(frame, item) for item in frame.items if item.field is not None}
     shader = _tone_pass(frame)
     return [
         *(passes.LIGHTING.variant(light) for light in _lights(frame)),

@@ -39,10 +39,7 @@ from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
 from ..compositor.look import Look, colors_values, has_flow, is_hatched
-from ..compositor.look_units import (
-    cell_size_args,
-    instance_line_spacing,
-)
+from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
 from ..compositor.streak_statistics import (

@@ -4,15 +4,12 @@
 // The sine of the angle from a direction to that of the same sheet at a neighbor.
 float angle_difference(ivec2 pixel, int line, ivec2 offset, vec2 direction, float phase)
 {
-  int bit = offset.x + 3 * offset.y + 4;
-  if (((neighbor_mask(phase) >> bit) & 1) == 0) {
+  int sheet = neighbor_sheet(pixel, line, offset, phase);
+  if (sheet < 0) {
     return 0.0;
   }
-  ivec2 neighbor = pixel + offset;
-  float neighbor_phase = texelFetch(cells, neighbor, 0).x;
-  int sheet = wrap_once(line + int(round(phase - neighbor_phase)), sheet_count);
-  bool is_opposite = sheet_count == 2 * line_count && sheet >= line_count;
-  ivec3 texel = ivec3(neighbor, is_opposite ? sheet - line_count : sheet);
+  bool is_opposite = sheet >= line_count;
+  ivec3 texel = ivec3(pixel + offset, is_opposite ? sheet - line_count : sheet);
   vec2 line_direction = unit_or_zero(texelFetch(directions, texel, 0).xy);
   vec2 relative = times(is_opposite ? -line_direction : line_direction, conjugate(direction));
   return relative.x > 0.0 ? relative.y : 0.0;

@@ -21,13 +21,8 @@ void main()
     return;
   }
   vec4 value = texelFetch(field_values, pixel, 0);
-  float line_angle = line_angle_of(pixel, value.xy), family_angle = 0.0;
-  int known_families = 1;
-  if (family_count > 1) {
-    vec2 family_value = texelFetch(field_channels, ivec3(pixel, family_channel), 0).xy;
-    family_angle = angle_of(family_value);
-    known_families = family_value == vec2(0.0) ? 1 : family_count;
-  }
+  float line_angle = line_angle_of(pixel, value.xy);
+  Families families = families_at(pixel);
   float pixel_tone = tone_at(pixel), value_position = texelFetch(tones, pixel, 0).w;
   bool is_colored_by_magnitude = (magnitude_mode & MAGNITUDE_COLOR) != 0;
   vec3 one_ink = vec3(0.0), ink_light = vec3(1.0);
@@ -80,7 +75,7 @@ void main()
     if (ink_count > 1) {
       float ink_index = soft_rank(line_rank(line, line_angle), line_count);
       if (family_count > 1) {
-        int family = line_family(line, line_angle + guiding_angle, family_angle, known_families);
+        int family = line_family(line, line_angle, families);
         ink_index = float(min(family, ink_count - 1));
       }
       ink = ink_of_tone(ink_index, pixel_tone);
@@ -115,8 +110,7 @@ void main()
         slopes.x = mix(slopes.x, slopes.y, break_weight);
       }
       if (is_undirected) {
-        float mean = noise_channels == 1 ? disc_noise.x : dot(disc_noise, vec3(1.0 / 3.0));
-        streak = mean / disc_std;
+        streak = gray(disc_noise) / disc_std;
       }
       float threshold = coverage_threshold(darkness, int(is_undirected));
       coverage = ink_above_threshold(streak + grain_offset, threshold, slopes.x);

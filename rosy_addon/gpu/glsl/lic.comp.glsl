@@ -14,13 +14,8 @@ void main()
   }
   vec4 value = texelFetch(field_values, pixel, 0);
   float relative_magnitude = magnitude_mode != 0 ? magnitude_share(value.xy) : 1.0;
-  float line_angle = line_angle_of(pixel, value.xy), family_angle = 0.0;
-  int known_families = 1;
-  if (family_count > 1) {
-    vec2 family_value = texelFetch(field_channels, ivec3(pixel, family_channel), 0).xy;
-    family_angle = angle_of(family_value);
-    known_families = family_value == vec2(0.0) ? 1 : family_count;
-  }
+  float line_angle = line_angle_of(pixel, value.xy);
+  Families families = families_at(pixel);
   vec3 source = is_carried != 0 ? sharpened_source(pixel, cell) : vec3(0.0);
   Reach reach = reach_at(relative_magnitude);
   vec3 lic_sum = vec3(0.0), hue_sum = vec3(0.0);
@@ -31,7 +26,7 @@ void main()
     sample_sum += filtered.samples;
     if (family_count > 1) {
       float weight = exp(hue_sharpness * gray(filtered.mean));
-      int family = line_family(line, line_angle + guiding_angle, family_angle, known_families);
+      int family = line_family(line, line_angle, families);
       family = modulo(family, textureSize(palette, 0).x);
       hue_sum += weight * texelFetch(palette, ivec2(family, 0), 0).xyz;
       hue_weight += weight;

@@ -18,11 +18,6 @@ struct FilteredLine {
   float tone;
 };
 
-float gray(vec3 mean)
-{
-  return noise_channels == 1 ? mean.x : (mean.x + mean.y + mean.z) / 3.0;
-}
-
 // `relative_magnitude` is 1 if the magnitude is not drawn.
 Reach reach_at(float relative_magnitude)
 {

@@ -1,14 +1,20 @@
-// The texel of the line of a neighbor that continues a line, in arrays with a layer for each line; the line
-// itself where the surface does not continue.
-ivec3 neighbor_line(ivec2 pixel, int line, ivec2 offset, float phase)
+// The sheet of a neighbor that continues that of a line; -1 where the surface does not continue.
+int neighbor_sheet(ivec2 pixel, int line, ivec2 offset, float phase)
 {
   int bit = offset.x + 3 * offset.y + 4;
   if (((neighbor_mask(phase) >> bit) & 1) == 0) {
-    return ivec3(pixel, line);
+    return -1;
   }
   float neighbor_phase = texelFetch(cells, pixel + offset, 0).x;
-  int sheet = wrap_once(line + int(round(phase - neighbor_phase)), sheet_count);
-  return ivec3(pixel + offset, sheet >= line_count ? sheet - line_count : sheet);
+  return wrap_once(line + int(round(phase - neighbor_phase)), sheet_count);
+}
+
+// The same in arrays with a layer for each line: its texel, or that of the line itself.
+ivec3 neighbor_line(ivec2 pixel, int line, ivec2 offset, float phase)
+{
+  int sheet = neighbor_sheet(pixel, line, offset, phase);
+  return sheet < 0 ? ivec3(pixel, line) :
+                     ivec3(pixel + offset, sheet >= line_count ? sheet - line_count : sheet);
 }
 
 // The neighbor in the direction of a line.

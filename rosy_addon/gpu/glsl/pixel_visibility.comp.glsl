@@ -1,10 +1,10 @@
 // The triangle that each pixel sees at its center. Where there is none, that of the nearest of its samples that
-// sees one, as `rasterizer.SampledTriangles`. Ids from stop_id on are of triangles that only occlude.
+// sees one, as `rasterizer.SampledTriangles`. Ids from occluder_id on are of triangles that only occlude.
 
 bool is_drawn(float id)
 {
   int bits = floatBitsToInt(id);
-  return bits != 0 && bits < stop_id;
+  return bits != 0 && bits < occluder_id;
 }
 
 void main()

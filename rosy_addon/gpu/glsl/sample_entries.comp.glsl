@@ -17,11 +17,7 @@ Point sample_point(int triangle, ivec2 sample_)
 {
   Corners corners = corners_to_camera(corner_positions(triangle));
   vec2 ray = pixel_ray(sample_, vec2(imageSize(sample_entries)), clip_to_camera, lens_shift);
-  vec3 edges = edge_functions(corners, ray);
-  float total = edges.x + edges.y + edges.z;
-  vec3 weights = total == 0.0 ? vec3(1.0 / 3.0) : max(edges / total, 0.0);
-  weights /= weights.x + weights.y + weights.z;
-  float z = interpolated(Corners(corners.first.zzz, corners.second.zzz, corners.third.zzz), weights).x;
+  float z = interpolated(corners, weights_at(corners, ray)).z;
   Point point;
   point.position = (vec2(sample_) + 0.5) / float(samples_per_side);
   point.depth = is_perspective != 0 ? -1.0 / z : z;

@@ -33,15 +33,6 @@ vec3 apply_curve(vec3 tone)
   return curve_power == 1.0 ? stretched : pow(stretched, vec3(curve_power));
 }
 
-// Barycentric coordinates of the point of a triangle that a pixel sees.
-vec3 weights_at(Corners corners, vec2 ray)
-{
-  vec3 edges = edge_functions(corners, ray);
-  float total = edges.x + edges.y + edges.z;
-  vec3 weights = total == 0.0 ? vec3(1.0 / 3.0) : max(edges / total, 0.0);
-  return weights / (weights.x + weights.y + weights.z);
-}
-
 #if HAS_VALUES
 // Where the number of the surface is in the color map, from 0 to 1; -1 if there is none.
 float map_position(int triangle, vec2 ray)

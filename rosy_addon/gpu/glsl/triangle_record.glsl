@@ -79,3 +79,12 @@ vec3 edge_functions(Corners corners, vec2 ray)
   vec2 r = relative_to_ray(corners.third, ray);
   return vec3(q.x * r.y - r.x * q.y, r.x * p.y - p.x * r.y, p.x * q.y - q.x * p.y);
 }
+
+// Barycentric coordinates of the point of a triangle that a pixel sees.
+vec3 weights_at(Corners corners, vec2 ray)
+{
+  vec3 edges = edge_functions(corners, ray);
+  float total = edges.x + edges.y + edges.z;
+  vec3 weights = total == 0.0 ? vec3(1.0 / 3.0) : max(edges / total, 0.0);
+  return weights / (weights.x + weights.y + weights.z);
+}

@@ -1,0 +1,24 @@
+// The families of the lines of a pixel: the stored angle, and their number; 1 at a pixel without families.
+struct Families {
+  float angle;
+  int count;
+};
+
+Families families_at(ivec2 pixel)
+{
+  if (family_count == 1) {
+    return Families(0.0, 1);
+  }
+  vec2 value = texelFetch(field_channels, ivec3(pixel, family_channel), 0).xy;
+  return Families(angle_of(value), value == vec2(0.0) ? 1 : family_count);
+}
+
+// The family of a line, as `family_hues`. `line_angle` is that of line 0.
+int line_family(int line, float line_angle, Families families)
+{
+  // For odd N, every other line is the opposite half of a member.
+  float opposite = (sheet_count > degree && (degree & line & 1) == 1) ? 0.5 * TAU : 0.0;
+  float angle = line_angle + guiding_angle + opposite + TAU * float(line) / float(sheet_count);
+  float forward = (angle * float(degree) - families.angle * float(family_count)) / TAU;
+  return modulo(int(round(forward)), families.count);
+}

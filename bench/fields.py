@@ -8,9 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from rosy_addon.field.connection import Connection, build_connection, laplacian
-from rosy_addon.field.smoothest import smallest_eigenvectors_task, smoothest_field
+from rosy_addon.field.smoothest import smallest_eigenvectors, smoothest_field
 from rosy_addon.field.sparse_multigrid import CSRMatrix
-from rosy_addon.progress import run_to_completion
 
 from . import cases
 from .timing import Case, compare, main
@@ -41,7 +40,7 @@ def measure(runs: int) -> Iterator[Case]:
 
     yield compare(
         f"smoothest field / SciPy's LU and {ITERATIONS} iterations, 200K triangles, N = {DEGREE}",
-        lambda: run_to_completion(smallest_eigenvectors_task(connection, DEGREE)),
+        lambda: smallest_eigenvectors(connection, DEGREE),
         solve_with_scipy,
         target=1.5,
         higher_is_better=False,

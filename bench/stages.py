@@ -13,7 +13,7 @@ from rosy_addon.compositor.lic import METHODS, look_noise
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
 from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.corner_field import corner_field_task
+from rosy_addon.projection.corner_field import compute_corner_field
 from rosy_addon.projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from rosy_addon.projection.project import project
 from rosy_addon.projection.rasterizer import rasterize
@@ -48,8 +48,8 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     clip = points @ (camera.projection @ camera.view).T
     triangle = instance.surface.triangle_vertex
     return {
-        "average the field at the corners, once per mesh": lambda: run_to_completion(
-            corner_field_task(instance.surface, instance.matrix, instance.field, look.display)
+        "average the field at the corners, once per mesh": lambda: compute_corner_field(
+            instance.surface, instance.matrix, instance.field, look.display
         ),
         "project": lambda: project([instance], camera, look.display, cache),
         "  of which rasterize": lambda: rasterize(clip, triangle, camera.width, camera.height),

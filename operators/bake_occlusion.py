@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..rosy_addon.progress import Task
+from ..rosy_addon.progress import Task, as_task
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
-from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion_task
+from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.scene_reader import field_objects
 from .modal_task import ModalTaskMixin
 from .poll import poll_has_field
@@ -37,7 +37,7 @@ class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
     def make_task(self, context: bpy.types.Context) -> Task[None]:
         depsgraph = context.evaluated_depsgraph_get()
         objects = field_objects(context.view_layer)
-        return store_occlusion_task(depsgraph, objects, direction_count=self.directions)
+        return as_task(store_occlusion, depsgraph, objects, direction_count=self.directions)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return field_objects(context.view_layer)

@@ -10,12 +10,12 @@ import numpy as np
 
 from ..rosy_addon.errors import counted
 from ..rosy_addon.field.analysis import format_degrees
-from ..rosy_addon.progress import Task
+from ..rosy_addon.progress import Task, as_task
 from ..rosy_addon.scene.field_difference import (
     DIFFERENCE_ATTRIBUTE,
     FieldDifference,
     other_field_names,
-    store_difference_task,
+    store_difference,
 )
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects
@@ -55,7 +55,7 @@ class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
 
     def make_task(self, context: bpy.types.Context) -> Task[FieldDifference]:
         (mesh,) = self.required_data(context)
-        return store_difference_task(mesh, self.other)
+        return as_task(store_difference, mesh, self.other)
 
     def finish(self, context: bpy.types.Context, result: FieldDifference) -> None:
         if self.use_as_color:

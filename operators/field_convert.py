@@ -10,15 +10,15 @@ from typing import Any, TypeVar
 import bpy
 
 from ..rosy_addon.errors import RosyError, counted
-from ..rosy_addon.field.convert import Conversion, convert_task
+from ..rosy_addon.field.convert import Conversion, convert
 from ..rosy_addon.field.curvature import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
-from ..rosy_addon.progress import Progress, Task, subtask
+from ..rosy_addon.progress import Progress, Task, as_task, subtask
 from ..rosy_addon.scene.face_values import read_face_scalars
 from ..rosy_addon.scene.field_attributes import has_field
-from ..rosy_addon.scene.meshes import mesh_surface_task
+from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
-from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents_task
+from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from .modal_task import ModalTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
@@ -160,7 +160,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
 
     def _converted_task(self, mesh: bpy.types.Mesh) -> Task[RosyField]:
         """Return the converted field of a mesh."""
-        surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.0)
+        surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.0)
         yield Progress(0.0, "reading the field")
         field = read_mesh_field(mesh, surface=surface)
         values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
@@ -172,7 +172,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         conversion = Conversion(
             self.degree or None, self.angle, self.smooth, self.pair_distance, magnitude
         )
-        field = yield from convert_task(surface, field, conversion)
+        field = yield from as_task(convert, surface, field, conversion)
         return replace(field, source_directions=None)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
@@ -211,7 +211,7 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
             tangents = yield from self.each_mesh_task(
-                context, lambda mesh: mesh_tangents_task(mesh, guiding_angle, self.attribute)
+                context, lambda mesh: as_task(mesh_tangents, mesh, guiding_angle, self.attribute)
             )
             assign_tangents(tangents, self.attribute)
             return len(tangents)
@@ -233,7 +233,7 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
 
 def _field_task(mesh: bpy.types.Mesh) -> Task[RosyField]:
     """Return the field of a mesh."""
-    surface = yield from mesh_surface_task(mesh)
+    surface = yield from as_task(mesh_surface, mesh)
     yield Progress(1.0, "reading the field")
     return read_mesh_field(mesh, surface=surface)
 

@@ -9,13 +9,13 @@ import bpy
 from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.field_io import write_field_task
+from ..rosy_addon.field.field_io import write_field
 from ..rosy_addon.field.rosy_field import RosyField
-from ..rosy_addon.progress import Task, subtask
+from ..rosy_addon.progress import Task, as_task, subtask
 from ..rosy_addon.scene.combed_guides import read_combed_guides
 from ..rosy_addon.scene.field_attributes import field_degree
-from ..rosy_addon.scene.meshes import mesh_label, mesh_surface_task
-from ..rosy_addon.scene.read_field import read_mesh_field_task
+from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
+from ..rosy_addon.scene.read_field import read_mesh_field
 from .modal_task import DialogTaskMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
 
@@ -104,14 +104,14 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
 
 def _export_task(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Task[Path]:
     """Read the field or the combed guides of a mesh, and write them to a file."""
-    surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
+    surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.2)
     if is_guides:
         field = RosyField(field_degree(mesh), read_combed_guides(mesh, surface))
         if not field.vectors.any():
             raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
     else:
-        field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.2, 0.4)
-    yield from subtask(write_field_task(path, field, surface), 0.4, 1.0)
+        field = yield from subtask(as_task(read_mesh_field, mesh, surface=surface), 0.2, 0.4)
+    yield from subtask(as_task(write_field, path, field, surface), 0.4, 1.0)
     return path
 
 

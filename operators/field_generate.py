@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 
 from ..rosy_addon.errors import NoFeaturesError, RosyError, counted
-from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate_task
+from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
-from ..rosy_addon.field.singularities import description_task
+from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface, orientation_warning
-from ..rosy_addon.progress import Progress, Task, subtask
+from ..rosy_addon.progress import Progress, Task, as_task, subtask
 from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..rosy_addon.scene.guides import (
     annotation_strokes,
@@ -25,7 +25,7 @@ from ..rosy_addon.scene.guides import (
     guide_strokes_and_empties,
     guide_vectors,
 )
-from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface_task
+from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
 from ..rosy_addon.scene.singularity_points import (
     INDEX_ATTRIBUTE,
     has_points,
@@ -188,7 +188,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         """
         inputs, fields, errors = [], {}, []
         for mesh in self.required_data(context):
-            surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.0)
+            surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.0)
             try:
                 settings = self._generator_settings(context, mesh, surface)
             except NoFeaturesError as error:
@@ -196,7 +196,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 continue
             inputs.append((mesh, surface, settings))
         for index, (mesh, surface, settings) in enumerate(inputs):
-            task = generate_task(surface, settings, self.degree)
+            task = as_task(generate, surface, settings, self.degree)
             try:
                 field = yield from subtask(task, index / len(inputs), (index + 1) / len(inputs))
             except NoFeaturesError as error:
@@ -235,7 +235,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         """Return what the message says about the fields. Counting must not take long."""
         face_count = sum(surface.face_count for surface, _ in fields)
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
-        return (yield from description_task(fields, count_singularities=is_cheap))
+        return (yield from as_task(description, fields, count_singularities=is_cheap))
 
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface

@@ -10,10 +10,10 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..rosy_addon.errors import counted
 from ..rosy_addon.field.directional_field import field_directions
-from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field_task
+from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.progress import Progress, Task, subtask
-from ..rosy_addon.scene.meshes import mesh_surface_task
+from ..rosy_addon.progress import Progress, Task, as_task, subtask
+from ..rosy_addon.scene.meshes import mesh_surface
 from .modal_task import DialogTaskMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
 from .reports import report_warning
@@ -78,8 +78,9 @@ class ROSY_OT_field_import(DialogTaskMixin, bpy.types.Operator, ImportHelper):
     def make_task(self, context: bpy.types.Context) -> Task[LoadedField]:
         """Read the field, then store it."""
         mesh = selected_mesh_objects(context)[0].data
-        surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.2)
-        loading = load_field_task(
+        surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.2)
+        loading = as_task(
+            load_field,
             bpy.path.abspath(self.filepath),
             surface,
             self.degree or None,

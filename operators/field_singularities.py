@@ -8,9 +8,9 @@ from dataclasses import replace
 import bpy
 
 from ..rosy_addon.errors import REPORTED_ERRORS
-from ..rosy_addon.field.singularity_moves import OUTSIDE, move_index_task
-from ..rosy_addon.progress import Progress, Task, subtask
-from ..rosy_addon.scene.meshes import mesh_surface_task
+from ..rosy_addon.field.singularity_moves import OUTSIDE, move_index
+from ..rosy_addon.progress import Progress, Task, as_task, subtask
+from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.ui import singularity_handles
 from .modal_task import ModalTaskMixin
@@ -76,11 +76,17 @@ class ROSY_OT_field_singularities(ModalTaskMixin, bpy.types.Operator):
     def make_task(self, context: bpy.types.Context) -> Task[None]:
         """Change the field of the active mesh."""
         (mesh,) = self.required_data(context)
-        surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.0)
+        surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.0)
         yield Progress(0.0, "reading the field")
         field = read_mesh_field(mesh, surface=surface)
-        task = move_index_task(
-            surface, field, self.source, self.target, self.index, self.reach * surface.extent
+        task = as_task(
+            move_index,
+            surface,
+            field,
+            self.source,
+            self.target,
+            self.index,
+            self.reach * surface.extent,
         )
         field = yield from subtask(task, 0.0, 1.0)
         store_fields(self, context, {mesh: replace(field, source_directions=None)})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from math import degrees
 from pathlib import Path
 
@@ -13,17 +14,17 @@ from bpy_extras.io_utils import ExportHelper
 from ..rosy_addon.cache import Cache
 from ..rosy_addon.file_io import check_writable
 from ..rosy_addon.gpu.select import select_renderer
-from ..rosy_addon.progress import Task, subtask
+from ..rosy_addon.progress import Task, as_task, subtask
 from ..rosy_addon.projection.camera import check_size
 from ..rosy_addon.rendering.band_workers import BandWorkers
 from ..rosy_addon.scene.look_properties import read_look
-from ..rosy_addon.scene.read_view import read_turntable_task
-from ..rosy_addon.scene.video import encode_video_task
+from ..rosy_addon.scene.read_view import read_turntable
+from ..rosy_addon.scene.video import encode_video
 from ..rosy_addon.turntable_video import (
     check_still,
     check_video_path,
     evicting,
-    turntable_task,
+    turntable,
     turntable_views,
 )
 from ..rosy_addon.ui.preferences import worker_count
@@ -131,7 +132,7 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
         obj = selected_mesh_objects(context)[0]
         check_still(look, self.still, obj.name)
         depsgraph = context.evaluated_depsgraph_get()
-        reading = read_turntable_task(scene, depsgraph, obj, look)
+        reading = as_task(read_turntable, scene, depsgraph, obj, look)
         instance, lights = yield from subtask(reading, 0.0, 0.0)
         size, view_angles = check_size(self.width, self.height), (-25.0, degrees(self.elevation))
         views = turntable_views(
@@ -142,8 +143,14 @@ class ROSY_OT_turntable(ModalTaskMixin, bpy.types.Operator, ExportHelper):
             renderer = select_renderer(
                 scene.rosy.device.lower(), look, cache, keep_gbuffers=self.still, workers=pool
             )
-            task = turntable_task(
-                renderer, evicting(views, cache), self.pictures, path, self.rate, encode_video_task
+            task = as_task(
+                turntable,
+                renderer,
+                evicting(views, cache),
+                self.pictures,
+                path,
+                self.rate,
+                partial(as_task, encode_video),
             )
             return (yield from task)
 

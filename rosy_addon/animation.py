@@ -26,15 +26,15 @@ from .compositor.look import Look, has_flow
 from .errors import RosyError
 from .file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
 from .gpu.select import select_renderer
-from .progress import Progress, Task, run_to_completion, subtask
+from .progress import Progress, Task, as_task, run_to_completion, subtask
 from .projection.camera import Camera
 from .rendering.band_workers import BandWorkers
 from .rendering.renderer import Renderer
-from .rendering.singularities import sequence_key_task
+from .rendering.singularities import sequence_key
 from .rendering.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
-from .scene.blender_images import frame_path, image_data_task, write_frame
+from .scene.blender_images import compute_image_data, frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
 from .scene.keys import update_keys
@@ -47,7 +47,7 @@ from .scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from .scene.read_view import nonfinite_policy, read_views_task, scene_depsgraph
+from .scene.read_view import nonfinite_policy, read_views, scene_depsgraph
 from .scene.scene_reader import SceneData, field_objects, temp_attributes
 
 #: Suffix of a sidecar file, after the name of the picture.
@@ -169,7 +169,7 @@ def bake_animation_task(
         key = PictureKey()
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
-            task = sequence_key_task(scene_data.instances, last_look, cache)
+            task = as_task(sequence_key, scene_data.instances, last_look, cache)
             key = yield from subtask(task, 1.0, 1.0)
         sequence_results = []
         for index, (name, results) in enumerate(frame_results.items()):
@@ -258,7 +258,8 @@ def _frame_task(
     )
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
-    reading = read_views_task(
+    reading = as_task(
+        read_views,
         scene,
         depsgraph,
         sources,
@@ -286,7 +287,7 @@ def _frame_task(
             if sidecar.exists():
                 check_writable(sidecar)
             picture = yield from subtask(renderer.render_task(view), start, stop)
-            image_task = image_data_task(picture, as_float=settings.as_float)
+            image_task = as_task(compute_image_data, picture, as_float=settings.as_float)
             image_data = yield from subtask(image_task, stop, stop)
             sidecar.unlink(missing_ok=True)
             write_frame(path, image_data)

@@ -12,11 +12,11 @@ from .compositor.ink_thresholds import unlit_look
 from .compositor.look import Look, is_hatched
 from .compositor.picture_key import picture_key
 from .gpu.select import select_renderer
-from .progress import Progress, Task, run_to_completion, subtask
+from .progress import Progress, Task, as_task, run_to_completion, subtask
 from .rendering.band_workers import BandWorkers
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
-from .scene.blender_images import image_data_task
+from .scene.blender_images import compute_image_data
 from .scene.cameras import CameraSource, render_camera
 from .scene.keys import update_keys
 from .scene.look_properties import look_at_frame, read_look
@@ -29,7 +29,7 @@ from .scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from .scene.read_view import read_views_task, scene_depsgraph
+from .scene.read_view import read_views, scene_depsgraph
 from .scene.texture_nodes import Hatching
 
 __all__ = ["BakeResult", "bake", "bake_task"]
@@ -82,7 +82,7 @@ def bake_task(
     Raises
     ------
     RosyError
-        If there is nothing to draw or it cannot be drawn; see `read_views_task`, `select_renderer`,
+        If there is nothing to draw or it cannot be drawn; see `read_views`, `select_renderer`,
         `Renderer.render_task` and `check_targets`.
     """
     look = look_at_frame(
@@ -95,8 +95,8 @@ def bake_task(
     sources = [render_camera(scene)] if cameras is None else list(cameras)
     yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
-    reading = read_views_task(
-        scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
+    reading = as_task(
+        read_views, scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )
     scene_views = yield from subtask(reading, 0.0, 0.05)
     check_targets(scene_views.scene_data.objects, settings)
@@ -108,7 +108,7 @@ def bake_task(
             start, stop = (0.05 + 0.9 * finished / len(sources) for finished in (index, index + 1))
             view = replace(view, draws_thresholds=draws_thresholds)
             picture = yield from subtask(renderer.render_task(view), start, stop)
-            image_task = image_data_task(picture, as_float=settings.as_float)
+            image_task = as_task(compute_image_data, picture, as_float=settings.as_float)
             image_data = yield from subtask(image_task, stop, stop)
             drawn_from = DrawnFrom(
                 source, {None: states[index]}, renderer.device_name, picture_key(look, picture)

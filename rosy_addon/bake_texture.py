@@ -12,8 +12,8 @@ from .cache import BAKE_CACHE
 from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import RosyError
-from .image_io.png import png_task
-from .progress import Progress, Task, run_to_completion, subtask
+from .image_io.png import compute_png
+from .progress import Progress, Task, as_task, run_to_completion, subtask
 from .scene.blender_images import ImageData
 from .scene.color_inputs import color_attribute_of
 from .scene.lights import read_lights
@@ -21,8 +21,8 @@ from .scene.look_properties import read_look
 from .scene.picture_state import bakes_light, read_texture_state
 from .scene.pictures import OutputSettings, check_targets, read_output_settings
 from .scene.read_view import scene_depsgraph
-from .scene.textures import Hatching, apply_texture, read_texture_input_task, uv_map_name
-from .surface_texture.draw import draw_texture_task, texture_colors_values
+from .scene.textures import Hatching, apply_texture, read_texture_input, uv_map_name
+from .surface_texture.draw import draw_texture, texture_colors_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +96,11 @@ def bake_texture_task(
     drawn = []
     for index, obj in enumerate(objects):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
-        reading = read_texture_input_task(scene, depsgraph, obj, BAKE_CACHE, color_attribute)
+        reading = as_task(read_texture_input, scene, depsgraph, obj, BAKE_CACHE, color_attribute)
         texture_input = yield from subtask(reading, start, start)
         state = read_texture_state(scene, depsgraph, obj)
-        task = draw_texture_task(
+        task = as_task(
+            draw_texture,
             texture_input.instance,
             texture_input.uv,
             look,
@@ -115,7 +116,9 @@ def bake_texture_task(
         for number, rgba in texture.tiles().items():
             png = None
             if not settings.as_float:
-                png = yield from subtask(png_task(rgba, is_color=not texture.is_data), stop, stop)
+                png = yield from subtask(
+                    as_task(compute_png, rgba, is_color=not texture.is_data), stop, stop
+                )
             tiles[number] = ImageData(rgba, png)
         note = texture.overlap_note(f"object '{obj.name}'")
         warnings = (note,) if note else ()

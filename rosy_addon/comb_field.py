@@ -10,14 +10,14 @@ import numpy as np
 from .cache import BAKE_CACHE
 from .field.combing import Combing, start_combing
 from .field.guide_brush import BrushStroke, GuideBrush
-from .field.guided_system import GuidedSystem, guided_system_task
+from .field.guided_system import GuidedSystem, guided_system
 from .field.rosy_field import RosyField
 from .field.surface import Surface
-from .progress import Progress, Task, subtask
+from .progress import Progress, Task, as_task, subtask
 from .scene.brush_surface import closest_faces
 from .scene.combed_guides import check_guides_storable, read_combed_guides, store_combed_guides
 from .scene.field_attributes import is_face_vector_field
-from .scene.meshes import mesh_surface_task
+from .scene.meshes import mesh_surface
 from .scene.read_field import read_mesh_field
 from .scene.write_field import assign_fields, check_writable, overwrite_vectors
 
@@ -73,7 +73,7 @@ class CombStroke:
 
     def settle_task(self) -> Task[None]:
         """Solve for the whole field."""
-        return self._combing.settle_task()
+        return as_task(self._combing.settle)
 
     def store(self) -> RosyField:
         """Store the field and its guides. Return the field."""
@@ -106,13 +106,13 @@ def comb_stroke_task(mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> T
     """
     check_writable(mesh)
     check_guides_storable(mesh)
-    surface = yield from subtask(mesh_surface_task(mesh, cache=BAKE_CACHE), 0.0, 0.3)
+    surface = yield from subtask(as_task(mesh_surface, mesh, cache=BAKE_CACHE), 0.0, 0.3)
     yield Progress(0.3, "reading the field")
     field = read_mesh_field(mesh, surface=surface, cache=BAKE_CACHE)
     degree = field.degree
 
     def create_task() -> Task[GuidedSystem]:
-        return guided_system_task(surface, degree)
+        return as_task(guided_system, surface, degree)
 
     key = "guided system", surface, degree
     system = yield from subtask(BAKE_CACHE.get_or_create_task(key, create_task), 0.3, 0.9)

@@ -12,18 +12,18 @@ from .cache import BAKE_CACHE
 from .compositor.shading import lights_of
 from .errors import RosyError
 from .file_io import check_writable, write_bytes
-from .line_drawing.pipeline import StrokeDrawing, draw_instances_task, geometry_task
-from .line_drawing.polyline_files import check_drawing_suffix, polyline_file_task
+from .line_drawing.pipeline import StrokeDrawing, draw_instances, stroke_geometry
+from .line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from .line_drawing.style import StrokeStyle
-from .line_drawing.svg import Pen, svg_task
-from .progress import Progress, Task, run_to_completion, subtask
+from .line_drawing.svg import Pen, svg_text
+from .progress import Progress, Task, as_task, run_to_completion, subtask
 from .projection.camera import Camera
 from .projection.gbuffer import MeshInstance
 from .projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
-from .scene.scene_reader import SceneData, read_scene_task
+from .scene.scene_reader import SceneData, compute_read_scene
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 
 
@@ -77,7 +77,7 @@ def draw_strokes_task(
         Grease Pencil object, curves object or file. By default ``scene.rosy.strokes.kind``.
     path : Path or str, optional
         Path of the file: .svg for a picture; .ply, .obj or .csv for polylines in world space, see
-        `polyline_file_task`. In an .obj file, y points up, as Blender exports it. ``//`` is the folder of
+        `polyline_file`. In an .obj file, y points up, as Blender exports it. ``//`` is the folder of
         the .blend file. By default ``scene.rosy.strokes.filepath``.
     objects : sequence of bpy.types.Object, optional
         Objects whose fields are drawn. By default all that have one. Other objects only occlude.
@@ -103,8 +103,8 @@ def draw_strokes_task(
     Raises
     ------
     RosyError
-        If there is nothing to draw, or it cannot be drawn; see `read_scene_task`, `resolve_camera` and
-        `draw_instances_task`. Also if the file cannot be written.
+        If there is nothing to draw, or it cannot be drawn; see `compute_read_scene`, `resolve_camera` and
+        `draw_instances`. Also if the file cannot be written.
     """
     settings = scene.rosy.strokes
     kind = settings.kind if kind is None else kind
@@ -118,13 +118,14 @@ def draw_strokes_task(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
-    reading = read_scene_task(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
+    reading = as_task(compute_read_scene, depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
     scene_data = yield from subtask(reading, 0.0, 0.05)
     followed = None
     if kind == "CURVES" and settings.follow:
         followed = _followed_instance(scene_data)
     lights = lights_of(style, read_lights(depsgraph, view.view))
-    work = draw_instances_task(
+    work = as_task(
+        draw_instances,
         scene_data.instances,
         view,
         style,
@@ -139,7 +140,7 @@ def draw_strokes_task(
         task = _file_task(suffix, drawing, view, pen)
         write_bytes(path, (yield from subtask(task, 0.95, 1.0, label)))
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
-    task = geometry_task(drawing, view, pen, followed)
+    task = as_task(stroke_geometry, drawing, view, pen, followed)
     geometry = yield from subtask(task, 0.95, 0.97, label)
     yield Progress(0.97, label)
     obj = store_strokes(
@@ -166,9 +167,11 @@ def draw_strokes(
 def _file_task(suffix: str, drawing: StrokeDrawing, view: Camera, pen: Pen) -> Task[bytes]:
     """Return the contents of a file of strokes."""
     if suffix == ".svg":
-        return (yield from svg_task(drawing.strokes, view, pen, drawing.marks)).encode()
+        return (yield from as_task(svg_text, drawing.strokes, view, pen, drawing.marks)).encode()
     up = UP_AXIS_BY_SUFFIX.get(suffix, "z")
-    return (yield from polyline_file_task(suffix, drawing.strokes, view, pen, UP_AXIS_MATRIX[up].T))
+    return (
+        yield from as_task(polyline_file, suffix, drawing.strokes, view, pen, UP_AXIS_MATRIX[up].T)
+    )
 
 
 def drawing_path(path: Path | str) -> Path:

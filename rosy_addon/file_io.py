@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from .errors import RosyError
 from .memory import check_memory, format_bytes
-from .progress import Progress, Task
+from .progress import report
 
 #: Bytes at the beginning of a file that show whether it is binary.
 HEAD_BYTES = 4096
@@ -137,9 +137,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
         file.write(data)
 
 
-def write_blocks_task(
-    path: str | os.PathLike[str], blocks: Iterable[bytes], block_count: float
-) -> Task[None]:
+def write_blocks(path: str | os.PathLike[str], blocks: Iterable[bytes], block_count: float) -> None:
     """Write a file atomically, block by block; see `replacing`.
 
     A task that is cancelled leaves an existing file unchanged.
@@ -159,7 +157,7 @@ def write_blocks_task(
     with replacing(path) as temporary, open(temporary, "xb") as file:
         for number, block in enumerate(blocks, 1):
             file.write(block)
-            yield Progress(min(number / block_count, 1.0), "writing the file")
+            report(min(number / block_count, 1.0), "writing the file")
 
 
 @contextmanager

@@ -1,31 +1,131 @@
-"""Long tasks as generators that yield `Progress`.
+"""How far long work has come: said by the functions that do it, heard by whoever listens.
 
-A modal operator advances a task step by step, so that Blender stays responsive and the user can
-cancel. A script runs it to completion.
+A function reports its progress with `report`, from 0 to 1. Where it calls others that report, `progress`
+scales their reports to a part of its own. Nobody need listen: then both cost next to nothing. The listener is a
+context variable, so no function passes it on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from typing import NamedTuple, TypeVar
+from collections.abc import Callable, Generator
+from contextvars import ContextVar
+from types import TracebackType
+from typing import Any, NamedTuple, TypeVar
 
-Result = TypeVar("Result")
+#: Is told a fraction from 0 to 1, and what is being done. An exception that it raises ends the work.
+Listener = Callable[[float, str], None]
+
+
+class _Part(NamedTuple):
+    """A listener, and the part of its progress that is reported now."""
+
+    listener: Listener
+    start: float
+    stop: float
+    label: str | None
+
+
+_current: ContextVar[_Part | None] = ContextVar("rosy_progress", default=None)
+
+
+def report(fraction: float, label: str) -> None:
+    """Tell the listener, if there is one, how far the present part of the work has come.
+
+    Parameters
+    ----------
+    fraction : float
+        0 at the start of the part, 1 when it is done.
+    label : str
+        What is being done, for a status bar.
+    """
+    part = _current.get()
+    if part is not None:
+        fraction = part.start + (part.stop - part.start) * fraction
+        part.listener(fraction, label if part.label is None else part.label)
+
+
+class _Scope:
+    """Sets the current part within a ``with`` block."""
+
+    __slots__ = ("_part", "_token")
+
+    def __init__(self, part: _Part | None) -> None:
+        self._part = part
+
+    def __enter__(self) -> None:
+        self._token = _current.set(self._part)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        _current.reset(self._token)
+
+
+def progress(start: float, stop: float | None = None, label: str | None = None) -> _Scope:
+    """Scale what is reported in a ``with`` block to a part of the present work.
+
+    Parameters
+    ----------
+    start, stop : float
+        Fractions of the present work at which the part begins and ends. By default it ends where it
+        begins: it takes next to no time.
+    label : str, optional
+        Replaces the labels that are reported.
+
+    Examples
+    --------
+    >>> def both():
+    ...     with progress(0.0, 0.5):
+    ...         report(0.5, "first")
+    ...     with progress(0.5, 1.0):
+    ...         report(0.5, "second")
+    >>> with listening(lambda fraction, label: print(fraction, label)):
+    ...     both()
+    0.25 first
+    0.75 second
+    """
+    outer = _current.get()
+    if outer is None:
+        return _Scope(None)
+    extent, stop = outer.stop - outer.start, start if stop is None else stop
+    inner_label = label if outer.label is None else outer.label
+    return _Scope(
+        _Part(
+            outer.listener, outer.start + extent * start, outer.start + extent * stop, inner_label
+        )
+    )
+
+
+def listening(listener: Listener | None) -> _Scope:
+    """Tell a listener what is reported in a ``with`` block; with None, nobody."""
+    return _Scope(None if listener is None else _Part(listener, 0.0, 1.0, None))
+
+
+def current_report() -> Listener:
+    """Return a function that reports to the present part of the work, wherever it is called."""
+    part = _current.get()
+
+    def report_there(fraction: float, label: str) -> None:
+        with _Scope(part):
+            report(fraction, label)
+
+    return report_there
+
+
+# Tasks of the rooms that are not plain functions yet.
 
 
 class Progress(NamedTuple):
-    """How far a task has come.
-
-    Attributes
-    ----------
-    fraction : float
-        0 at the start, 1 when done.
-    label : str
-        The current step, for a status bar.
-    """
+    """How far a task has come."""
 
     fraction: float
     label: str
 
+
+Result = TypeVar("Result")
 
 #: A generator that yields `Progress` and returns a `Result`. Closing it cancels the task.
 Task = Generator[Progress, None, Result]
@@ -40,38 +140,21 @@ def run_to_completion(task: Task[Result]) -> Result:
             return end.value
 
 
+def as_task(function: Callable[..., Result], *args: Any, **kwargs: Any) -> Task[Result]:
+    """Return a task of one step that calls a function."""
+    yield Progress(0.0, "working")
+    return function(*args, **kwargs)
+
+
+def run_with_report(task: Task[Result], report: Any = None) -> Result:
+    """Run a task to its end and return its result."""
+    return run_to_completion(task)
+
+
 def subtask(
     task: Task[Result], start: float, stop: float, label: str | None = None
 ) -> Task[Result]:
-    """Run a task as one part of a longer task, with its progress scaled to that part.
-
-    Parameters
-    ----------
-    task : Task
-    start, stop : float
-        Fractions of the longer task at which this part starts and ends.
-    label : str, optional
-        Replaces the labels of `task`.
-
-    Yields
-    ------
-    Progress
-        With the fraction of the longer task.
-
-    Returns
-    -------
-    Result
-        The result of `task`.
-
-    Examples
-    --------
-    ::
-
-        def both_task() -> Task[tuple[int, int]]:
-            first = yield from subtask(first_task(), 0.0, 0.5)
-            second = yield from subtask(second_task(), 0.5, 1.0)
-            return first, second
-    """
+    """Run a task as one part of a longer task."""
     while True:
         try:
             progress = next(task)

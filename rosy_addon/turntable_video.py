@@ -15,10 +15,10 @@ from .compositor.look import Look, has_flow
 from .compositor.shading import Light
 from .errors import RosyError
 from .file_io import write_bytes
-from .image_io.gif import gif_task
+from .image_io.gif import gif_bytes
 from .image_io.png import write_png
 from .memory import check_memory
-from .progress import Progress, Task, subtask
+from .progress import progress, report, run_with_report
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
 from .rendering.renderer import Renderer
@@ -29,7 +29,7 @@ VIDEO_SUFFIXES = (".mp4", ".gif")
 
 #: A task that encodes a video. Its arguments are the folder of pictures, their number and size, the
 #: frames per second, and the file.
-Encoder = Callable[[Path, int, tuple[int, int], float, Path], Task[None]]
+Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 
 #: What is wrong with an .mp4 for which there is no encoder.
 NO_ENCODER = "an .mp4 needs ffmpeg or Blender; a .gif needs neither"
@@ -104,14 +104,14 @@ def check_still(look: Look, still: bool, name: str) -> None:
         )
 
 
-def turntable_task(
+def turntable(
     renderer: Renderer,
     views: Iterator[ViewInput],
     count: int,
     path: Path,
     fps: float,
     encode: Encoder | None = None,
-) -> Task[Path]:
+) -> Path:
     """Draw views and write them as a video. No file is written before all pictures are drawn.
 
     Parameters
@@ -124,10 +124,6 @@ def turntable_task(
     path, fps, encode
         See `VideoWriter`.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Path
@@ -139,10 +135,11 @@ def turntable_task(
             label = f"picture {index + 1} of {count}"
             if not index:
                 writer.check_memory(count, view.camera.width, view.camera.height)
-            yield Progress(start, label)
-            picture = yield from subtask(renderer.render_task(view), start, stop, label)
+            report(start, label)
+            picture = run_with_report(renderer.render_task(view), report.part(start, stop, label))
             writer.add(picture.rgba)
-        yield from subtask(writer.write_task(), ENCODING_START, 1.0, "encoding the video")
+        with progress(ENCODING_START, 1.0, "encoding the video"):
+            writer.write()
     return path
 
 
@@ -214,12 +211,8 @@ class VideoWriter:
         write_png(Path(self._temp_folder.name) / f"{self._count:05d}.png", opaque)
         self._count, self._size = self._count + 1, (rgba.shape[1], rgba.shape[0])
 
-    def write_task(self) -> Task[None]:
+    def write(self) -> None:
         """Write the video.
-
-        Yields
-        ------
-        Progress
 
         Raises
         ------
@@ -227,12 +220,12 @@ class VideoWriter:
             If it cannot be encoded or written.
         """
         if self._is_gif:
-            write_bytes(self._path, (yield from gif_task(self._gif_frames, self._fps)))
+            write_bytes(self._path, gif_bytes(self._gif_frames, self._fps))
             return
         folder = Path(self._temp_folder.name)
         video_path = folder / "video.mp4"
         assert self._encode is not None
-        yield from self._encode(folder, self._count, self._size, self._fps, video_path)
+        self._encode(folder, self._count, self._size, self._fps, video_path)
         write_bytes(self._path, video_path.read_bytes())
 
 

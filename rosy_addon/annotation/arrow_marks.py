@@ -15,16 +15,16 @@ import numpy as np
 from ..cache import Cache
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_neighbors import screen_jacobians
 from ..projection.progressive_samples import matrix_scale, progressive_samples
-from ..projection.project import surface_points_task
+from ..projection.project import surface_points
 from ..projection.surface_points import SurfacePoints
-from ..projection.visible_vertices import ProjectedPoints, project_points_task
+from ..projection.visible_vertices import ProjectedPoints, project_points
 from .even_spacing import spaced_points
-from .surface_places import surface_places_task
+from .surface_places import surface_places
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -99,7 +99,7 @@ def has_arrows(instance: MeshInstance) -> bool:
     return instance.field is not None and not field_symmetry(instance.field).has_opposites
 
 
-def arrow_marks_task(
+def arrow_marks(
     instances: Sequence[MeshInstance],
     camera: Camera,
     spacing: float,
@@ -109,7 +109,7 @@ def arrow_marks_task(
     clip_planes: np.ndarray | None = None,
     cache: Cache | None = None,
     is_exact: bool = True,
-) -> Task[ArrowMarks]:
+) -> ArrowMarks:
     """Find the places and directions of arrowheads in a view.
 
     Parameters
@@ -123,7 +123,7 @@ def arrow_marks_task(
     size : float
         Length of an arrowhead, pixels.
     display : {"smooth", "flat"}
-        As for `projection.project.project_task`.
+        As for `projection.project.project`.
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
     cache : Cache, optional
@@ -131,38 +131,34 @@ def arrow_marks_task(
     is_exact : bool
         Whether no place is hidden. If not, most hidden ones are left out, which is faster.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     ArrowMarks
     """
-    yield Progress(0.0, "finding places of arrowheads")
+    report(0.0, "finding places of arrowheads")
     frame = camera.width, camera.height
     degrees = [instance.field.degree for instance in instances if has_arrows(instance)]
     reach = _reach(max(degrees, default=1), size)
     spacing = max(spacing, 2 * reach + size, float(np.sqrt(frame[0] * frame[1] / MAX_COUNT)))
     cache = Cache() if cache is None else cache
-    task = _places_in_order_task(instances, camera, spacing, cache)
-    points = yield from subtask(task, 0.0, 0.2)
+    with progress(0.0, 0.2):
+        points = _places_in_order(instances, camera, spacing, cache)
     first = np.cumsum([0, *(len(instance.surface.triangles) for instance in instances[:-1])])
-    task = project_points_task(
-        instances,
-        camera,
-        points.triangle + first[points.instance_id],
-        points.barycentric,
-        clip_planes,
-        finds_hidden=is_exact,
-    )
-    projected = yield from subtask(task, 0.2, 0.6)
+    with progress(0.2, 0.6):
+        projected = project_points(
+            instances,
+            camera,
+            points.triangle + first[points.instance_id],
+            points.barycentric,
+            clip_planes,
+            finds_hidden=is_exact,
+        )
     kept = np.flatnonzero(projected.is_visible)
     points, projected = points.part(kept), projected.part(kept)
     if not len(kept):
         return _no_marks(size)
-    task = surface_points_task(instances, camera, display, points, projected.position, cache)
-    gbuffer = yield from subtask(task, 0.6, 0.9)
+    with progress(0.6, 0.9):
+        gbuffer = surface_points(instances, camera, display, points, projected.position, cache)
     directions = _screen_directions(gbuffer)
     is_usable = (np.abs(directions) >= MIN_FORESHORTENING).any(axis=1) & _faces_camera(gbuffer)
     if not is_exact:
@@ -174,9 +170,9 @@ def arrow_marks_task(
     )
 
 
-def _places_in_order_task(
+def _places_in_order(
     instances: Sequence[MeshInstance], camera: Camera, spacing: float, cache: Cache
-) -> Task[SurfacePoints]:
+) -> SurfacePoints:
     """Return places on all surfaces with arrowheads, and points between them, in the order of preference.
 
     The places do not depend on the view. The points are where the view is so near that it needs more.
@@ -188,7 +184,7 @@ def _places_in_order_task(
         if not has_arrows(instance) or not scale:
             continue
         smallest = NEAREST_PLACES * spacing * _smallest_pixel(instance, camera) / scale
-        places = yield from surface_places_task(instance.surface, smallest, cache)
+        places = surface_places(instance.surface, smallest, cache)
         points = SurfacePoints(
             np.full(len(places.triangle), number, np.int32), places.triangle, places.barycentric
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..color import from_hex, to_linear
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import Progress, Task
+from ..progress import report
 from .arrow_marks import FILL_COLOR, NOTCH, OUTLINE_COLOR, WIDTH, ArrowMarks
 from .painting import draw_over
 
@@ -14,7 +14,7 @@ from .painting import draw_over
 PIXELS_PER_STEP = 1 << 19
 
 
-def draw_arrows_task(rgba: np.ndarray, marks: ArrowMarks) -> Task[np.ndarray]:
+def draw_arrows(rgba: np.ndarray, marks: ArrowMarks) -> np.ndarray:
     """Draw arrowheads over a picture, with one outline around those that overlap.
 
     Parameters
@@ -23,15 +23,11 @@ def draw_arrows_task(rgba: np.ndarray, marks: ArrowMarks) -> Task[np.ndarray]:
         Linear, not premultiplied, rows from the bottom. Not changed.
     marks : ArrowMarks
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (H, W, 4) float32 ndarray
     """
-    yield Progress(0.0, "drawing arrowheads")
+    report(0.0, "drawing arrowheads")
     rgba = rgba.copy()
     height, width = rgba.shape[:2]
     distance = np.full(height * width, np.inf, dtype=np.float32)
@@ -44,7 +40,7 @@ def draw_arrows_task(rgba: np.ndarray, marks: ArrowMarks) -> Task[np.ndarray]:
     row = concatenated_ranges(low[:, 1], row_count)
     length = (high - low)[head, 0]
     for part in blocks_by_count(length, PIXELS_PER_STEP):
-        yield Progress(part.start / len(head), "drawing arrowheads")
+        report(part.start / len(head), "drawing arrowheads")
         column = concatenated_ranges(low[head[part], 0], length[part])
         of_head, of_row = (np.repeat(values[part], length[part]) for values in (head, row))
         x, y = column + 0.5 - marks.position[of_head, 0], of_row + 0.5 - marks.position[of_head, 1]

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..color import from_hex, to_linear
-from ..progress import Progress, Task
+from ..progress import report
 from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, Label, placed_labels, stroke_width
 from .painting import draw_over, window
 from .singularity_marks import (
@@ -22,7 +22,7 @@ from .singularity_marks import (
 DOTS_PER_STEP = 256
 
 
-def draw_marks_task(rgba: np.ndarray, marks: SingularityMarks) -> Task[np.ndarray]:
+def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
     """Draw dots and their labels over a picture.
 
     Parameters
@@ -30,10 +30,6 @@ def draw_marks_task(rgba: np.ndarray, marks: SingularityMarks) -> Task[np.ndarra
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied, rows from the bottom. Not changed.
     marks : SingularityMarks
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -45,7 +41,7 @@ def draw_marks_task(rgba: np.ndarray, marks: SingularityMarks) -> Task[np.ndarra
         zip(marks.position, marks.radius.tolist(), marks.index, marks.is_visible, strict=True)
     ):
         if number % DOTS_PER_STEP == 0:
-            yield Progress(number / len(marks), "drawing singularities")
+            report(number / len(marks), "drawing singularities")
         draw_dot(
             rgba,
             center,

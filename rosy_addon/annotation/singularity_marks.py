@@ -8,16 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..cache import Cache
-from ..field.singularities import singularities_task
-from ..progress import Task, subtask
+from ..field.singularities import find_singularities
+from ..progress import progress
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.visible_vertices import project_vertices_task
+from ..projection.visible_vertices import project_vertices
 
 #: Display colors by the sign of the index, and of the outline of dots.
 COLOR_BY_SIGN, OUTLINE_COLOR = {1: "#eb5a14", -1: "#2864eb"}, "#141414"
@@ -99,13 +100,13 @@ def dot_diameters(index: np.ndarray, size: float) -> np.ndarray:
     return size * np.sqrt(np.abs(index))
 
 
-def singularity_marks_task(
+def singularity_marks(
     instances: Sequence[MeshInstance],
     camera: Camera,
     settings: Any,
     clip_planes: np.ndarray | None = None,
     cache: Cache | None = None,
-) -> Task[SingularityMarks]:
+) -> SingularityMarks:
     """Find the singularities of fields in a view.
 
     Parameters
@@ -120,10 +121,6 @@ def singularity_marks_task(
     cache : Cache, optional
         Stores the singularities of fields.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     SingularityMarks
@@ -133,14 +130,14 @@ def singularity_marks_task(
     for number, instance in enumerate(instances):
         vertex = index = np.empty(0, dtype=np.int32)
         if instance.field is not None:
-            task = cached_singularities_task(instance, cache)
             part = 0.5 / len(instances)
-            vertex, index = yield from subtask(task, number * part, (number + 1) * part)
+            with progress(number * part, (number + 1) * part):
+                vertex, index = cached_singularities(instance, cache)
             degrees.append(np.full(len(vertex), instance.field.degree))
         vertices.append(vertex)
         indices.append(index)
-    task = project_vertices_task(instances, camera, vertices, clip_planes)
-    projected = yield from subtask(task, 0.5, 1.0)
+    with progress(0.5, 1.0):
+        projected = project_vertices(instances, camera, vertices, clip_planes)
     kept = projected.is_in_view if settings.singularity_dots == "all" else projected.is_visible
     marks = SingularityMarks(
         projected.position,
@@ -155,15 +152,13 @@ def singularity_marks_task(
     return marks.part(kept)
 
 
-def cached_singularities_task(
-    instance: MeshInstance, cache: Cache
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:
     """Find the singularities of an instance with a field, or return those in the cache.
 
-    They are the same for all deformations of a mesh. See `field.singularities.singularities_task`.
+    They are the same for all deformations of a mesh. See `field.singularities.find_singularities`.
     """
     surface, field = instance.surface, instance.field
-    return cache.get_or_create_task(
+    return cache.get_or_create(
         ("singularities", surface.rest_shape_key, field),
-        lambda: singularities_task(surface.in_rest_shape(), field),
+        partial(find_singularities, surface.in_rest_shape(), field),
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..cache import Cache
 from ..field.surface import Surface
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.progressive_samples import rest_areas, surface_samples
 from .even_spacing import spaced_points
 
@@ -56,7 +56,7 @@ def level_distance(extent: float, level: int) -> float:
     return extent * 2 ** (-level / LEVELS_PER_OCTAVE)
 
 
-def surface_places_task(surface: Surface, distance: float, cache: Cache) -> Task[SurfacePlaces]:
+def surface_places(surface: Surface, distance: float, cache: Cache) -> SurfacePlaces:
     """Find places on a surface, down to the level at which they are as near as a distance, or further.
 
     Parameters
@@ -67,10 +67,6 @@ def surface_places_task(surface: Surface, distance: float, cache: Cache) -> Task
     cache : Cache
         Stores the places. They are the same for all deformations of a mesh, and those of a level for any
         distance.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -85,14 +81,14 @@ def surface_places_task(surface: Surface, distance: float, cache: Cache) -> Task
     last = _wanted_level(places.extent, distance)
     if places.level >= last:
         return places
-    yield Progress(0.0, "finding places of arrowheads")
+    report(0.0, "finding places of arrowheads")
     density = CANDIDATES_PER_PLACE / level_distance(places.extent, last) ** 2
     triangle, barycentric, rank = surface_samples(surface, density)
     order = np.argsort(rank, kind="stable")
     # The samples of a level are the first ones of these.
     triangle, barycentric, rank = triangle[order], barycentric[order], rank[order]
     for level in range(places.level + 1, last + 1):
-        yield Progress(level / (last + 1), "finding places of arrowheads")
+        report(level / (last + 1), "finding places of arrowheads")
         density = CANDIDATES_PER_PLACE / level_distance(places.extent, level) ** 2
         count = int(np.searchsorted(rank, density))
         places = _with_level(surface, places, triangle[:count], barycentric[:count])

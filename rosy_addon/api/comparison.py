@@ -15,9 +15,8 @@ from ..field.analysis import format_degrees
 from ..field.singularity_matching import (
     DEFAULT_REACH,
     SingularityMatching,
-    match_on_surface_task,
+    match_on_surface,
 )
-from ..progress import run_to_completion
 from .field import Difference, Field
 
 #: Characters that LaTeX would interpret, and what prints them.
@@ -212,9 +211,7 @@ def compare(
             continue
         differences[title] = reference.difference(field)
         pair = reference.singularities, field.singularities
-        matchings[title] = run_to_completion(
-            match_on_surface_task(field.surface.mesh, *pair, reach)
-        )
+        matchings[title] = match_on_surface(field.surface.mesh, *pair, reach)
     return Comparison(titled, differences, matchings)
 
 

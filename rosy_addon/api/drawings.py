@@ -15,10 +15,9 @@ from ..compositor.shading import lights_of
 from ..errors import RosyError
 from ..file_io import write_bytes
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
-from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file_task
+from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
-from ..progress import run_to_completion
 from ..projection.camera import Camera, check_size, orbit_camera
 from ..projection.up_axis import UP_AXIS_MATRIX
 from ..rendering.mesh_view import check_light, mesh_instance
@@ -98,8 +97,7 @@ class Drawing:
             write_bytes(path, self.svg.encode())
             return
         to_mesh = UP_AXIS_MATRIX[self._up].T
-        task = polyline_file_task(suffix, self._strokes, self._camera, self._pen, to_mesh)
-        write_bytes(path, run_to_completion(task))
+        write_bytes(path, polyline_file(suffix, self._strokes, self._camera, self._pen, to_mesh))
 
 
 def strokes(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..annotation.round_numbers import round_below
-from ..annotation.singularity_marks import SingularityMarks, singularity_marks_task
+from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..color import color_stops, map_colors
@@ -28,7 +28,7 @@ from ..image_io.png import to_srgb_uint8
 from ..progress import run_to_completion
 from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.visible_vertices import project_vertices_task
+from ..projection.visible_vertices import project_vertices
 from ..rendering.band_workers import BandWorkers
 from ..rendering.cpu import CpuRenderer
 from ..rendering.view_input import ViewInput
@@ -409,7 +409,7 @@ class _Studio:
         """
         if not shows_singularities(self.look):
             return None
-        marks = run_to_completion(singularity_marks_task([instance], self.camera, self.look))
+        marks = singularity_marks([instance], self.camera, self.look)
         area = float((np.pi * marks.radius**2).sum())
         limit = MAX_DOT_SHARE * self.camera.width * self.camera.height
         return marks if area <= limit else replace(marks, size=marks.size * np.sqrt(limit / area))
@@ -514,5 +514,5 @@ class _Studio:
         self, instance: MeshInstance, vertices: NDArray[np.integer[Any]]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Return the (n, 2) places of vertices in pixels, and which are visible."""
-        projected = run_to_completion(project_vertices_task([instance], self.camera, [vertices]))
+        projected = project_vertices([instance], self.camera, [vertices])
         return projected.position, projected.is_visible

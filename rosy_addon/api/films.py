@@ -23,13 +23,12 @@ from ..field.representation import face_representation
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface as PolygonMesh
 from ..field.surface import face_area_vectors, have_same_polygons
-from ..progress import run_to_completion
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.band_workers import BandWorkers
 from ..rendering.cpu import CpuRenderer
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
-from ..turntable_video import Encoder, check_video_path, turntable_task
+from ..turntable_video import Encoder, check_video_path, turntable
 from .field import Field, warn
 from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, announced, find_ffmpeg, picture_look
 
@@ -131,8 +130,7 @@ def film(
         views = announced(views, on_picture)
     with BandWorkers(workers) as pool:
         renderer = CpuRenderer(Cache(), keep_gbuffers=False, workers=pool)
-        task = turntable_task(renderer, views, series.picture_count, path, rate, encode)
-        result = run_to_completion(task)
+        result = turntable(renderer, views, series.picture_count, path, rate, encode)
     warn(series.advice)
     return result
 

@@ -16,7 +16,7 @@ from ..cache import Cache
 from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..image_io.png import png_task, read_png, to_srgb_uint8, write_png
+from ..image_io.png import compute_png, read_png, to_srgb_uint8, write_png
 from ..presets.store import default_user_folder, load_preset, preset_files, read_preset
 from ..progress import run_to_completion
 from ..projection.ambient_occlusion import DIRECTION_COUNT
@@ -33,8 +33,10 @@ from ..turntable_video import (
     check_still,
     check_video_path,
     evicting,
-    turntable_task,
     turntable_views,
+)
+from ..turntable_video import (
+    turntable as rosy_addon_turntable,
 )
 from .field import Field, check_same_surface
 from .generators import form, uv_map
@@ -94,7 +96,7 @@ class Picture:
         return array if dtype is None else array.astype(dtype)
 
     def _repr_png_(self) -> bytes:
-        return run_to_completion(png_task(self.rgba))
+        return compute_png(self.rgba)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an 8-bit ``.png`` file.
@@ -328,7 +330,7 @@ def turntable(
     with BandWorkers(workers) as pool:
         renderer = CpuRenderer(cache, keep_gbuffers=still, workers=pool)
         views = evicting(views, cache)
-        return run_to_completion(turntable_task(renderer, views, pictures, path, rate, encode))
+        return rosy_addon_turntable(renderer, views, pictures, path, rate, encode)
 
 
 def picture_look(

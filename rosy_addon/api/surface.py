@@ -16,12 +16,11 @@ from ..errors import RosyError, RosyWarning, counted
 from ..field.formats.obj import read_uv
 from ..field.formats.ply import read_vertex_values
 from ..field.formats.polygons import offsets_from_sizes
-from ..field.mesh_io import READERS, SHARP_ANGLE, read_polygons_task
+from ..field.mesh_io import READERS, SHARP_ANGLE, read_polygons
 from ..field.representation import face_frames
 from ..field.singularities import euler_characteristic
 from ..field.surface import Surface as PolygonMesh
 from ..field.surface import build_surface
-from ..progress import run_to_completion
 from ..projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .mesh_objects import MeshArrays, arrays_of
 
@@ -213,7 +212,7 @@ def _read_arrays(path: Path, step: int | None) -> MeshArrays:
     If it is one step of several, issue a `RosyWarning` that says so.
     """
     if path.suffix.lower() in READERS:
-        return MeshArrays(*run_to_completion(read_polygons_task(path)))
+        return MeshArrays(*read_polygons(path))
     simulation_suffixes = _simulation_suffixes()
     if path.suffix.lower() not in simulation_suffixes:
         *suffixes, last = (*READERS, *simulation_suffixes)

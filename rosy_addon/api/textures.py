@@ -16,14 +16,13 @@ from ..compositor.shading import Light
 from ..errors import RosyError
 from ..field.frames import unit_direction
 from ..presets.store import default_user_folder, load_preset
-from ..progress import run_to_completion
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
     CONTENTS,
     DEFAULT_MARGIN,
     DEFAULT_SIZE,
     check_texture_size,
-    draw_texture_task,
+    draw_texture,
 )
 from .field import Field, warn
 from .generators import uv_map
@@ -182,7 +181,7 @@ def texture(
         raise RosyError(f"content must be one of {', '.join(CONTENTS)}, not '{content}'")
     uv = uv_map(surface)
     instance = upright_instance(surface, field, None, corner_numbers(surface, color_values))
-    task = draw_texture_task(
+    drawn = draw_texture(
         instance,
         uv,
         look,
@@ -192,7 +191,6 @@ def texture(
         content=content,
         lights=None if light_direction is None else [_lamp(light_direction, instance)],
     )
-    drawn = run_to_completion(task)
     warn(drawn.overlap_note(surface.name))
     tiles = drawn.tiles()
     if drawn.is_data:  # display values, as pictures are saved

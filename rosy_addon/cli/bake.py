@@ -12,7 +12,6 @@ from ..errors import RosyError, counted
 from ..file_io import check_folder
 from ..frame_workers import parse_frames
 from ..gpu.select import RENDER_DEVICES
-from ..progress import Task
 from .bake_workers import run_workers, uses_workers
 from .extras import Extras
 from .look import add_flow_option, add_look_options, requested_look
@@ -163,7 +162,7 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
         print_line(save_blend())
 
 
-def _run_with_log(task: Task[Any]) -> Any:
+def _run_with_log(task: Any) -> Any:
     """Run a task to its end and return its result. Print a line for each frame."""
     last_label = ""
     while True:

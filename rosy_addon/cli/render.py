@@ -134,7 +134,7 @@ def video_encoder(options: argparse.Namespace) -> Encoder | None:
         encode = find_ffmpeg()
     if encode is None:
         with suppress(ImportError):
-            from ..scene.video import encode_video_task as encode
+            from ..scene.video import encode_video as encode
     if encode is None and find_blender_encoder is not None:
         encode = find_blender_encoder(None)
     if encode is None:

@@ -15,8 +15,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ..progress import Task
-
 #: Rows beyond those of a band whose pixels may show a sample of them.
 BORDER_ROWS = 1
 
@@ -27,7 +25,7 @@ class BandExchange(Protocol):
     def put(self, key: Hashable, values: np.ndarray) -> None:
         """Store an array for the band above."""
 
-    def get_task(self, key: Hashable) -> Task[np.ndarray | None]:
+    def get(self, key: Hashable) -> np.ndarray | None:
         """Wait for an array of the band below, and return it; None if that band ends without it."""
 
 

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .lic_images import LicImages, LineTracer, convolve_members_task
+from .lic_images import LicImages, LineTracer, convolve_members
 from .look import Look
-from .per_pixel_lic import DirectionSampler, direction_table_task, interpolate_direction
-from .pixel_field import PixelField, all_members, neighbor_table_task
+from .per_pixel_lic import DirectionSampler, direction_table, interpolate_direction
+from .pixel_field import PixelField, all_members, neighbor_table
 
 
-def brute_force_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+def brute_force(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
     """Compute one LIC image for each of the M lines.
 
     There are no breaking points and no second set of images, but every step of every streamline
@@ -33,11 +33,12 @@ def brute_force_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[L
     LicImages
     """
     count, degree = len(field.pixel), field.degree
-    neighbors = yield from subtask(neighbor_table_task(field), 0.0, 0.0)
+    with progress(0.0):
+        neighbors = neighbor_table(field)
     member_directions = np.zeros((count + 1, degree), dtype=np.complex64)
     screen_directions = np.empty((count, degree), dtype=np.complex64)
     for block in pixel_blocks(count):
-        yield Progress(0.0, "finding directions")
+        report(0.0, "finding directions")
         part = field.part(block)
         for index, member in enumerate(all_members(part, look.guiding_angle)):
             member_directions[block, index] = member
@@ -45,15 +46,15 @@ def brute_force_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[L
             screen_directions[block, index] = part.to_screen(in_plane, look.foreshorten)
     direction_tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
     for index in range(degree):
-        table_task = direction_table_task(
-            screen_directions[:, index], member_directions[:-1, index], degree, neighbors
-        )
-        direction_tables[:, index] = yield from subtask(table_task, 0.0, 0.0)
+        with progress(0.0):
+            direction_tables[:, index] = direction_table(
+                screen_directions[:, index], member_directions[:-1, index], degree, neighbors
+            )
     tracers = [
         _best_match_tracer(member_directions, direction_tables, member)
         for member in range(field.line_count)
     ]
-    return (yield from convolve_members_task(field, look, noise, neighbors, tracers))
+    return convolve_members(field, look, noise, neighbors, tracers)
 
 
 def _best_match_tracer(
@@ -66,7 +67,7 @@ def _best_match_tracer(
     member_directions : (P + 1, N) complex64 ndarray
         Members in the view plane, where they are matched. Row P is 0.
     direction_tables : (P + 1, N, 4) float32 ndarray
-        The table of `direction_table_task` of each member, on screen.
+        The table of `direction_table` of each member, on screen.
     member : int
     """
 

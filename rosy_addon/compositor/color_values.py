@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import surface_values
@@ -86,7 +86,7 @@ def map_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
     return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
 
 
-def map_positions_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
+def compute_map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     """Find where the numbers of the surfaces are in the color map.
 
     Parameters
@@ -109,6 +109,6 @@ def map_positions_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     low, scale = value_scale(look, value_ranges(gbuffer.instances))
     positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
     for block in pixel_blocks(len(positions)):
-        yield Progress(block.start / len(positions), "finding colors")
+        report(block.start / len(positions), "finding colors")
         positions[block] = map_positions(surface_values(gbuffer.part(block)), low, scale)
     return positions

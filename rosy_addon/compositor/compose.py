@@ -9,14 +9,14 @@ import numpy as np
 
 from ..cache import Cache
 from ..color import map_colors, to_linear
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import GBuffer, PixelCoverage
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .band import Band
-from .color_values import map_positions_task, value_ends, value_ranges
+from .color_values import compute_map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines, even_line_images_task, has_even_lines
+from .even_lines import EvenLines, even_line_images, has_even_lines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
 from .flow import with_cycle_distance
@@ -31,23 +31,23 @@ from .hatching import (
 )
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
-from .lic import lic_task
+from .lic import lic
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_hatched
 from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
-from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain_task
+from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import DegreeLayer, Picture, common_color_range
 from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
 from .stages import ComposeStages
-from .streak_statistics import break_steps, look_streak_statistics, look_streak_statistics_task
-from .target_tone import ReferenceRender, target_tone_task
+from .streak_statistics import break_steps, look_streak_statistics
+from .target_tone import ReferenceRender, target_tone
 
 #: Contrast of streaks in colored pictures, relative to gray pictures.
 COLOR_CONTRAST = 1.5
 
 
-def compose_task(
+def compose(
     gbuffer: GBuffer,
     look: Look,
     lights: Sequence[Light] = (),
@@ -56,7 +56,7 @@ def compose_task(
     mesh_cache: Cache | None = None,
     band: Band | None = None,
     draws_thresholds: bool = False,
-) -> Task[Picture]:
+) -> Picture:
     """Draw the fields of a G-buffer.
 
     Parameters
@@ -109,34 +109,37 @@ def compose_task(
     alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
     stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache, band)
-    tone_task = target_tone_task(gbuffer, look, lights, reference, cache)
-    tone_rgb = yield from subtask(tone_task, 0.0, 0.0)
+    with progress(0.0):
+        tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
     map_position = None
     if colors_values(look) and not draws_thresholds:
-        map_position = yield from subtask(map_positions_task(gbuffer, look), 0.0, 0.0)
+        with progress(0.0):
+            map_position = compute_map_positions(gbuffer, look)
     layers, color_tops = [], set()
     visible_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
     degrees = sorted({gbuffer.instance_degrees[instance_id] for instance_id in visible_ids})
     for layer_index, degree in enumerate(degrees):
         start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
-        yield Progress(start, "finding directions")
-        field = yield from subtask(stages.pixel_field_task(degree, pixel_look), start, start)
+        report(start, "finding directions")
+        with progress(start):
+            field = stages.pixel_field(degree, pixel_look)
         field_look = look_for_symmetry(pixel_look, field.symmetry)
         even_lines = break_images = None
         break_look = replace(field_look, length=break_steps(field_look))
         if has_even_lines(field_look):
-            task = stages.even_lines_task(field, field_look)
-            even_lines = yield from subtask(task, start, stop)
-            images = yield from subtask(even_line_images_task(even_lines), stop, stop)
+            with progress(start, stop):
+                even_lines = stages.even_lines(field, field_look)
+            with progress(stop):
+                images = even_line_images(even_lines)
             if has_breaks(look):
-                (break_images,) = yield from subtask(
-                    stages.lic_task(field, [break_look]), stop, stop
-                )
+                with progress(stop):
+                    (break_images,) = stages.lic(field, [break_look])
         elif has_breaks(look):
-            task = stages.lic_task(field, [field_look, break_look])
-            images, break_images = yield from subtask(task, start, stop)
+            with progress(start, stop):
+                images, break_images = stages.lic(field, [field_look, break_look])
         else:
-            (images,) = yield from subtask(stages.lic_task(field, [field_look]), start, stop)
+            with progress(start, stop):
+                (images,) = stages.lic(field, [field_look])
         part_look = (
             with_magnitude_range(field_look, field) if colors_magnitude(look) else field_look
         )
@@ -145,19 +148,19 @@ def compose_task(
         tone = modulation = None
         drawn = stages.drawn(field)
         if is_hatched(look):
-            tone = yield from subtask(_mean_tone_task(tone_rgb[field.gbuffer_index]), stop, stop)
-            modulation = yield from subtask(
-                _line_modulation_task(stages, field, field_look, tone, break_images, even_lines),
-                stop,
-                stop,
-            )
+            with progress(stop):
+                tone = _mean_tone(tone_rgb[field.gbuffer_index])
+                modulation = _line_modulation(
+                    stages, field, field_look, tone, break_images, even_lines
+                )
             tone = tone[drawn]
         field = field.part(drawn)
         if map_position is not None:
             field = replace(field, map_position=map_position[field.gbuffer_index])
-        layer = yield from subtask(layer_task(field, field_look, images), stop, stop)
+        with progress(stop):
+            layer = compute_layer(field, field_look, images)
         for block in pixel_blocks(len(field.pixel)):
-            yield Progress(stop, "drawing the ink")
+            report(stop, "drawing the ink")
             part, part_images = field.part(block), images.part(block)
             entries = part.gbuffer_index
             if modulation is None:
@@ -176,27 +179,16 @@ def compose_task(
         color *= tone_rgb
     rows = (0, camera.height) if band is None else (band.start, band.stop)
     frame = camera.width, rows, look.supersampling, gbuffer.coverage
-    resolve = _resolve_pixels_task(gbuffer.pixel, color, alpha, *frame)
-    rgba = yield from subtask(resolve, 1.0, 1.0)
+    with progress(1.0):
+        rgba = _resolve_pixels(gbuffer.pixel, color, alpha, *frame)
     color_range = common_color_range(color_tops)
     if map_position is not None:
         color_range = value_ends(look, value_ranges(gbuffer.instances))
     if not draws_thresholds:
         return Picture(rgba, tuple(layers), color_range=color_range)
-    resolve = _resolve_pixels_task(gbuffer.pixel, spread, alpha, *frame)
-    spread_rgba = yield from subtask(resolve, 1.0, 1.0)
+    with progress(1.0):
+        spread_rgba = _resolve_pixels(gbuffer.pixel, spread, alpha, *frame)
     return Picture(rgba, tuple(layers), spread_rgba[..., 0], color_range)
-
-
-def compose(
-    gbuffer: GBuffer,
-    look: Look,
-    lights: Sequence[Light] = (),
-    reference: ReferenceRender | None = None,
-    cache: Cache | None = None,
-) -> Picture:
-    """Draw the fields of a G-buffer, without progress reports; see `compose_task`."""
-    return run_to_completion(compose_task(gbuffer, look, lights, reference, cache))
 
 
 def compose_planar(
@@ -229,42 +221,43 @@ def compose_planar(
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
     look = look_for_symmetry(with_cycle_distance(replace(look, supersampling=1)), field.symmetry)
-    images = run_to_completion(lic_task(field, look, noise))
-    layer = run_to_completion(layer_task(field, look, images))
+    images = lic(field, look, noise)
+    layer = compute_layer(field, look, images)
     color = colorize(field, layer.images, layer.tone, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
-    rgba_task = _resolve_pixels_task(field.pixel, color, opaque, field.width, (0, field.height), 1)
-    return Picture(run_to_completion(rgba_task), (layer,))
+    return Picture(
+        _resolve_pixels(field.pixel, color, opaque, field.width, (0, field.height), 1), (layer,)
+    )
 
 
-def _mean_tone_task(tone_rgb: np.ndarray) -> Task[np.ndarray]:
+def _mean_tone(tone_rgb: np.ndarray) -> np.ndarray:
     """(P,) float32 tones from 0 to 1: the means of the three channels of (P, 3) tones."""
     tone = np.empty(len(tone_rgb), dtype=np.float32)
     for block in pixel_blocks(len(tone)):
-        yield Progress(block.start / len(tone), "finding tones")
+        report(block.start / len(tone), "finding tones")
         tone[block] = np.clip(tone_rgb[block].mean(axis=1), 0, 1)
     return tone
 
 
-def _line_modulation_task(
+def _line_modulation(
     stages: ComposeStages,
     field: PixelField,
     look: Look,
     tone: np.ndarray,
     break_images: LicImages | None,
     even_lines: EvenLines | None,
-) -> Task[LineModulation]:
+) -> LineModulation:
     """Compute the parts of the `LineModulation` that a look uses, at the pixels that are drawn."""
-    undirected = yield from stages.undirected_texture_task(field, look)
+    undirected = stages.undirected_texture(field, look)
     uses_streaks = even_lines is None or has_breaks(look) or has_paper_grain(look)
     if uses_streaks or undirected is not None:
-        yield from look_streak_statistics_task(look)  # `line_coverage` finds them in their cache
+        look_streak_statistics(look)  # `line_coverage` finds them in their cache
     paper_grain = line_tones = None
     if has_paper_grain(look):
-        paper_grain = yield from _paper_grain_task(stages, field, look)
+        paper_grain = _paper_grain(stages, field, look)
     if has_overshoot(look):
-        line_tones = yield from _tone_along_lines_task(stages, field, look, tone)
-    outline = (yield from stages.outline_task(field, look)) if has_outline(look) else None
+        line_tones = _tone_along_lines(stages, field, look, tone)
+    outline = stages.outline(field, look) if has_outline(look) else None
     drawn = stages.drawn(field)
     return LineModulation(
         break_images,
@@ -276,9 +269,9 @@ def _line_modulation_task(
     )
 
 
-def _tone_along_lines_task(
+def _tone_along_lines(
     stages: ComposeStages, field: PixelField, look: Look, tone: np.ndarray
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
@@ -297,10 +290,10 @@ def _tone_along_lines_task(
     # or three channels.
     channels = np.ones((len(tone), 3), dtype=np.float32)
     channels[:, 0] = tone
-    images = yield from stages.line_means_task(field, overshoot_look, channels)
+    images = stages.line_means(field, overshoot_look, channels)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
     for block in pixel_blocks(means.shape[1]):
-        yield Progress(1.0, "finding tones")
+        report(1.0, "finding tones")
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
         means[:, block] = (
             NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
@@ -308,33 +301,31 @@ def _tone_along_lines_task(
     return np.clip(means, 0, 1, out=means)
 
 
-def _paper_grain_task(stages: ComposeStages, field: PixelField, look: Look) -> Task[np.ndarray]:
+def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     if look.anchor == "picture":
         subpixels = look.supersampling
         grain = look.grain / subpixels
-        return (
-            yield from picture_paper_grain_task(
-                field.pixel, field.width, grain, look.seed, subpixels, field.line_count
-            )
+        return picture_paper_grain(
+            field.pixel, field.width, grain, look.seed, subpixels, field.line_count
         )
-    noise = yield from stages.surface_paper_grain_task(field, look)
-    yield Progress(1.0, "drawing the paper grain")
+    noise = stages.surface_paper_grain(field, look)
+    report(1.0, "drawing the paper grain")
     std = np.float32(look_streak_statistics(look).paper_grain_std)
     channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
     heights = np.empty((field.line_count, len(noise)), dtype=np.float32)
     for block in pixel_blocks(len(noise)):
-        yield Progress(1.0, "drawing the paper grain")
+        report(1.0, "drawing the paper grain")
         heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / std).T[channel]
     return heights
 
 
-def layer_task(field: PixelField, look: Look, images: LicImages) -> Task[DegreeLayer]:
+def compute_layer(field: PixelField, look: Look, images: LicImages) -> DegreeLayer:
     """Build the layer of one degree: its blend, with the contrast of one image times the gain."""
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     tone = np.empty_like(images.blend)
     for block in pixel_blocks(len(tone)):
-        yield Progress(block.start / len(tone), "blending lines")
+        report(block.start / len(tone), "blending lines")
         effective_samples = images.effective_samples[block]
         gain = look.gain * blend_gain(field.line_count, effective_samples, look) * supersampled_gain
         tone[block] = scale_contrast(images.blend[block], gain[:, None])
@@ -363,7 +354,7 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
     return color
 
 
-def _resolve_pixels_task(
+def _resolve_pixels(
     pixel: np.ndarray,
     color: np.ndarray,
     alpha: np.ndarray,
@@ -371,7 +362,7 @@ def _resolve_pixels_task(
     rows: tuple[int, int],
     supersampling: int,
     coverage: PixelCoverage | None = None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Assemble the image from the colors of subpixels.
 
     Parameters
@@ -400,7 +391,7 @@ def _resolve_pixels_task(
     rgba = np.zeros((height, width // s, 4), dtype=np.float32)
     band_rows = max(BLOCK_PIXELS // (width * s), 1)
     for start in range(0, height, band_rows):
-        yield Progress(start / height, "drawing the ink")
+        report(start / height, "drawing the ink")
         band = rgba[start : start + band_rows]
         first_pixel = (rows[0] + start * s) * width
         border = np.array([first_pixel, first_pixel + band.size // 4 * s * s], dtype=np.int64)

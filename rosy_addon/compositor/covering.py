@@ -28,7 +28,7 @@ import numpy as np
 
 from ..deterministic_trig import cos_sin, vector_angle
 from ..field.directional_field import evaluate_harmonics
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from ..projection.pixel_blocks import pixel_blocks
 from .flow import forward_share
 from .look import Look
@@ -235,11 +235,6 @@ def member_lines(field: PixelField) -> np.ndarray:
 
 
 def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering:
-    """Return the covering of a field, without progress reports; see `build_covering_task`."""
-    return run_to_completion(build_covering_task(field, look, noise))
-
-
-def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[Covering]:
     """Build the covering of a pixel field. Sheet 0 is the member nearest to the guiding angle.
 
     Parameters
@@ -257,7 +252,7 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
     degree, (count, channels) = field.degree, noise.shape
     line_count, per_turn = field.line_count, field.symmetry.sheets_per_turn
     cell_of_pixel, width, cell_count = _pixel_window(field)
-    yield Progress(0.0, "finding directions")
+    report(0.0, "finding directions")
     # Streamlines that have ended stay in `SINK_CELL`.
     packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
     cell_noise = np.zeros((cell_count, channels), dtype=np.float32)
@@ -271,7 +266,7 @@ def build_covering_task(field: PixelField, look: Look, noise: np.ndarray) -> Tas
     ]
     state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
     for block in pixel_blocks(count):
-        yield Progress(block.start / count, "finding directions")
+        report(block.start / count, "finding directions")
         block_cells = cell_of_pixel[block]
         right, up = _noise_gradient(cell_noise, block_cells, width, field.neighbor_mask[block])
         right, up = right * quantize[2], up * quantize[2]

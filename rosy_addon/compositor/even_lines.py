@@ -22,12 +22,12 @@ import numpy as np
 from ..cache import Cache
 from ..deterministic_trig import vector_angle
 from ..field.frames import transform_components
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.project import view_plane_rotation
-from ..projection.surface_lines import SurfaceLines, cached_surface_lines_task
-from .lic_images import LicImages, lic_images_task
+from ..projection.surface_lines import SurfaceLines, cached_surface_lines
+from .lic_images import LicImages, lic_images
 from .look import Look, is_hatched
 from .look_units import instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
@@ -207,11 +207,11 @@ def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> 
     return covered
 
 
-def even_line_images_task(lines: EvenLines) -> Task[LicImages]:
+def even_line_images(lines: EvenLines) -> LicImages:
     """Return even lines as the images of members, as if they were streaks."""
     count = lines.streaks.shape[1]
     effective_samples = np.ones(count, dtype=np.float32)
-    return (yield from lic_images_task(lines.streaks[..., None], effective_samples))
+    return lic_images(lines.streaks[..., None], effective_samples)
 
 
 def uneven_width(
@@ -279,13 +279,13 @@ def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> 
     return 0.5 * (low + high)
 
 
-def even_lines_task(
+def even_lines(
     gbuffer: GBuffer,
     field: PixelField,
     look: Look,
     wobble_angle: np.ndarray | None = None,
     cache: Cache | None = None,
-) -> Task[EvenLines]:
+) -> EvenLines:
     """Evaluate evenly spaced lines at the pixels of a field.
 
     Parameters
@@ -301,10 +301,6 @@ def even_lines_task(
     cache : Cache, optional
         Stores what does not depend on the camera.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     EvenLines
@@ -318,22 +314,22 @@ def even_lines_task(
     for number, index in enumerate(present):
         start, stop = number / len(present), (number + 1) / len(present)
         pixels = np.flatnonzero(instance_id == index)
-        task = _instance_lines_task(gbuffer, field, look, index, pixels, wobble_angle, 1.0, cache)
-        result = yield from subtask(task, start, (start + stop) / 2)
+        with progress(start, (start + stop) / 2):
+            result = _instance_lines(gbuffer, field, look, index, pixels, wobble_angle, 1.0, cache)
         streaks[:, pixels], period[:, pixels], growth[pixels] = result
         is_crowded = (result[1] < crowded_pixels(look)[1]).any(axis=0)
         pixels = pixels[is_crowded & (field.representation[pixels] != 0)]
         if len(pixels):
-            task = _instance_lines_task(
-                gbuffer, field, look, index, pixels, wobble_angle, COARSE_RATIO, cache
-            )
-            result = yield from subtask(task, (start + stop) / 2, stop)
+            with progress((start + stop) / 2, stop):
+                result = _instance_lines(
+                    gbuffer, field, look, index, pixels, wobble_angle, COARSE_RATIO, cache
+                )
             coarse_streaks = np.zeros_like(streaks) if coarse_streaks is None else coarse_streaks
             coarse_streaks[:, pixels] = result[0]
     return EvenLines(streaks, period, growth if growth.any() else None, coarse_streaks)
 
 
-def _instance_lines_task(
+def _instance_lines(
     gbuffer: GBuffer,
     field: PixelField,
     look: Look,
@@ -342,13 +338,13 @@ def _instance_lines_task(
     wobble_angle: np.ndarray | None,
     ratio: float,
     cache: Cache | None,
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Evaluate the lines of one mesh instance at some pixels of the field.
 
     Parameters
     ----------
     gbuffer, field, look, wobble_angle, cache
-        As for `even_lines_task`.
+        As for `even_lines`.
     index : int
         Of the instance.
     pixels : (n,) intp ndarray
@@ -364,10 +360,10 @@ def _instance_lines_task(
     """
     instance = gbuffer.instances[index]
     spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
-    task = cached_surface_lines_task(
-        instance.surface, instance.matrix, instance.field, look.display, ratio * spacing, cache
-    )
-    lines = yield from subtask(task, 0.0, 1.0)
+    with progress(0.0, 1.0):
+        lines = cached_surface_lines(
+            instance.surface, instance.matrix, instance.field, look.display, ratio * spacing, cache
+        )
     sides = _camera_space_sides(gbuffer, instance)
     unit = spacing / (SPACING_GRAINS * look.grain)
     entries = np.arange(len(gbuffer.pixel), dtype=np.intp)[field.gbuffer_index]
@@ -375,7 +371,7 @@ def _instance_lines_task(
     growth = np.zeros(len(pixels), dtype=np.float32)
     is_all = len(pixels) == len(field.pixel)
     for block in pixel_blocks(len(pixels)):
-        yield Progress(1.0, STEP_LABEL)
+        report(1.0, STEP_LABEL)
         part = pixels[block]
         block_field = field.part(block) if is_all else _taken(field, part)
         phases, line_period, octaves = _evaluate(

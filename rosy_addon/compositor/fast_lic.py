@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .band import BORDER_ROWS, Band, drawn_pixels
 from .contrast import normalize_variance
@@ -26,7 +26,7 @@ from .covering import (
     ALL_NEIGHBORS,
     SINK_CELL,
     Covering,
-    build_covering_task,
+    build_covering,
     member_lines,
     rows_as_scalars,
     scatter_rows,
@@ -34,7 +34,7 @@ from .covering import (
 from .filter_kernel import full_sample_count
 from .flow import blend_channels, streamline_reach
 from .image_noise import NOISE_MEAN
-from .lic_images import LicImages, lic_images_task, step_limits_task
+from .lic_images import LicImages, compute_step_limits, lic_images
 from .look import Look, has_flow, is_hatched
 from .look_units import AntialiasedLook
 from .pixel_field import PixelField
@@ -87,9 +87,9 @@ MIN_STRIP_MARGINS = 4
 OVERLAP_ROWS = 12
 
 
-def fast_lic_task(
+def compute_fast_lic(
     field: PixelField, look: Look, noise: np.ndarray, band: Band | None = None, name: str = ""
-) -> Task[LicImages]:
+) -> LicImages:
     """Compute one LIC image for each of the M lines.
 
     Parameters
@@ -108,23 +108,23 @@ def fast_lic_task(
     LicImages
         At the `drawn_pixels` of the band.
     """
-    (images,) = yield from fast_lic_lengths_task(field, [look], noise, band, name)
+    (images,) = fast_lic_lengths(field, [look], noise, band, name)
     return images
 
 
-def fast_lic_lengths_task(
+def fast_lic_lengths(
     field: PixelField,
     looks: Sequence[Look],
     noise: np.ndarray,
     band: Band | None = None,
     name: str = "",
-) -> Task[list[LicImages]]:
+) -> list[LicImages]:
     """Compute LIC images of several lengths, with the same streamlines.
 
     Parameters
     ----------
     field, noise, band, name
-        As for `fast_lic_task`.
+        As for `compute_fast_lic`.
     looks : sequence of Look
         In pixels of the frame. They differ in the `length` of streamlines. The first is the longest.
 
@@ -135,7 +135,8 @@ def fast_lic_lengths_task(
     """
     step_limits = []
     for look in looks:
-        step_limits.append((yield from subtask(step_limits_task(field, look), 0.0, 0.0)))
+        with progress(0.0):
+            step_limits.append(compute_step_limits(field, look))
     drawn = drawn_pixels(band, field.pixel, field.width)
     channels = 1 if has_flow(looks[0]) else noise.shape[1]
     images = [_NewImages.empty(field, look, drawn, channels) for look in looks]
@@ -145,39 +146,43 @@ def fast_lic_lengths_task(
     # From the top, because the band above needs the values of the uppermost strip.
     for place, strip in enumerate(reversed(strips)):
         start, stop = place / len(strips), (place + 1) / len(strips)
-        yield Progress(start, STEP_LABEL)
-        values = yield from subtask(
-            _strip_values_task(field, strip, looks, noise, step_limits), start, stop
-        )
+        report(start, STEP_LABEL)
+        with progress(start, stop):
+            values = _strip_values(field, strip, looks, noise, step_limits)
         if place:
             row = field.pixel[upper_head] // np.int32(field.width) - np.int32(strip.stop_row)
             _blend_rows(upper_values, _at(values, strip, upper_head), row)
-            yield from subtask(_write_task(images, upper_head, upper_values), stop, stop)
+            with progress(stop):
+                _write(images, upper_head, upper_values)
         elif strip.stop_row < field.height:
             border = slice(strip.core.stop, drawn.stop)
-            yield from subtask(_write_task(images, border, _at(values, strip, border)), stop, stop)
+            with progress(stop):
+                _write(images, border, _at(values, strip, border))
             for index, rows in enumerate(_at(values, strip, strip.tail)):
                 band.exchange.put((name, index, strip.stop_row), rows)
         body = slice(strip.head.stop, strip.core.stop)
-        yield from subtask(_write_task(images, body, _at(values, strip, body)), stop, stop)
+        with progress(stop):
+            _write(images, body, _at(values, strip, body))
         upper_head = strip.head
         upper_values = [rows.copy() for rows in _at(values, strip, strip.head)]
     if strips[0].start_row:
         border = slice(drawn.start, strips[0].core.start)
         below = []
         for index, rows in enumerate(upper_values):
-            task = band.exchange.get_task((name, index, strips[0].start_row))
-            lower = yield from subtask(task, 1.0, 1.0)
+            with progress(1.0):
+                lower = band.exchange.get((name, index, strips[0].start_row))
             below.append(rows[:, :0] if lower is None else lower)
         count = border.stop - border.start
         row = field.pixel[upper_head] // np.int32(field.width) - np.int32(strips[0].start_row)
         _blend_rows(upper_values, [part[:, count:] for part in below], row)
-        yield from subtask(_write_task(images, border, [part[:, :count] for part in below]), 1, 1)
-    yield from subtask(_write_task(images, upper_head, upper_values), 1.0, 1.0)
+        with progress(1):
+            _write(images, border, [part[:, :count] for part in below])
+    with progress(1.0):
+        _write(images, upper_head, upper_values)
     blended = []
     for out in images:
-        task = lic_images_task(out.members, out.effective_samples, out.slopes)
-        blended.append((yield from subtask(task, 1.0, 1.0)))
+        with progress(1.0):
+            blended.append(lic_images(out.members, out.effective_samples, out.slopes))
     return blended
 
 
@@ -296,13 +301,13 @@ def _strips(field: PixelField, look: Look, band: Band | None) -> list[_Strip]:
     return strips
 
 
-def _strip_values_task(
+def _strip_values(
     field: PixelField,
     strip: _Strip,
     looks: Sequence[Look],
     noise: np.ndarray,
     step_limits: Sequence[np.ndarray | None],
-) -> Task[list[np.ndarray]]:
+) -> list[np.ndarray]:
     """Compute the averages of the lines of a strip, for each look.
 
     Returns
@@ -324,27 +329,30 @@ def _strip_values_task(
         return values
     strip_field = _crop_rows(field, extent)
     strip_noise = noise[extent] - np.float32(NOISE_MEAN)
-    covering = yield from subtask(build_covering_task(strip_field, looks[0], strip_noise), 0.0, 0.1)
+    with progress(0.0, 0.1):
+        covering = build_covering(strip_field, looks[0], strip_noise)
     cells = covering.cell_of_pixel[averaged.start - extent.start : averaged.stop - extent.start]
     undefined = strip_field.representation == 0
     tables = []
     for _ in looks:
-        yield Progress(0.1, STEP_LABEL)
+        report(0.1, STEP_LABEL)
         tables.append(_LineAverages(covering, cells, channels))
         own_noise = strip_noise[undefined]
         if has_moving_kernel:
             own_noise = blend_channels(own_noise, looks[0])
         tables[-1].init_undefined(covering.cell_of_pixel[undefined], own_noise)
     cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
-    yield from subtask(_cover_all_lines_task(covering, tables, looks, cell_limits), 0.1, 0.9)
+    with progress(0.1, 0.9):
+        _cover_all_lines(covering, tables, looks, cell_limits)
     line = member_lines(field)
     for look, table, rows in zip(looks, tables, values, strict=True):
         if is_fine(look):
-            yield from subtask(table.smooth_task(covering, cells), 0.9, 0.9)
+            with progress(0.9):
+                table.smooth(covering, cells)
         if has_slopes(look):
-            slopes_task = table.slopes_task(covering, cells, line)
-            rows[:, :, -1] = yield from subtask(slopes_task, 0.9, 0.9)
-        yield Progress(0.9, STEP_LABEL)
+            with progress(0.9):
+                rows[:, :, -1] = table.slopes(covering, cells, line)
+        report(0.9, STEP_LABEL)
         table.gather(cells, line, rows[:, :, : channels + 1])
     return values
 
@@ -372,9 +380,7 @@ def _blend_rows(upper: Sequence[np.ndarray], lower: Sequence[np.ndarray], row: n
             upper_values += weight * (lower_values - upper_values)
 
 
-def _write_task(
-    images: Sequence[_NewImages], pixels: slice, values: Sequence[np.ndarray]
-) -> Task[None]:
+def _write(images: Sequence[_NewImages], pixels: slice, values: Sequence[np.ndarray]) -> None:
     """Write the values of strips at a range of the pixels of the field."""
     for out, rows in zip(images, values, strict=True):
         target = slice(pixels.start - out.first, pixels.stop - out.first)
@@ -384,9 +390,9 @@ def _write_task(
             out.members[:, target], out.effective_samples[target] = NOISE_MEAN, 1
             continue
         for line_values, member in zip(rows, out.members, strict=True):
-            yield Progress(1.0, STEP_LABEL)
+            report(1.0, STEP_LABEL)
             _write_averages(line_values[:, : channels + 1], out.look, member[target])
-        yield Progress(1.0, STEP_LABEL)
+        report(1.0, STEP_LABEL)
         out.effective_samples[target] = rows[:, :, channels].mean(axis=0)
         if out.slopes is not None:
             out.slopes[:, target] = rows[:, :, channels + 1]
@@ -479,7 +485,7 @@ class _LineAverages:
         """The lines, among those given, that need an average and have none yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
-    def smooth_task(self, covering: Covering, cells: np.ndarray) -> Task[None]:
+    def smooth(self, covering: Covering, cells: np.ndarray) -> None:
         """Average all lines of some cells with their neighbors along the line.
 
         Pixels of a line take their averages from different streamlines, which differ a little.
@@ -487,7 +493,7 @@ class _LineAverages:
         smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
         for line, out in enumerate(smooth):
             for block in pixel_blocks(len(cells)):
-                yield Progress(1.0, STEP_LABEL)
+                report(1.0, STEP_LABEL)
                 entry = line * covering.cell_count + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 total = np.float32(2) * own
@@ -495,17 +501,15 @@ class _LineAverages:
                     total += self._or_own(self._flat.take(neighbor, axis=0), own)
                 np.multiply(total, np.float32(0.25), out=out[block])
         for line, rows in enumerate(smooth):
-            yield Progress(1.0, STEP_LABEL)
+            report(1.0, STEP_LABEL)
             scatter_rows(self._values[line], cells, rows)
 
-    def slopes_task(
-        self, covering: Covering, cells: np.ndarray, line: np.ndarray
-    ) -> Task[np.ndarray]:
+    def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
         """(M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
             for block in pixel_blocks(len(cells)):
-                yield Progress(1.0, STEP_LABEL)
+                report(1.0, STEP_LABEL)
                 entry = first_entry + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 left, right = (
@@ -534,12 +538,12 @@ class _LineAverages:
             )
 
 
-def _cover_all_lines_task(
+def _cover_all_lines(
     covering: Covering,
     averages: Sequence[_LineAverages],
     looks: Sequence[Look],
     step_limits: Sequence[np.ndarray | None],
-) -> Task[None]:
+) -> None:
     """Trace streamlines until every line has the averages that it needs, one for each look."""
     look = looks[0]
     half_window = max(HALF_WINDOW_STEPS, look.length // 2)
@@ -558,7 +562,7 @@ def _cover_all_lines_task(
         for batch_seeds in _batches(seeds, batch_size):
             _write_streamlines(averages, batch.trace(batch_seeds))
             covered_steps += batch.covered_steps
-            yield Progress(1 - len(missing) / total, STEP_LABEL)
+            report(1 - len(missing) / total, STEP_LABEL)
         missing = averages[0].missing_lines()
         if len(missing) <= max_uncovered * total:
             break
@@ -569,7 +573,7 @@ def _cover_all_lines_task(
         priority = _seed_priority(covering, missing)
         seeds = missing[(priority >= last) & (priority < threshold)]
     for forward, left in FILL_OFFSETS:
-        yield Progress(0.9, STEP_LABEL)
+        report(0.9, STEP_LABEL)
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
         remaining = [table.copy_from(missing, source) for table in averages]
         missing = remaining[0]
@@ -578,7 +582,7 @@ def _cover_all_lines_task(
     batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):
         _write_streamlines(averages, batch.trace(batch_seeds))
-        yield Progress(0.95, STEP_LABEL)
+        report(0.95, STEP_LABEL)
 
 
 def _write_streamlines(

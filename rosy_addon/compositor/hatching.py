@@ -72,7 +72,7 @@ class LineModulation(NamedTuple):
         Coverage of each pixel by lines along silhouettes and creases, 0 to 1.
     undirected : (P,) float32 ndarray or None
         Undirected texture where the field is undefined, and NaN elsewhere; see
-        `undirected_texture_task`.
+        `undirected_texture`.
     even_lines : EvenLines or None
         Evenly spaced lines, if they are drawn instead of the streaks of LIC images.
     """

@@ -35,14 +35,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.symmetry import FieldSymmetry
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
-from .covering import SINK_CELL, Covering, build_covering_task, member_lines, unpack_neighbor_mask
+from .covering import SINK_CELL, Covering, build_covering, member_lines, unpack_neighbor_mask
 from .filter_kernel import full_sample_count, kernel_of, kernel_weights
 from .flow import FLOW_CHANNELS, cycle_distance
 from .image_noise import NOISE_MEAN
-from .lic_images import LicImages, lic_images_task, step_limits_task
+from .lic_images import LicImages, compute_step_limits, lic_images
 from .look import Look, has_flow
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField
 
@@ -88,7 +88,7 @@ class StreakWaves:
     wave: np.ndarray | None
     effective_samples: np.ndarray
 
-    def images_task(self, phase: float) -> Task[LicImages]:
+    def images(self, phase: float) -> LicImages:
         """Return the LIC images at a phase of the flow."""
         members = np.empty_like(self.constant)
         turn = np.exp(2j * np.pi * phase)
@@ -96,15 +96,16 @@ class StreakWaves:
         count = members.shape[1]
         for line, member in enumerate(members):
             for block in pixel_blocks(count):
-                yield Progress(0.5 * block.start / count, "blending lines")
+                report(0.5 * block.start / count, "blending lines")
                 np.add(self.constant[line, block], np.float32(NOISE_MEAN), out=member[block])
                 if self.wave is not None:
                     wave = self.wave[line, block]
                     member[block, 0] += wave.real * real - wave.imag * imaginary
-        return (yield from subtask(lic_images_task(members, self.effective_samples), 0.5, 1.0))
+        with progress(0.5, 1.0):
+            return lic_images(members, self.effective_samples)
 
 
-def ibfv_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+def ibfv(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
     """Compute one LIC image for each of the M lines.
 
     Parameters
@@ -114,29 +115,27 @@ def ibfv_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImage
         In pixels of the frame.
     noise : (P, K) float32 ndarray
     """
-    (images,) = yield from ibfv_lengths_task(field, [look], noise)
+    (images,) = ibfv_lengths(field, [look], noise)
     return images
 
 
-def ibfv_lengths_task(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray
-) -> Task[list[LicImages]]:
-    """Compute LIC images of several lengths; parameters as for `streak_waves_task`."""
-    waves = yield from subtask(streak_waves_task(field, looks, noise), 0.0, 0.95)
-    return (yield from subtask(wave_images_task(waves, looks), 0.95, 1.0))
+def ibfv_lengths(field: PixelField, looks: Sequence[Look], noise: np.ndarray) -> list[LicImages]:
+    """Compute LIC images of several lengths; parameters as for `streak_waves`."""
+    with progress(0.0, 0.95):
+        waves = streak_waves(field, looks, noise)
+    with progress(0.95, 1.0):
+        return wave_images(waves, looks)
 
 
-def wave_images_task(waves: Sequence[StreakWaves], looks: Sequence[Look]) -> Task[list[LicImages]]:
+def wave_images(waves: Sequence[StreakWaves], looks: Sequence[Look]) -> list[LicImages]:
     """Return the LIC images of looks at their phases."""
     images = []
     for wave, look in zip(waves, looks, strict=True):
-        images.append((yield from wave.images_task(look.flow_phase)))
+        images.append(wave.images(look.flow_phase))
     return images
 
 
-def streak_waves_task(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray
-) -> Task[list[StreakWaves]]:
+def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) -> list[StreakWaves]:
     """Average the noise upstream of every state, for looks that differ in the length of streamlines.
 
     Parameters
@@ -156,29 +155,34 @@ def streak_waves_task(
     if not len(field.pixel):
         return [_empty_waves(field, each, noise) for each in looks]
     # Of the noise, the covering only needs the number of channels.
-    covering_task = build_covering_task(field, look, np.zeros((len(field.pixel), 1), np.float32))
-    covering = yield from subtask(covering_task, 0.0, 0.05)
+    with progress(0.0, 0.05):
+        covering = build_covering(field, look, np.zeros((len(field.pixel), 1), np.float32))
     sheets = _Sheets(covering, is_upstream=not look.oriented)
-    yield from subtask(sheets.link_task(), 0.05, 0.1)
+    with progress(0.05, 0.1):
+        sheets.link()
     decays = []
     for each in looks:
-        decays.append((yield from subtask(_decay_task(field, each), 0.1, 0.1)))
+        with progress(0.1):
+            decays.append(_decay(field, each))
     doublings = max(doubling_count(float(np.max(decay))) for decay in decays)
     full_decays = [float(full_decay(each, is_two_sided(field.symmetry, each))) for each in looks]
     sharpening = np.float32(sharpening_strength(full_decays))
-    sources = yield from subtask(sheets.sources_task(noise, look, sharpening), 0.1, 0.1)
+    with progress(0.1):
+        sources = sheets.sources(noise, look, sharpening)
     sums = [_Sums(sheets, sources, decay, step_turn(look)) for decay in decays]
     for total in sums:
-        yield from subtask(total.start_task(), 0.1, 0.1)
-    origins = yield from subtask(sheets.one_step_task(), 0.1, 0.2)
+        with progress(0.1):
+            total.start()
+    with progress(0.1, 0.2):
+        origins = sheets.one_step()
     for doubling in range(doublings):
         start, stop = (0.2 + 0.7 * place / doublings for place in (doubling, doubling + 1))
-        task = sheets.doubled_task(sums, 1 << doubling, origins, doubling == doublings - 1)
-        origins = yield from subtask(task, start, stop)
+        with progress(start, stop):
+            origins = sheets.doubled(sums, 1 << doubling, origins, doubling == doublings - 1)
     waves = []
     for each, total in zip(looks, sums, strict=True):
-        task = _line_waves_task(field, covering, each, total)
-        waves.append((yield from subtask(task, 0.9, 1.0)))
+        with progress(0.9, 1.0):
+            waves.append(_line_waves(field, covering, each, total))
     return waves
 
 
@@ -255,10 +259,10 @@ def sharpening_strength(decays: Sequence[float]) -> float:
     return SHARPENING * doubling_count(max(decays))
 
 
-def _decay_task(field: PixelField, look: Look) -> Task[np.ndarray]:
+def _decay(field: PixelField, look: Look) -> np.ndarray:
     """(P,) or () float32 ratios q of the weights of successive steps."""
     two_sided = is_two_sided(field.symmetry, look)
-    limits = yield from step_limits_task(field, look)
+    limits = compute_step_limits(field, look)
     if limits is None:
         return full_decay(look, two_sided)
     length = np.arange(look.length + 1, dtype=np.float64)
@@ -405,7 +409,7 @@ class _Sheets:
         (numbers,) = np.nonzero(self._covering_sheet == covering_sheet)
         return int(numbers[0])
 
-    def link_task(self) -> Task[None]:
+    def link(self) -> None:
         """Tabulate what steps to neighbors add to the number of the sheet, from 0.
 
         It is -1 where streamlines cannot step.
@@ -413,7 +417,7 @@ class _Sheets:
         phase = self._covering.packed_phase
         table = self._shift.reshape(9, -1)
         for share, _, block, state in self.blocks(1):
-            yield Progress(share, STEP_LABEL)
+            report(share, STEP_LABEL)
             cell, own = self.cells[block], phase.take(state)
             mask = unpack_neighbor_mask(own)
             for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
@@ -421,20 +425,18 @@ class _Sheets:
                 shift = np.rint(turned / self._spacing).astype(np.int32) % self.count
                 table[bit, cell] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
 
-    def sources_task(
-        self, noise: np.ndarray, look: Look, sharpening: np.float32
-    ) -> Task[list[np.ndarray]]:
+    def sources(self, noise: np.ndarray, look: Look, sharpening: np.float32) -> list[np.ndarray]:
         """Return the (C,) `_noise_sources` of cells, 0 outside, from (P, K) noise; see `SHARPENING`."""
         plain: list[np.ndarray] = []
         for share, _, block, cell in self.blocks(1):
-            yield Progress(share, STEP_LABEL)
+            report(share, STEP_LABEL)
             parts = _noise_sources(noise[block] - np.float32(NOISE_MEAN), look)
             plain = plain or [np.zeros(self.cell_count, dtype=np.complex64) for _ in parts]
             for source, part in zip(plain, parts, strict=True):
                 source[cell] = part
         sharp = [source.copy() for source in plain]
         for share, _, _, cell in self.blocks(1):
-            yield Progress(share, STEP_LABEL)
+            report(share, STEP_LABEL)
             for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
                 if abs(column) + abs(row) == 1:
                     linked = cell[self._shift.take(bit * self.cell_count + cell) >= 0]
@@ -461,7 +463,7 @@ class _Sheets:
                 state = sheet * self.cell_count + self.cells[block].astype(np.intp)
                 yield (sheet + block.start / count) / sheets, sheet, block, state
 
-    def one_step_task(self) -> Task[_Origins]:
+    def one_step(self) -> _Origins:
         """Find where each state is reached from in a step, by the midpoint method."""
         scale = np.float32(self._covering.state_scales[0])
         table = self._covering.state_table.reshape(
@@ -469,13 +471,13 @@ class _Sheets:
         )
         step = np.zeros((self.count, self.cell_count), dtype=np.complex64)
         for rows, sheet in zip(step, self._covering_sheet, strict=True):
-            yield Progress(0.0, STEP_LABEL)
+            report(0.0, STEP_LABEL)
             rows.real, rows.imag = table[sheet, :, 0], table[sheet, :, 1]
             rows *= scale
         step = step.reshape(-1)
         result = _Origins.ended(len(step))
         for share, sheet, block, state in self.blocks():
-            yield Progress(share, STEP_LABEL)
+            report(share, STEP_LABEL)
             cell = self.cells[block]
             sheets = np.full(len(cell), sheet, dtype=np.int8)
             own = step.take(state)
@@ -486,9 +488,9 @@ class _Sheets:
             result.put(state, self._moved(_Origins(cell, sheets, middle)))
         return result
 
-    def doubled_task(
+    def doubled(
         self, sums: Sequence[_Sums], steps: int, origins: _Origins, is_last: bool
-    ) -> Task[_Origins]:
+    ) -> _Origins:
         """Add to sums over a number of steps those over as many further steps, from the origins.
 
         Returns
@@ -499,7 +501,7 @@ class _Sheets:
         doubled = [[values.copy() for values in total.values] for total in sums]
         result = _Origins.ended(0 if is_last else len(origins.cell))
         for share, _, block, state in self.blocks():
-            yield Progress(share, STEP_LABEL)
+            report(share, STEP_LABEL)
             around = self.surroundings(origins.at(state))
             weights = around.weights()
             for total, results in zip(sums, doubled, strict=True):
@@ -646,10 +648,10 @@ class _Sums:
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
 
-    def start_task(self) -> Task[None]:
+    def start(self) -> None:
         """Set the sums to the noise of each state."""
         for share, _, block, state in self._sheets.blocks():
-            yield Progress(share, STEP_LABEL)
+            report(share, STEP_LABEL)
             for total, source in zip(self.values, self.sources, strict=True):
                 total[state] = source.take(self._sheets.cells[block])
 
@@ -701,9 +703,7 @@ class _Sums:
         return values, weight, _square_sum(np.clip(rest, 0, 1), decay).astype(np.float32)
 
 
-def _line_waves_task(
-    field: PixelField, covering: Covering, look: Look, sums: _Sums
-) -> Task[StreakWaves]:
+def _line_waves(field: PixelField, covering: Covering, look: Look, sums: _Sums) -> StreakWaves:
     """Blend the two sheets of each line, and equalize the contrast."""
     lines, count = field.line_count, len(field.pixel)
     flows = has_flow(look)
@@ -714,7 +714,7 @@ def _line_waves_task(
     effective_samples = np.zeros(count, dtype=np.float32)
     for line, first_sheet in enumerate(member_lines(field).tolist()):
         for block in pixel_blocks(count):
-            yield Progress((line + block.start / count) / lines, "blending lines")
+            report((line + block.start / count) / lines, "blending lines")
             state = first_sheet * covering.cell_count + covering.cell_of_pixel[block].astype(
                 np.intp
             )

@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .filter_kernel import Kernel
-from .picture_tiles import TileRectangle, cached_tiles_task, tile_rectangle
+from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 
 #: Mean and standard deviation of binary noise.
 NOISE_MEAN, NOISE_STD = 0.5, 0.5
@@ -100,14 +100,13 @@ def image_noise(
     density: float = 0.5,
     high_pass: float = 0.0,
 ) -> np.ndarray:
-    """Make noise that is anchored to the picture, without progress; see `image_noise_task`."""
-    task = image_noise_task(
+    """Make noise that is anchored to the picture, without progress; see `compute_image_noise`."""
+    return compute_image_noise(
         pixel, width, grain, seed, channels, density=density, high_pass=high_pass
     )
-    return run_to_completion(task)
 
 
-def image_noise_task(
+def compute_image_noise(
     pixel: np.ndarray,
     width: int,
     grain: float,
@@ -116,7 +115,7 @@ def image_noise_task(
     *,
     density: float = 0.5,
     high_pass: float = 0.0,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Make noise that is anchored to the picture: random binary square cells, filtered to pixels.
 
     Parameters
@@ -145,42 +144,38 @@ def image_noise_task(
     noise = np.empty((len(pixel), channels), dtype=np.float32)
     for channel in range(channels):
         settings = grain, seed, channel, density, high_pass
-        tiles = yield from subtask(
-            cached_tiles_task(_noise_tiles_task, rectangle, *settings),
-            channel / channels,
-            (channel + 1) / channels,
-        )
+        with progress(channel / channels, (channel + 1) / channels):
+            tiles = cached_tiles(_noise_tiles, rectangle, *settings)
         for block in pixel_blocks(len(pixel)):
-            yield Progress((channel + 1) / channels, STEP_LABEL)
+            report((channel + 1) / channels, STEP_LABEL)
             index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
             noise[block, channel] = tiles.take(index)
     return noise
 
 
-def _noise_tiles_task(
+def _noise_tiles(
     rectangle: TileRectangle,
     grain: float,
     seed: int,
     channel: int,
     density: float,
     high_pass: float,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
     padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
-    cells = yield from _lattice_noise_task(*padded_bounds, grain, seed, channel, density)
+    cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
     if high_pass:
         outside = "edge" if margin == full_margin else "mean"
-        blur_task = gaussian_blur_task(cells, BLUR_FACTOR * high_pass, outside)
-        cells += NOISE_MEAN - (yield from blur_task)
-        yield Progress(1.0, STEP_LABEL)
+        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
+        report(1.0, STEP_LABEL)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 
 
-def _lattice_noise_task(
+def _lattice_noise(
     left: int,
     right: int,
     bottom: int,
@@ -189,7 +184,7 @@ def _lattice_noise_task(
     seed: int,
     channel: int,
     density: float,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(top - bottom, right - left) float32 noise without high pass, averaged over each pixel."""
     cos, sin = np.cos(LATTICE_ANGLE) / grain, np.sin(LATTICE_ANGLE) / grain
     column = np.arange(left, right, dtype=np.float64)
@@ -197,7 +192,7 @@ def _lattice_noise_task(
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
     total = np.zeros((top - bottom, right - left), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
-        yield Progress(0.0, STEP_LABEL)
+        report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         for y in taps:
             for x in taps:
@@ -226,13 +221,6 @@ def box_radius(sigma: float) -> int:
 def gaussian_blur(
     image: np.ndarray, sigma: float, outside: Literal["edge", "mean"] = "edge"
 ) -> np.ndarray:
-    """Blur an image, without progress reports; see `gaussian_blur_task`."""
-    return run_to_completion(gaussian_blur_task(image, sigma, outside))
-
-
-def gaussian_blur_task(
-    image: np.ndarray, sigma: float, outside: Literal["edge", "mean"] = "edge"
-) -> Task[np.ndarray]:
     """Approximate a Gaussian blur by three box filters.
 
     Parameters
@@ -251,7 +239,7 @@ def gaussian_blur_task(
     for index, axis in enumerate((0, 1, 0, 1, 0, 1)):
         blurred = np.empty(image.shape, dtype=np.float32)
         for start in range(0, image.shape[1 - axis], BLUR_LINES):
-            yield Progress((index + start / image.shape[1 - axis]) / 6, STEP_LABEL)
+            report((index + start / image.shape[1 - axis]) / 6, STEP_LABEL)
             lines = [slice(None), slice(None)]
             lines[1 - axis] = slice(start, start + BLUR_LINES)
             blurred[tuple(lines)] = _box_filter(image[tuple(lines)], radius, axis, outside)

@@ -8,28 +8,28 @@ from typing import Any
 import numpy as np
 
 from ..memory import raise_mmap_threshold
-from ..progress import Task, run_to_completion, subtask
+from ..progress import progress
 from .band import Band
-from .brute_force import brute_force_task
-from .fast_lic import fast_lic_lengths_task, fast_lic_task
+from .brute_force import brute_force
+from .fast_lic import compute_fast_lic, fast_lic_lengths
 from .flow import noise_channel_count
-from .ibfv import ibfv_lengths_task, ibfv_task
-from .image_noise import image_noise_task
+from .ibfv import ibfv, ibfv_lengths
+from .image_noise import compute_image_noise
 from .lic_images import LicImages
 from .look import Look
-from .member_decomposition import member_decomposition_task
+from .member_decomposition import member_decomposition
 from .pixel_field import PixelField
 
 #: LIC methods by the value of `Look.method`.
-METHODS: dict[str, Callable[[PixelField, Look, np.ndarray], Task[LicImages]]] = {
-    "members": member_decomposition_task,
-    "brute": brute_force_task,
-    "sheets": fast_lic_task,
-    "ibfv": ibfv_task,
+METHODS: dict[str, Callable[[PixelField, Look, np.ndarray], LicImages]] = {
+    "members": member_decomposition,
+    "brute": brute_force,
+    "sheets": compute_fast_lic,
+    "ibfv": ibfv,
 }
 
 
-def lic_task(field: PixelField, look: Look, noise: np.ndarray | None = None) -> Task[LicImages]:
+def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicImages:
     """Average noise along the streamlines of each member, with the method of the look.
 
     Parameters
@@ -44,43 +44,39 @@ def lic_task(field: PixelField, look: Look, noise: np.ndarray | None = None) -> 
     -------
     LicImages
     """
-    (images,) = yield from lic_lengths_task(field, [look], noise)
+    (images,) = lic_lengths(field, [look], noise)
     return images
 
 
-def lic_lengths_task(
+def lic_lengths(
     field: PixelField,
     looks: Sequence[Look],
     noise: np.ndarray | None = None,
     band: Band | None = None,
     name: str = "",
-) -> Task[list[LicImages]]:
-    """Do the same as `lic_task` for looks that differ in the length of streamlines, longest first.
+) -> list[LicImages]:
+    """Do the same as `lic` for looks that differ in the length of streamlines, longest first.
 
-    The images may be those of a band of the picture; see `fast_lic_task`.
+    The images may be those of a band of the picture; see `compute_fast_lic`.
     """
     raise_mmap_threshold()
     look = looks[0]
     if noise is None:
-        noise = yield from subtask(look_noise_task(field, look), 0.0, 0.0)
+        with progress(0.0):
+            noise = look_noise(field, look)
     if look.method == "sheets":
-        return (yield from fast_lic_lengths_task(field, looks, noise, band, name))
+        return fast_lic_lengths(field, looks, noise, band, name)
     if look.method == "ibfv":
-        return (yield from ibfv_lengths_task(field, looks, noise))
+        return ibfv_lengths(field, looks, noise)
     images = []
     for each in looks:
-        images.append((yield from METHODS[look.method](field, each, noise)))
+        images.append(METHODS[look.method](field, each, noise))
     return images
 
 
 def look_noise(field: PixelField, look: Look) -> np.ndarray:
     """(P, K) float32 image-space noise of a look at the pixels of a field."""
-    return run_to_completion(look_noise_task(field, look))
-
-
-def look_noise_task(field: PixelField, look: Look) -> Task[np.ndarray]:
-    """Do the same as `look_noise`, in steps."""
-    return image_noise_task(field.pixel, field.width, **noise_args(look))
+    return compute_image_noise(field.pixel, field.width, **noise_args(look))
 
 
 def noise_args(look: Look) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .filter_kernel import WEIGHT_SLOPES, kernel_of, kernel_weights
@@ -58,26 +58,26 @@ class LicImages:
         )
 
 
-def lic_images_task(
+def lic_images(
     members: np.ndarray, effective_samples: np.ndarray, slopes: np.ndarray | None = None
-) -> Task[LicImages]:
+) -> LicImages:
     """Blend member images. Parameters as in `LicImages`."""
     blend = np.empty(members.shape[1:], dtype=np.float32)
     for block in pixel_blocks(len(blend)):
-        yield Progress(block.start / len(blend), "blending lines")
+        report(block.start / len(blend), "blending lines")
         blend[block] = members[:, block].mean(axis=0)
     return LicImages(
         members, blend, effective_samples, np.ones(len(effective_samples), dtype=np.float32), slopes
     )
 
 
-def convolve_members_task(
+def convolve_members(
     field: PixelField,
     look: Look,
     noise: np.ndarray,
     neighbors: np.ndarray,
     tracers: Sequence[LineTracer],
-) -> Task[LicImages]:
+) -> LicImages:
     """Trace a streamline of each member through every pixel, and average the noise along it.
 
     Parameters
@@ -87,7 +87,7 @@ def convolve_members_task(
         In pixels of the frame. Its `length`, `step`, kernel and `magnitude` are used.
     noise : (P, K) float32 ndarray
     neighbors : (9, P + 1) int32 ndarray
-        From `pixel_field.neighbor_table_task`.
+        From `pixel_field.neighbor_table`.
     tracers : sequence of M functions
         One per member image.
 
@@ -96,7 +96,8 @@ def convolve_members_task(
     LicImages
     """
     count, channels = noise.shape
-    step_limit = yield from subtask(step_limits_task(field, look), 0.0, 0.0)
+    with progress(0.0):
+        step_limit = compute_step_limits(field, look)
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
@@ -124,19 +125,20 @@ def convolve_members_task(
             members[member, block] = normalize_variance(mean, weights.effective_samples, look)
             effective_samples[block] += weights.effective_samples
             fraction = (member + block.stop / count) / len(tracers)
-            yield Progress(fraction, "tracing streamlines")
+            report(fraction, "tracing streamlines")
     effective_samples /= len(tracers)
-    return (yield from subtask(lic_images_task(members, effective_samples), 1.0, 1.0))
+    with progress(1.0):
+        return lic_images(members, effective_samples)
 
 
-def step_limits_task(field: PixelField, look: Look) -> Task[np.ndarray | None]:
+def compute_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
     """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
     if look.magnitude not in ("length", "both"):
         return None
     look = with_magnitude_range(look, field)
     limits = np.empty(len(field.pixel), dtype=np.int32)
     for block in pixel_blocks(len(limits)):
-        yield Progress(block.start / len(limits), "tracing streamlines")
+        report(block.start / len(limits), "tracing streamlines")
         limits[block] = np.rint(look.length * relative_magnitude(field.part(block), look))
     return limits
 

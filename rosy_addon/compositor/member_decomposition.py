@@ -7,18 +7,19 @@ TVCG 17(7), 2011, section 4.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .lic_images import LicImages, LineTracer, convolve_members_task
+from .lic_images import LicImages, LineTracer, convolve_members
 from .look import Look
-from .per_pixel_lic import direction_table_task, interpolate_direction
-from .pixel_field import PixelField, all_members, blend_weights, neighbor_table_task
+from .per_pixel_lic import direction_table, interpolate_direction
+from .pixel_field import PixelField, all_members, blend_weights, neighbor_table
 
 
-def member_decomposition_task(field: PixelField, look: Look, noise: np.ndarray) -> Task[LicImages]:
+def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
     """Compute two sets of member images, and blend them.
 
     The first set follows V_i, the member nearest to the guiding angle phi + 2 pi i / N. Where two
@@ -37,16 +38,18 @@ def member_decomposition_task(field: PixelField, look: Look, noise: np.ndarray) 
     -------
     LicImages
     """
-    neighbors = yield from subtask(neighbor_table_task(field), 0.0, 0.0)
+    with progress(0.0):
+        neighbors = neighbor_table(field)
     angle = look.guiding_angle
-    first_task = _one_set_task(field, look, noise, neighbors, angle)
+    first_task = partial(_one_set, field, look, noise, neighbors, angle)
     if field.degree == 1 or look.weights == "none":
-        return (yield from first_task)
-    first = yield from subtask(first_task, 0.0, 0.5)
-    second_task = _one_set_task(field, look, noise, neighbors, angle + np.pi / field.degree)
-    second = yield from subtask(second_task, 0.5, 1.0)
+        return first_task()
+    with progress(0.0, 0.5):
+        first = first_task()
+    with progress(0.5, 1.0):
+        second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
     for block in pixel_blocks(len(field.pixel)):
-        yield Progress(1.0, "blending lines")
+        report(1.0, "blending lines")
         weight = _first_set_weight(field.part(block), look)
         second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
         second.effective_samples[block] += weight * (
@@ -56,12 +59,13 @@ def member_decomposition_task(field: PixelField, look: Look, noise: np.ndarray) 
     return replace(first, blend=second.blend, effective_samples=second.effective_samples)
 
 
-def _one_set_task(
+def _one_set(
     field: PixelField, look: Look, noise: np.ndarray, neighbors: np.ndarray, angle: float
-) -> Task[LicImages]:
+) -> LicImages:
     """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
-    tracers = yield from subtask(_tracers_task(field, look, neighbors, angle), 0.0, 0.0)
-    return (yield from convolve_members_task(field, look, noise, neighbors, tracers))
+    with progress(0.0):
+        tracers = _tracers(field, look, neighbors, angle)
+    return convolve_members(field, look, noise, neighbors, tracers)
 
 
 def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
@@ -75,14 +79,14 @@ def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
     return (weight > 0.5).astype(np.float32) if look.weights == "binary" else weight
 
 
-def _tracers_task(
+def _tracers(
     field: PixelField, look: Look, neighbors: np.ndarray, angle: float
-) -> Task[list[LineTracer]]:
+) -> list[LineTracer]:
     """Make tracers along the M members nearest to `angle` and to its rotations by 2 pi / N."""
     count = len(field.pixel)
     members, directions = np.empty((2, field.line_count, count), dtype=np.complex64)
     for block in pixel_blocks(count):
-        yield Progress(block.start / count, "finding directions")
+        report(block.start / count, "finding directions")
         part = field.part(block)
         if look.view_plane:
             members[:, block] = all_members(part, angle)[: field.line_count]
@@ -93,13 +97,13 @@ def _tracers_task(
             members[:, block] = directions[:, block] = _screen_space_members(part, angle)
     tracers = []
     for member, direction in zip(members, directions, strict=True):
-        table = yield from direction_table_task(direction, member, field.degree, neighbors)
+        table = direction_table(direction, member, field.degree, neighbors)
         tracers.append(_direction_tracer(table))
     return tracers
 
 
 def _direction_tracer(table: np.ndarray) -> LineTracer:
-    """Make a tracer along one vector field on screen, given its `direction_table_task`."""
+    """Make a tracer along one vector field on screen, given its `direction_table`."""
 
     def forward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
         return interpolate_direction(table.take(entry, axis=0), offset)

@@ -16,14 +16,14 @@ import numpy as np
 
 from ..cache import Cache
 from ..field.frames import dot
-from ..field.surface import connected_components_task
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..field.surface import connected_components
+from ..progress import progress, report
 from ..projection.crease_pixels import mark_crease_pixels
 from ..projection.gbuffer import GBuffer
-from ..projection.outline_mesh import cached_outline_mesh_task
+from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.pixel_neighbors import affine_depth, neighbor_masks_task
-from ..projection.project import project_samples_task
+from ..projection.pixel_neighbors import affine_depth, neighbor_masks
+from ..projection.project import project_samples
 from .look import Look
 from .look_units import supersampled_look
 
@@ -55,12 +55,7 @@ STEP_LABEL = "drawing outlines"
 NEIGHBORS_4 = ((1, 0, 5), (-1, 0, 3), (0, 1, 7), (0, -1, 1))
 
 
-def outline_coverage(gbuffer: GBuffer, look: Look) -> np.ndarray:
-    """Return the coverage by outlines, without progress reports; see `outline_task`."""
-    return run_to_completion(outline_task(gbuffer, look))
-
-
-def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Task[np.ndarray]:
+def outline_coverage(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> np.ndarray:
     """Compute the coverage of each pixel by outlines.
 
     Parameters
@@ -80,12 +75,15 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
         0 to 1.
     """
     if gbuffer.samples is None:
-        edges = yield from subtask(_find_edges_task(gbuffer, look, cache), 0.0, 0.8)
-        return (yield from subtask(_draw_edges_task(gbuffer, look, edges), 0.8, 1.0))
-    edges = yield from subtask(_find_edges_task(gbuffer, look, cache), 0.0, 0.3)
+        with progress(0.0, 0.8):
+            edges = _find_edges(gbuffer, look, cache)
+        with progress(0.8, 1.0):
+            return _draw_edges(gbuffer, look, edges)
+    with progress(0.0, 0.3):
+        edges = _find_edges(gbuffer, look, cache)
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
-    yield Progress(0.3, STEP_LABEL)
+    report(0.3, STEP_LABEL)
     is_near = _dilated(gbuffer, is_start, reach)
     # The samples at the border of this part do not know their neighbors.
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
@@ -93,8 +91,8 @@ def outline_task(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> Ta
     for band, core in _bands(gbuffer, entries, reach + FULL_MARK_LENGTH):
         start = 0.3 + 0.7 * core.start / len(entries)
         stop = 0.3 + 0.7 * core.stop / len(entries)
-        task = _sample_outline_task(gbuffer, look, entries[band], is_near, cache)
-        home, shown, coverage = yield from subtask(task, start, stop, STEP_LABEL)
+        with progress(start, stop, STEP_LABEL):
+            home, shown, coverage = _sample_outline(gbuffer, look, entries[band], is_near, cache)
         first, last = entries[core.start], entries[core.stop - 1]
         is_core = (home >= first) & (home <= last)
         sums += np.bincount(shown[is_core], coverage[is_core], minlength=len(sums))
@@ -122,9 +120,9 @@ def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> Iterator[tuple
         start = stop
 
 
-def _sample_outline_task(
+def _sample_outline(
     gbuffer: GBuffer, look: Look, entries: np.ndarray, is_near: np.ndarray, cache: Cache | None
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the coverage of samples by outlines.
 
     Parameters
@@ -142,15 +140,17 @@ def _sample_outline_task(
     Returns
     -------
     home, shown : (Q,) int32 ndarray
-        Entries of the samples; see `project_samples_task`.
+        Entries of the samples; see `project_samples`.
     coverage : (Q,) float32 ndarray
     """
-    task = project_samples_task(gbuffer, entries, look.display, cache)
-    samples, home, shown = yield from subtask(task, 0.0, 0.4)
+    with progress(0.0, 0.4):
+        samples, home, shown = project_samples(gbuffer, entries, look.display, cache)
     look = supersampled_look(replace(look, supersampling=gbuffer.samples.side))
-    edges = yield from subtask(_find_edges_task(samples, look, cache), 0.4, 0.8)
+    with progress(0.4, 0.8):
+        edges = _find_edges(samples, look, cache)
     edges.line_width[~is_near[home]] = 0
-    coverage = yield from subtask(_draw_edges_task(samples, look, edges), 0.8, 1.0)
+    with progress(0.8, 1.0):
+        coverage = _draw_edges(samples, look, edges)
     return home, shown, coverage
 
 
@@ -166,7 +166,7 @@ def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray
     return padded[row, column]
 
 
-def _find_edges_task(gbuffer: GBuffer, look: Look, cache: Cache | None) -> Task[_Edges]:
+def _find_edges(gbuffer: GBuffer, look: Look, cache: Cache | None) -> _Edges:
     """Find the pixels at silhouettes, borders and creases, and how wide lines may be there."""
     width, height = gbuffer.camera.width, gbuffer.camera.height
     radius = int(np.ceil(look.outline))
@@ -175,7 +175,7 @@ def _find_edges_task(gbuffer: GBuffer, look: Look, cache: Cache | None) -> Task[
     entry_of_cell = np.full((height + 2 * radius + 2) * stride, -1, dtype=np.int32)
     cell = np.empty(len(gbuffer.pixel), dtype=np.int32)
     for block in pixel_blocks(len(cell)):
-        yield Progress(0.1 * block.start / len(cell), STEP_LABEL)
+        report(0.1 * block.start / len(cell), STEP_LABEL)
         row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
         cell[block] = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
         entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
@@ -183,50 +183,42 @@ def _find_edges_task(gbuffer: GBuffer, look: Look, cache: Cache | None) -> Task[
     # Larger depths are nearer to the eye.
     depth, tolerance = np.empty((2, len(cell)), dtype=np.float32)
     for block in pixel_blocks(len(cell)):
-        yield Progress(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
+        report(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
         depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
-    task = neighbor_masks_task(gbuffer, look.crease_angle, True)
-    mask = yield from subtask(task, 0.2, 0.6, STEP_LABEL)
+    with progress(0.2, 0.6, STEP_LABEL):
+        mask = neighbor_masks(gbuffer, look.crease_angle, True)
     line_width = np.zeros(len(cell), dtype=np.float32)
     border = np.zeros(len(cell), dtype=np.uint8)
     instance_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)) if gbuffer.instances else ()
     for instance_id in instance_ids:
-        yield from subtask(
-            _creases_and_parts_task(
+        with progress(0.6, 0.7, STEP_LABEL):
+            _creases_and_parts(
                 gbuffer, int(instance_id), look, cache, grid, mask, line_width, border
-            ),
-            0.6,
-            0.7,
-            STEP_LABEL,
-        )
-    task = _occlusions_task(gbuffer, look, grid, mask, depth, tolerance, line_width, border)
-    yield from subtask(task, 0.7, 0.9, STEP_LABEL)
-    task = _steps_task(gbuffer, look, grid, mask, depth, tolerance, line_width)
-    yield from subtask(task, 0.9, 1.0, STEP_LABEL)
+            )
+    with progress(0.7, 0.9, STEP_LABEL):
+        _occlusions(gbuffer, look, grid, mask, depth, tolerance, line_width, border)
+    with progress(0.9, 1.0, STEP_LABEL):
+        _steps(gbuffer, look, grid, mask, depth, tolerance, line_width)
     return _Edges(grid, depth, tolerance, line_width, border)
 
 
-def _draw_edges_task(gbuffer: GBuffer, look: Look, edges: _Edges) -> Task[np.ndarray]:
+def _draw_edges(gbuffer: GBuffer, look: Look, edges: _Edges) -> np.ndarray:
     """(P,) float32 coverage of each pixel by the lines of edges."""
     grid, depth, tolerance, line_width, border = edges
     edge_pixels = np.flatnonzero(line_width)
-    strength = yield from subtask(
-        _mark_strength_task(
+    with progress(0.0, 0.5, STEP_LABEL):
+        strength = _mark_strength(
             gbuffer.pixel[edge_pixels],
             border[edge_pixels],
             gbuffer.camera.width,
             look.supersampling,
-        ),
-        0.0,
-        0.5,
-        STEP_LABEL,
-    )
+        )
     edge_pixels, strength = edge_pixels[strength > 0], strength[strength > 0]
     line_width = np.minimum(line_width[edge_pixels], np.float32(look.outline) * strength)
     depth_slack = np.float32(DEPTH_JUMP) * tolerance[edge_pixels]
     coverage = np.zeros(len(depth), dtype=np.float32)
     for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
-        yield Progress(0.5, STEP_LABEL)
+        report(0.5, STEP_LABEL)
         neighbor = grid.entry.take(grid.cell[edge_pixels] + (dy * grid.stride + dx))
         paintable = (neighbor >= 0) & (
             gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge_pixels]
@@ -282,7 +274,7 @@ class _Edges(NamedTuple):
     border: np.ndarray
 
 
-def _creases_and_parts_task(
+def _creases_and_parts(
     gbuffer: GBuffer,
     instance_id: int,
     look: Look,
@@ -291,17 +283,17 @@ def _creases_and_parts_task(
     mask: np.ndarray,
     line_width: np.ndarray,
     border: np.ndarray,
-) -> Task[None]:
+) -> None:
     """Set the width of lines along the creases of an instance, and along borders of its parts.
 
     There is a line where two parts of a mesh intersect if their normals differ by the crease angle.
-    `mask` is that of `neighbor_masks_task`, without creases.
+    `mask` is that of `neighbor_masks`, without creases.
     `border` becomes `PART_BORDER` wherever another part begins.
     """
     instance = gbuffer.instances[instance_id]
     crease_angle = None if look.cross_creases else look.crease_angle
-    task = cached_outline_mesh_task(instance.surface, instance.matrix, crease_angle, cache)
-    mesh = yield from subtask(task, 0.0, 0.5)
+    with progress(0.0, 0.5):
+        mesh = cached_outline_mesh(instance.surface, instance.matrix, crease_angle, cache)
     defined = gbuffer.representation != 0
     if len(mesh.crease_ends):
         marks = np.zeros(len(grid.cell), dtype=bool)
@@ -311,13 +303,13 @@ def _creases_and_parts_task(
             gbuffer, instance_id, points, grid.entry, grid.origin, grid.stride, marks
         )
         for fraction in steps:
-            yield Progress(0.5 + 0.3 * fraction, STEP_LABEL)
+            report(0.5 + 0.3 * fraction, STEP_LABEL)
         line_width[marks & defined] = look.outline / 2
     if mesh.triangle_part is None:
         return
     min_cosine = -2.0 if crease_angle is None else np.float32(np.cos(crease_angle))
     for block in pixel_blocks(len(grid.cell)):
-        yield Progress(0.8 + 0.2 * block.start / len(grid.cell), STEP_LABEL)
+        report(0.8 + 0.2 * block.start / len(grid.cell), STEP_LABEL)
         entry = np.flatnonzero(gbuffer.instance_id[block] == instance_id) + block.start
         part = mesh.triangle_part.take(gbuffer.triangle[entry])
         for dx, dy, bit in NEIGHBORS_4:
@@ -333,7 +325,7 @@ def _creases_and_parts_task(
             line_width[a[meet]] = look.outline / 2
 
 
-def _occlusions_task(
+def _occlusions(
     gbuffer: GBuffer,
     look: Look,
     grid: _CellGrid,
@@ -342,16 +334,16 @@ def _occlusions_task(
     tolerance: np.ndarray,
     line_width: np.ndarray,
     border: np.ndarray,
-) -> Task[None]:
+) -> None:
     """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
 
-    `mask` is that of `neighbor_masks_task`, without creases.
+    `mask` is that of `neighbor_masks`, without creases.
     There is no edge at the border of the frame, and none where the surface continues but the field
     ends. `border` is set where another instance or no surface follows.
     """
     defined = gbuffer.representation != 0
     for block in pixel_blocks(len(grid.cell)):
-        yield Progress(block.start / len(grid.cell), STEP_LABEL)
+        report(block.start / len(grid.cell), STEP_LABEL)
         row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
         for dx, dy, bit in NEIGHBORS_4:
             inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
@@ -374,7 +366,7 @@ def _occlusions_task(
             border[edge[~is_empty & ~same_instance]] |= PART_BORDER
 
 
-def _steps_task(
+def _steps(
     gbuffer: GBuffer,
     look: Look,
     grid: _CellGrid,
@@ -382,16 +374,16 @@ def _steps_task(
     depth: np.ndarray,
     tolerance: np.ndarray,
     line_width: np.ndarray,
-) -> Task[None]:
+) -> None:
     """Set the width of lines at the nearer pixel of steps in the depth of a surface.
 
     A surface that is seen edge-on predicts any difference in depth, so `mask`, that of
-    `neighbor_masks_task`, does not tell it from a silhouette. At a step, the depth changes much more
+    `neighbor_masks`, does not tell it from a silhouette. At a step, the depth changes much more
     than from either pixel on to the next.
     """
     defined = gbuffer.representation != 0
     for block in pixel_blocks(len(grid.cell)):
-        yield Progress(block.start / len(grid.cell), STEP_LABEL)
+        report(block.start / len(grid.cell), STEP_LABEL)
         for offset, bit in ((1, 5), (grid.stride, 7)):
             first = np.flatnonzero(mask[block] >> np.uint16(bit) & 1) + block.start
             second = grid.entry.take(grid.cell[first] + offset)
@@ -409,9 +401,9 @@ def _steps_task(
             line_width[nearer[defined[first] & defined[second]]] = look.outline
 
 
-def _mark_strength_task(
+def _mark_strength(
     pixel: np.ndarray, border: np.ndarray, width: int, block_side: int
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Return the share of the full width that lines may have, by the lengths of their marks.
 
     Marks are connected pixels of the finished picture; diagonal neighbors are connected. The length
@@ -437,21 +429,21 @@ def _mark_strength_task(
     """
     if not len(pixel):
         return np.zeros(0, dtype=np.float32)
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     row, column = np.divmod(pixel.astype(np.int64), width)
     stride = width // block_side + 2
     block, block_of_pixel = np.unique(
         row // block_side * stride + column // block_side, return_inverse=True
     )
-    yield Progress(0.2, STEP_LABEL)
+    report(0.2, STEP_LABEL)
     pairs = []
     for offset in (1, stride - 1, stride, stride + 1):
         target = np.searchsorted(block, block + offset)
         target[target == len(block)] = 0
         source = np.flatnonzero(block[target] == block + offset)
         pairs.append(np.stack([source, target[source]], axis=1))
-    task = connected_components_task(len(block), np.concatenate(pairs))
-    mark = yield from subtask(task, 0.3, 0.8)
+    with progress(0.3, 0.8):
+        mark = connected_components(len(block), np.concatenate(pairs))
     sides = [_extent_per_label(values, mark) for values in (block // stride, block % stride)]
     is_part_border = np.zeros(len(block), dtype=bool)
     is_part_border[block_of_pixel[border & PART_BORDER != 0]] = True

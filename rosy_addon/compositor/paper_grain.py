@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur_task, hash_bits_2d
+from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits_2d
 from .look import Look
-from .picture_tiles import TileRectangle, cached_tiles_task, tile_rectangle
+from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
 #: grains, and its minimum in pixels.
@@ -47,15 +47,6 @@ STEP_LABEL = "drawing the paper grain"
 def picture_paper_grain(
     pixel: np.ndarray, width: int, grain: float, seed: int, subpixels: int = 1, line_count: int = 1
 ) -> np.ndarray:
-    """Return paper grain, without progress reports; see `picture_paper_grain_task`."""
-    return run_to_completion(
-        picture_paper_grain_task(pixel, width, grain, seed, subpixels, line_count)
-    )
-
-
-def picture_paper_grain_task(
-    pixel: np.ndarray, width: int, grain: float, seed: int, subpixels: int = 1, line_count: int = 1
-) -> Task[np.ndarray]:
     """Make paper grain that is anchored to the picture.
 
     The grain of different lines must be independent. Otherwise the coverages of crossing lines
@@ -83,10 +74,10 @@ def picture_paper_grain_task(
     """
     offset = line_offset(grain)
     rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
-    tiles = yield from cached_tiles_task(_grain_tiles_task, rectangle, grain, seed)
+    tiles = cached_tiles(_grain_tiles, rectangle, grain, seed)
     heights = np.empty((line_count, len(pixel)), dtype=np.float32)
     for block in pixel_blocks(len(pixel)):
-        yield Progress(block.start / len(pixel), STEP_LABEL)
+        report(block.start / len(pixel), STEP_LABEL)
         row, column = np.divmod(pixel[block], np.int32(width))
         index = rectangle.index(row // subpixels, column // subpixels)
         for line in range(line_count):
@@ -126,7 +117,7 @@ def _band_sigmas(grain: float) -> list[float]:
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 
 
-def _grain_tiles_task(rectangle: TileRectangle, grain: float, seed: int) -> Task[np.ndarray]:
+def _grain_tiles(rectangle: TileRectangle, grain: float, seed: int) -> np.ndarray:
     """Flat float32 heights in a rectangle of the picture, row by row."""
     sigmas = _band_sigmas(grain)
     margin = 4 * box_radius(sigmas[-1])
@@ -135,34 +126,35 @@ def _grain_tiles_task(rectangle: TileRectangle, grain: float, seed: int) -> Task
     row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
     white = np.empty((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
-        yield Progress(0.0, STEP_LABEL)
+        report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         bits = hash_bits_2d(column, row[block], seed ^ SEED_SALT, 0, 0.5)
         white[block] = bits.astype(np.float32) - np.float32(0.5)
-    heights = (yield from _band_noise_task(white, sigmas))[margin:-margin, margin:-margin]
+    heights = _band_noise(white, sigmas)[margin:-margin, margin:-margin]
     return np.ascontiguousarray(heights / np.float32(_band_noise_std(*sigmas))).reshape(-1)
 
 
-def _band_noise_task(white: np.ndarray, sigmas: Sequence[float]) -> Task[np.ndarray]:
+def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
     """Weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
     total = np.zeros_like(white)
-    finer = yield from _blur_task(white, sigmas[0])
+    finer = _blur(white, sigmas[0])
     for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
-        broader = yield from _blur_task(white, broader_sigma)
-        yield Progress(0.0, STEP_LABEL)
+        broader = _blur(white, broader_sigma)
+        report(0.0, STEP_LABEL)
         # The standard deviation of blurred white noise is proportional to 1 / sigma.
         total += np.float32(weight * finer_sigma / sigmas[0]) * (finer - broader)
         finer = broader
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     return total
 
 
-def _blur_task(image: np.ndarray, sigma: float) -> Task[np.ndarray]:
+def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
     """Approximate a Gaussian blur, including small ones that `gaussian_blur` does not support."""
     if sigma > 1.5:
-        return (yield from subtask(gaussian_blur_task(image, sigma), 0.0, 0.0, STEP_LABEL))
+        with progress(0.0, label=STEP_LABEL):
+            return gaussian_blur(image, sigma)
     for axis in (0, 1) * max(round(2 * sigma**2), 1):
-        yield Progress(0.0, STEP_LABEL)
+        report(0.0, STEP_LABEL)
         # The kernel (1, 2, 1) / 4 has the variance 1 / 2.
         forward, backward = (np.roll(image, shift, axis=axis) for shift in (1, -1))
         image = np.float32(0.5) * image + np.float32(0.25) * (forward + backward)
@@ -175,4 +167,4 @@ def _band_noise_std(*sigmas: float) -> float:
     radius = 4 * box_radius(sigmas[-1])
     impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
     impulse[radius, radius] = 1
-    return float(np.linalg.norm(run_to_completion(_band_noise_task(impulse, sigmas))) / 2)
+    return float(np.linalg.norm(_band_noise(impulse, sigmas)) / 2)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.pixel_blocks import pixel_blocks
 from .pixel_field import NEIGHBOR_OFFSETS, normalized
 
@@ -14,9 +14,9 @@ from .pixel_field import NEIGHBOR_OFFSETS, normalized
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def direction_table_task(
+def direction_table(
     direction: np.ndarray, member: np.ndarray, degree: int, neighbors: np.ndarray
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Build a table of directions and the gradients of their angles, for `interpolate_direction`.
 
     The gradients are differences of linked neighbors.
@@ -31,7 +31,7 @@ def direction_table_task(
     degree : int
         Degree of the field.
     neighbors : (9, P + 1) int32 ndarray
-        From `pixel_field.neighbor_table_task`.
+        From `pixel_field.neighbor_table`.
 
     Returns
     -------
@@ -44,12 +44,12 @@ def direction_table_task(
     table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
     unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
     for block in pixel_blocks(count):
-        yield Progress(0.3 * block.start / count, "finding directions")
+        report(0.3 * block.start / count, "finding directions")
         unit_direction[block] = normalized(direction[block])
         unit_member[block] = normalized(member[block])
     min_cosine = np.cos(np.pi / max(degree, 2))
     for block in pixel_blocks(count):
-        yield Progress(0.3 + 0.7 * block.start / count, "finding directions")
+        report(0.3 + 0.7 * block.start / count, "finding directions")
         conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()
         gradient_sines = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
@@ -108,7 +108,7 @@ def integrate_noise(
     block : slice
         Pixels of the field.
     neighbors : (9, P + 1) int32 ndarray
-        From `pixel_field.neighbor_table_task`.
+        From `pixel_field.neighbor_table`.
     direction_at : function
         Takes the (B,) int32 entries of the streamlines, P for those that have ended, and their
         (B, 2) float32 offsets from the centers of those pixels. Returns their (B, 2) float32

@@ -6,12 +6,12 @@ Whole tiles do not change while the visible region changes a little, so they sta
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..cache import Cache
-from ..progress import Task
 
 #: Side of a tile in pixels.
 TILE_PIXELS = 256
@@ -65,17 +65,19 @@ def _round_outward(start: int, stop: int) -> tuple[int, int]:
     return start // TILE_PIXELS * TILE_PIXELS, -(-stop // TILE_PIXELS) * TILE_PIXELS
 
 
-def cached_tiles_task(
-    create_task: Callable[..., Task[np.ndarray]], rectangle: TileRectangle, *settings: Hashable
-) -> Task[np.ndarray]:
+def cached_tiles(
+    create_task: Callable[..., np.ndarray],
+    rectangle: TileRectangle,
+    *settings: Hashable,
+) -> np.ndarray:
     """Return the result of ``create_task(rectangle, *settings)``, from the cache if it is there.
 
     It is a flat image of the rectangle. Large images are not stored.
     """
     left, right, bottom, top = rectangle
     if (right - left) * (top - bottom) > MAX_CACHED_PIXELS:
-        return (yield from create_task(rectangle, *settings))
+        return create_task(rectangle, *settings)
     key = create_task.__name__, rectangle, settings
-    image = yield from TILE_CACHE.get_or_create_task(key, lambda: create_task(rectangle, *settings))
+    image = TILE_CACHE.get_or_create(key, partial(create_task, rectangle, *settings))
     TILE_CACHE.evict_over_limit()
     return image

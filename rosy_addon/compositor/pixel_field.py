@@ -13,11 +13,11 @@ from ..deterministic_trig import unit_phasor
 from ..field.directional_field import evaluate_harmonics
 from ..field.rosy_field import check_degree
 from ..field.symmetry import FieldSymmetry
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
-from ..projection.pixel_neighbors import neighbor_masks_task, screen_jacobians
+from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 
 #: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
 NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -200,7 +200,7 @@ def normalized(values: np.ndarray) -> np.ndarray:
     return np.divide(values, norm, out=values, where=norm > 0).astype(np.complex64)
 
 
-def neighbor_table_task(field: PixelField) -> Task[np.ndarray]:
+def neighbor_table(field: PixelField) -> np.ndarray:
     """Tabulate the neighbors of the pixels of a field.
 
     Returns
@@ -215,7 +215,7 @@ def neighbor_table_task(field: PixelField) -> Task[np.ndarray]:
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
     for block in pixel_blocks(count):
-        yield Progress(block.start / count, "finding neighbors")
+        report(block.start / count, "finding neighbors")
         pixel, mask = field.pixel[block], field.neighbor_mask[block]
         for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
             linked = np.flatnonzero(mask >> bit & 1)
@@ -226,14 +226,13 @@ def neighbor_table_task(field: PixelField) -> Task[np.ndarray]:
 def surface_pixel_field(
     gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
 ) -> PixelField:
-    """Return a pixel field, without progress reports; see `surface_pixel_field_task`."""
-    task = surface_pixel_field_task(gbuffer, degree, crease_angle, cross_creases)
-    return run_to_completion(task)
+    """Return a pixel field, without progress reports; see `compute_surface_pixel_field`."""
+    return compute_surface_pixel_field(gbuffer, degree, crease_angle, cross_creases)
 
 
-def surface_pixel_field_task(
+def compute_surface_pixel_field(
     gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
-) -> Task[PixelField]:
+) -> PixelField:
     """Extract the field of one degree from a G-buffer.
 
     Parameters
@@ -252,21 +251,22 @@ def surface_pixel_field_task(
         The pixels whose mesh instances have a field of that degree.
     """
     count = len(gbuffer.pixel)
-    mask = yield from subtask(neighbor_masks_task(gbuffer, crease_angle, cross_creases), 0.0, 0.5)
+    with progress(0.0, 0.5):
+        mask = neighbor_masks(gbuffer, crease_angle, cross_creases)
     jacobians = np.empty((2, count), dtype=np.complex64).T
     instance_selected = np.asarray(gbuffer.instance_degrees) == degree
     selected = np.empty(count, dtype=bool)
     for block in pixel_blocks(count):
-        yield Progress(0.5 + 0.4 * block.start / count, "finding directions")
+        report(0.5 + 0.4 * block.start / count, "finding directions")
         jacobians[block] = screen_jacobians(gbuffer.part(block))
         selected[block] = instance_selected[gbuffer.instance_id[block]]
     selected = slice(None) if selected.all() else np.flatnonzero(selected)
     z = gbuffer.representation[selected]
     pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]
     if not z.all():
-        mask_task = _mask_undefined_task(mask, pixel, camera.width, camera.height, z != 0)
-        mask = yield from subtask(mask_task, 0.9, 1.0)
-    yield Progress(1.0, "finding directions")
+        with progress(0.9, 1.0):
+            mask = _mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+    report(1.0, "finding directions")
     return PixelField(
         degree=degree,
         width=camera.width,
@@ -333,15 +333,13 @@ def planar_pixel_field(
         pixel=pixel,
         representation=z,
         screen_jacobian=None,
-        neighbor_mask=run_to_completion(
-            _mask_undefined_task(all_neighbors, pixel, width, height, z != 0)
-        ),
+        neighbor_mask=_mask_undefined(all_neighbors, pixel, width, height, z != 0),
     )
 
 
-def _mask_undefined_task(
+def _mask_undefined(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Clear the bits of neighbor masks that lead from or to undefined pixels.
 
     Parameters
@@ -358,7 +356,7 @@ def _mask_undefined_task(
     result = np.empty_like(mask)
     band_rows = max(BLOCK_PIXELS // width, 1)
     for start in range(0, height, band_rows):
-        yield Progress(start / height, "finding neighbors")
+        report(start / height, "finding neighbors")
         padded = is_defined[start : start + band_rows + 2].astype(np.uint16)
         # Three neighbors of a row are three bits, in the order of `NEIGHBOR_OFFSETS`.
         row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2

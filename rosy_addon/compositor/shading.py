@@ -11,9 +11,8 @@ import numpy as np
 
 from ..cache import Cache
 from ..field.frames import dot, normalize
-from ..progress import Task, run_to_completion
 from ..projection.gbuffer import GBuffer
-from ..projection.shadow_maps import light_cameras, shadow_visibility_task
+from ..projection.shadow_maps import light_cameras, shadow_visibility
 from .look import Look
 
 
@@ -97,7 +96,7 @@ def diffuse(
     lights : sequence of Light
         Lights of the scene in the space of the camera. Used if the light of the look is "scene".
     visibility : sequence of (P,) ndarray, optional
-        By default that of `light_visibility_task`.
+        By default that of `light_visibility`.
 
     Returns
     -------
@@ -111,7 +110,7 @@ def diffuse(
         light = np.repeat(cosine[:, None], 3, axis=1)
     else:
         if visibility is None:
-            visibility = run_to_completion(light_visibility_task(gbuffer, look, lights))
+            visibility = light_visibility(gbuffer, look, lights)
         light = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
         for index, source in enumerate(lights_of(look, lights)):
             irradiance = source.irradiance(gbuffer.position, gbuffer.normal)
@@ -121,9 +120,9 @@ def diffuse(
     return (1 - look.shading + look.shading * light).astype(np.float32)
 
 
-def light_visibility_task(
+def light_visibility(
     gbuffer: GBuffer, look: Look, lights: Sequence[Light] = (), cache: Cache | None = None
-) -> Task[list[np.ndarray]]:
+) -> list[np.ndarray]:
     """Compute the fraction of each light that reaches each pixel.
 
     Parameters
@@ -146,11 +145,9 @@ def light_visibility_task(
         vector = np.asarray(light.vector, dtype=np.float64)
         cameras = light_cameras(gbuffer.instances, gbuffer.camera, light.kind, vector)
         visibility.append(
-            (
-                yield from cache.get_or_create_task(
-                    ("shadow", gbuffer, light.kind, vector.tobytes()),
-                    functools.partial(shadow_visibility_task, gbuffer, cameras),
-                )
+            cache.get_or_create(
+                ("shadow", gbuffer, light.kind, vector.tobytes()),
+                functools.partial(shadow_visibility, gbuffer, cameras),
             )
         )
     return visibility

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..cache import Cache
-from ..progress import Task, subtask
-from ..projection.feature_curvatures import feature_curvatures_task
+from ..progress import progress
+from ..projection.feature_curvatures import feature_curvatures
 from ..projection.gbuffer import GBuffer
 from .band import Band, drawn_pixels
-from .even_lines import EvenLines, even_lines_task
+from .even_lines import EvenLines, even_lines
 from .flow import unconvolved_noise
-from .ibfv import StreakWaves, streak_waves_task, wave_images_task
-from .lic import lic_lengths_task, look_noise_task, noise_args
+from .ibfv import StreakWaves, streak_waves, wave_images
+from .lic import lic_lengths, look_noise, noise_args
 from .lic_images import LicImages
 from .look import Look, has_flow, lic_key
 from .look_units import cell_size_args
-from .outline import OUTLINE_SETTINGS, outline_task
+from .outline import OUTLINE_SETTINGS, outline_coverage
 from .paper_grain import surface_paper_grain_args
-from .pixel_field import PixelField, surface_pixel_field_task
-from .surface_noise import surface_noise_task
-from .undirected import undirected_texture_task
-from .wobble import has_wobble, rotate_pixel_field_task, wobble_angle_task
+from .pixel_field import PixelField, compute_surface_pixel_field
+from .surface_noise import compute_surface_noise
+from .undirected import undirected_texture
+from .wobble import has_wobble, rotate_pixel_field, wobble_angle
 
 #: Share of the progress of LIC that the noise takes.
 NOISE_SHARE = 0.3
@@ -60,113 +61,113 @@ class ComposeStages:
         """Return the range of the pixels of a field that its LIC images have."""
         return drawn_pixels(self._band, field.pixel, field.width)
 
-    def pixel_field_task(self, degree: int, look: Look) -> Task[PixelField]:
+    def pixel_field(self, degree: int, look: Look) -> PixelField:
         """Pixel field of one degree, rotated by the wobble of the look."""
         settings = look.crease_angle, look.cross_creases
-        field = yield from self._cache.get_or_create_task(
+        field = self._cache.get_or_create(
             ("pixel field", self._gbuffer, degree, *settings),
-            lambda: surface_pixel_field_task(self._gbuffer, degree, *settings),
+            partial(compute_surface_pixel_field, self._gbuffer, degree, *settings),
         )
         if not has_wobble(look):
             return field
-        angle = (yield from self._wobble_angle_task(look))[field.gbuffer_index]
-        return (yield from rotate_pixel_field_task(field, np.float32(look.wobble) * angle))
+        angle = self._wobble_angle(look)[field.gbuffer_index]
+        return rotate_pixel_field(field, np.float32(look.wobble) * angle)
 
-    def lic_task(self, field: PixelField, looks: Sequence[Look]) -> Task[list[LicImages]]:
+    def lic(self, field: PixelField, looks: Sequence[Look]) -> list[LicImages]:
         """Compute the LIC images of a field, or find them in the cache.
 
         The looks differ in the length of streamlines. The first is the longest.
         """
 
-        def waves_task() -> Task[list[StreakWaves]]:
-            noise = yield from subtask(self._noise_task(field, looks[0]), 0.0, NOISE_SHARE)
+        def compute_waves() -> list[StreakWaves]:
+            with progress(0.0, NOISE_SHARE):
+                noise = self._noise(field, looks[0])
             if noise is None:
-                noise = yield from look_noise_task(field, looks[0])
-            task = streak_waves_task(field, looks, noise)
-            return (yield from subtask(task, NOISE_SHARE, 1.0))
+                noise = look_noise(field, looks[0])
+            with progress(NOISE_SHARE, 1.0):
+                return streak_waves(field, looks, noise)
 
-        def compute_task() -> Task[list[LicImages]]:
+        def compute() -> list[LicImages]:
             if looks[0].method == "ibfv" and has_flow(looks[0]):
                 # They serve all frames.
                 still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
                 key = "streak waves", self._gbuffer, field.degree, *still
-                waves = yield from self._cache.get_or_create_task(key, waves_task)
-                return (yield from wave_images_task(waves, looks))
-            noise = yield from subtask(self._noise_task(field, looks[0]), 0.0, NOISE_SHARE)
-            task = lic_lengths_task(field, looks, noise, self._band, f"degree {field.degree}")
-            return (yield from subtask(task, NOISE_SHARE, 1.0))
+                waves = self._cache.get_or_create(key, compute_waves)
+                return wave_images(waves, looks)
+            with progress(0.0, NOISE_SHARE):
+                noise = self._noise(field, looks[0])
+            with progress(NOISE_SHARE, 1.0):
+                return lic_lengths(field, looks, noise, self._band, f"degree {field.degree}")
 
         key = "LIC images", self._gbuffer, field.degree, *map(lic_key, looks)
-        return (yield from self._cache.get_or_create_task(key, compute_task))
+        return self._cache.get_or_create(key, compute)
 
-    def line_means_task(self, field: PixelField, look: Look, values: np.ndarray) -> Task[LicImages]:
+    def line_means(self, field: PixelField, look: Look, values: np.ndarray) -> LicImages:
         """Average (P, K) values along the lines of a field."""
-        task = lic_lengths_task(field, [look], values, self._band, f"means, degree {field.degree}")
-        (images,) = yield from task
+        (images,) = lic_lengths(field, [look], values, self._band, f"means, degree {field.degree}")
         return images
 
-    def undirected_texture_task(self, field: PixelField, look: Look) -> Task[np.ndarray | None]:
-        """Compute the texture where the field is undefined; see `undirected_texture_task`."""
+    def undirected_texture(self, field: PixelField, look: Look) -> np.ndarray | None:
+        """Compute the texture where the field is undefined; see `undirected_texture`."""
         if field.representation.all():
             return None
-        noise = yield from self._noise_task(field, look)
+        noise = self._noise(field, look)
         if noise is None:
-            noise = yield from look_noise_task(field, look)
+            noise = look_noise(field, look)
         noise = unconvolved_noise(noise, look)
-        return (yield from undirected_texture_task(field, noise, look.grain))
+        return undirected_texture(field, noise, look.grain)
 
-    def even_lines_task(self, field: PixelField, look: Look) -> Task[EvenLines]:
+    def even_lines(self, field: PixelField, look: Look) -> EvenLines:
         """Compute the evenly spaced lines of a field, or find them in the cache."""
 
-        def compute_task() -> Task[EvenLines]:
+        def compute() -> EvenLines:
             wobble_angle = None
             if has_wobble(look):
-                wobble_angle = (yield from self._wobble_angle_task(look))[field.gbuffer_index]
-            task = even_lines_task(self._gbuffer, field, look, wobble_angle, self._mesh_cache)
-            return (yield from task)
+                wobble_angle = self._wobble_angle(look)[field.gbuffer_index]
+            return even_lines(self._gbuffer, field, look, wobble_angle, self._mesh_cache)
 
         key = "even lines", self._gbuffer, field.degree, lic_key(look)
-        return (yield from self._cache.get_or_create_task(key, compute_task))
+        return self._cache.get_or_create(key, compute)
 
-    def outline_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
-        """(P,) float32 coverage by outlines at the pixels of a field; see `outline_task`."""
-        coverage = yield from self._cache.get_or_create_task(
+    def outline(self, field: PixelField, look: Look) -> np.ndarray:
+        """(P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
+        coverage = self._cache.get_or_create(
             ("outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)),
-            lambda: outline_task(self._gbuffer, look, self._mesh_cache),
+            partial(outline_coverage, self._gbuffer, look, self._mesh_cache),
         )
         return coverage[field.gbuffer_index]
 
-    def surface_paper_grain_task(self, field: PixelField, look: Look) -> Task[np.ndarray]:
+    def surface_paper_grain(self, field: PixelField, look: Look) -> np.ndarray:
         """(P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
 
         They are not normalized: the mean is `NOISE_MEAN`.
         """
         args = surface_paper_grain_args(look) | cell_size_args(look)
-        return self._surface_noise_task(field, args)
+        return self._surface_noise(field, args)
 
-    def _noise_task(self, field: PixelField, look: Look) -> Task[np.ndarray | None]:
+    def _noise(self, field: PixelField, look: Look) -> np.ndarray | None:
         """(P, K) float32 noise anchored to the surface. None if the look uses image-space noise."""
         if look.anchor == "picture":
             return None
         args = noise_args(look) | cell_size_args(look)
         if look.detail:
             args["detail"] = look.detail
-        return (yield from self._surface_noise_task(field, args))
+        return self._surface_noise(field, args)
 
-    def _surface_noise_task(self, field: PixelField, args: dict[str, Any]) -> Task[np.ndarray]:
-        """(P, K) float32 noise at the pixels of a field; see `surface_noise_task`."""
+    def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
+        """(P, K) float32 noise at the pixels of a field; see `compute_surface_noise`."""
 
-        def noise_task() -> Task[np.ndarray]:
+        def compute_noise() -> np.ndarray:
             curvature = None
             if "detail" in args:
-                curvature = yield from feature_curvatures_task(self._gbuffer, self._mesh_cache)
-            return (yield from surface_noise_task(self._gbuffer, **args, curvature=curvature))
+                curvature = feature_curvatures(self._gbuffer, self._mesh_cache)
+            return compute_surface_noise(self._gbuffer, **args, curvature=curvature)
 
         key = "surface noise", self._gbuffer, *sorted(args.items())
-        noise = yield from self._cache.get_or_create_task(key, noise_task)
+        noise = self._cache.get_or_create(key, compute_noise)
         return noise[field.gbuffer_index]
 
-    def _wobble_angle_task(self, look: Look) -> Task[np.ndarray]:
-        """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle_task`."""
+    def _wobble_angle(self, look: Look) -> np.ndarray:
+        """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
         key = "wobble", self._gbuffer, look.anchor, look.grain, *cell_size_args(look).values()
-        return self._cache.get_or_create_task(key, lambda: wobble_angle_task(self._gbuffer, look))
+        return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

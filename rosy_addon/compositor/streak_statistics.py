@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cache import Cache
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .filter_kernel import Kernel, kernel_of
 from .image_noise import image_noise
 from .look import Look
@@ -149,11 +149,6 @@ def look_streak_statistics(look: Look) -> StreakStatistics:
 
     See `look_streak_statistics_task`.
     """
-    return run_to_completion(look_streak_statistics_task(look))
-
-
-def look_streak_statistics_task(look: Look) -> Task[StreakStatistics]:
-    """Measure the statistics of the streaks of a look that is in pixels of the frame."""
     surface_paper_grain = None
     if look.anchor != "picture":
         args = surface_paper_grain_args(look)
@@ -174,14 +169,14 @@ def look_streak_statistics_task(look: Look) -> Task[StreakStatistics]:
     )
     statistics = STATISTICS_CACHE.get(settings)
     if statistics is None:
-        statistics = STATISTICS_CACHE.put(settings, (yield from streak_statistics_task(settings)))
+        statistics = STATISTICS_CACHE.put(settings, streak_statistics(settings))
         STATISTICS_CACHE.evict_over_limit()
     return statistics
 
 
-def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
+def streak_statistics(settings: StreakSettings) -> StreakStatistics:
     """Measure the statistics of streaks in a sample of noise."""
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     settings = settings.scaled(min(MAX_SAMPLE_GRAIN / settings.grain, 1.0))
     side = max(int(SAMPLE_GRAINS * settings.grain), MIN_SAMPLE_PIXELS)
     length_pixels = max(round(settings.length), 1)
@@ -189,16 +184,16 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
     noise = _noise_sample(
         (side, width), settings.grain, settings.density, settings.high_pass, settings.anchored
     )
-    yield Progress(0.2, STEP_LABEL)
+    report(0.2, STEP_LABEL)
     streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, settings.kernel))
     break_pixels = min(max(round(settings.break_length), 1), length_pixels)
-    yield Progress(0.3, STEP_LABEL)
+    report(0.3, STEP_LABEL)
     break_streaks, break_std = _standardized(
         _line_means(noise, break_pixels, side, settings.kernel)
     )
-    yield Progress(0.4, STEP_LABEL)
+    report(0.4, STEP_LABEL)
     spots, disc_std = _standardized(disc_means(noise[:, :side], settings.grain))
-    yield Progress(0.5, STEP_LABEL)
+    report(0.5, STEP_LABEL)
     paper_relief, paper_grain_std = 0.0, 1.0
     if settings.paper_grain_amplitude and settings.surface_paper_grain is not None:
         heights = _noise_sample(streaks.shape, *settings.surface_paper_grain, anchored=True)
@@ -209,7 +204,7 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
             np.arange(streaks.size, dtype=np.int32), len(streaks[0]), settings.grain, 1
         )
         paper_relief = settings.paper_grain_amplitude * heights[0].reshape(streaks.shape)
-    yield Progress(0.6, STEP_LABEL)
+    report(0.6, STEP_LABEL)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     break_amounts = break_amount(coverages, settings.breaks, settings.wobble)
     break_levels = np.linspace(
@@ -219,10 +214,10 @@ def streak_statistics_task(settings: StreakSettings) -> Task[StreakStatistics]:
         streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
     ]
     half_width = softness(settings.crispness)
-    threshold_tables = yield from subtask(_threshold_tables_task(samples, half_width), 0.7, 0.95)
-    (disc_threshold,) = yield from subtask(
-        _threshold_tables_task([spots + paper_relief], half_width), 0.95, 1.0
-    )
+    with progress(0.7, 0.95):
+        threshold_tables = _threshold_tables(samples, half_width)
+    with progress(0.95, 1.0):
+        (disc_threshold,) = _threshold_tables([spots + paper_relief], half_width)
     stds = streak_std, break_std, disc_threshold, disc_std, paper_grain_std
     if len(break_levels) == 1:
         return StreakStatistics(threshold_tables[0], *stds)
@@ -269,7 +264,7 @@ def softness(crispness: float) -> float:
     return MAX_SOFTNESS * (MIN_SOFTNESS / MAX_SOFTNESS) ** crispness
 
 
-def _threshold_tables_task(samples: list[np.ndarray], half_width: float) -> Task[np.ndarray]:
+def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
     """(S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
 
     `half_width` is half the width of the step from paper to ink, in the unit of the samples.
@@ -283,7 +278,7 @@ def _threshold_tables_task(samples: list[np.ndarray], half_width: float) -> Task
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     tables = []
     for index, sample in enumerate(samples):
-        yield Progress(index / len(samples), STEP_LABEL)
+        report(index / len(samples), STEP_LABEL)
         histogram = np.histogram(sample, edges)[0] / sample.size
         tables.append(np.interp(coverages, ink_fraction @ histogram, thresholds))
     return np.array(tables)

@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates_task
+from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
 from .image_noise import (
     BLUR_FACTOR,
     NOISE_MEAN,
     NOISE_STD,
     STEP_LABEL,
     box_radius,
-    gaussian_blur_task,
+    gaussian_blur,
     hash_bits_nd,
 )
 
@@ -61,11 +61,11 @@ OCTAVE_OFFSET = 64
 
 
 def surface_noise(gbuffer: GBuffer, *args: Any, **settings: Any) -> np.ndarray:
-    """Make noise, without progress reports; see `surface_noise_task`."""
-    return run_to_completion(surface_noise_task(gbuffer, *args, **settings))
+    """Make noise, without progress reports; see `compute_surface_noise`."""
+    return compute_surface_noise(gbuffer, *args, **settings)
 
 
-def surface_noise_task(
+def compute_surface_noise(
     gbuffer: GBuffer,
     grain: float,
     seed: int,
@@ -77,7 +77,7 @@ def surface_noise_task(
     smallest: float = 0.0,
     detail: float = 0.0,
     curvature: np.ndarray | None = None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Make noise that is anchored to the surfaces of a G-buffer.
 
     Parameters
@@ -108,12 +108,13 @@ def surface_noise_task(
     (P, channels) float32 ndarray
         With the mean `NOISE_MEAN`, as for `image_noise`.
     """
-    rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.3)
+    with progress(0.0, 0.3):
+        rest = rest_coordinates(gbuffer)
     units = instance_units(gbuffer, pixel)
     instance_hash = instance_hashes(gbuffer.instance_names)
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for block in pixel_blocks(len(gbuffer.pixel)):
-        yield Progress(0.3 + 0.3 * block.start / len(gbuffer.pixel), STEP_LABEL)
+        report(0.3 + 0.3 * block.start / len(gbuffer.pixel), STEP_LABEL)
         block_rest = rest.block(block)
         instance_id = gbuffer.instance_id[block]
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
@@ -127,10 +128,11 @@ def surface_noise_task(
         total[:, block] /= np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     del rest  # as large as all other arrays together
     if high_pass:
-        yield from subtask(_high_pass_task(gbuffer, total, BLUR_FACTOR * high_pass), 0.6, 1.0)
+        with progress(0.6, 1.0):
+            _high_pass(gbuffer, total, BLUR_FACTOR * high_pass)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
     for block in pixel_blocks(len(noise)):
-        yield Progress(1.0, STEP_LABEL)
+        report(1.0, STEP_LABEL)
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
 
@@ -317,7 +319,7 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in lattice_axes()])
 
 
-def _high_pass_task(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> Task[None]:
+def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     """Subtract a Gaussian blur that ignores pixels outside the G-buffer from (K, P) `channels`."""
     count, width = len(gbuffer.pixel), np.int32(gbuffer.camera.width)
     column = gbuffer.pixel % width
@@ -329,24 +331,25 @@ def _high_pass_task(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> Tas
     # Index of each pixel in the image that is blurred.
     index = np.empty(count, dtype=np.int32)
     for block in pixel_blocks(count):
-        yield Progress(0.0, STEP_LABEL)
+        report(0.0, STEP_LABEL)
         row = gbuffer.pixel[block] // width - np.int32(bottom)
         index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
 
-    def blurred_task(values: np.ndarray | None, part: int) -> Task[np.ndarray]:
+    def compute_blurred(values: np.ndarray | None, part: int) -> np.ndarray:
         """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
         image = np.zeros((height, image_width), dtype=np.float32)
         for block in pixel_blocks(count):
-            yield Progress(part / (len(channels) + 1), STEP_LABEL)
+            report(part / (len(channels) + 1), STEP_LABEL)
             image.reshape(-1)[index[block]] = 1 if values is None else values[block]
         start, stop = part / (len(channels) + 1), (part + 1) / (len(channels) + 1)
-        image = yield from subtask(gaussian_blur_task(image, sigma), start, stop)
+        with progress(start, stop):
+            image = gaussian_blur(image, sigma)
         return image.reshape(-1)
 
-    weight = yield from blurred_task(None, 0)
+    weight = compute_blurred(None, 0)
     weight = np.maximum(weight.take(index), 1e-3)
     for part, channel in enumerate(channels, start=1):
-        blurred = yield from blurred_task(channel, part)
+        blurred = compute_blurred(channel, part)
         for block in pixel_blocks(count):
-            yield Progress((part + 1) / (len(channels) + 1), STEP_LABEL)
+            report((part + 1) / (len(channels) + 1), STEP_LABEL)
             channel[block] -= blurred.take(index[block]) / weight[block]

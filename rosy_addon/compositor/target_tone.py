@@ -10,14 +10,14 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.mip_map import MipMap
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import surface_tones
 from .look import Look
-from .shading import Light, diffuse, light_visibility_task
+from .shading import Light, diffuse, light_visibility
 
 #: Minimum difference between the tones that become white and black.
 MIN_TONE_RANGE = 1e-3
@@ -90,18 +90,8 @@ def target_tone(
     look: Look,
     lights: Sequence[Light] = (),
     reference: ReferenceRender | None = None,
-) -> np.ndarray:
-    """Return the target tone of each pixel, without progress reports; see `target_tone_task`."""
-    return run_to_completion(target_tone_task(gbuffer, look, lights, reference))
-
-
-def target_tone_task(
-    gbuffer: GBuffer,
-    look: Look,
-    lights: Sequence[Light] = (),
-    reference: ReferenceRender | None = None,
     cache: Cache | None = None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Compute the target tone of each pixel.
 
     Parameters
@@ -128,10 +118,10 @@ def target_tone_task(
     """
     if look.tone != "light":
         check_tone(look, [instance.tone for instance in gbuffer.instances], reference)
-    visibility = yield from light_visibility_task(gbuffer, look, lights, cache)
+    visibility = light_visibility(gbuffer, look, lights, cache)
     tone = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(tone)):
-        yield Progress(block.start / len(tone), "finding tones")
+        report(block.start / len(tone), "finding tones")
         block_visibility = [of_light[block] for of_light in visibility]
         part = gbuffer.part(block)
         tone[block] = _block_tone(part, look, lights, reference, block_visibility)
@@ -145,7 +135,7 @@ def _block_tone(
     reference: ReferenceRender | None,
     visibility: Sequence[np.ndarray],
 ) -> np.ndarray:
-    """Compute `target_tone` for a part of the pixels, with the `light_visibility_task` there."""
+    """Compute `target_tone` for a part of the pixels, with the `light_visibility` there."""
     if look.tone == "light":
         return apply_tone_curve(diffuse(gbuffer, look, lights, visibility), look)
     source_tone = reference.sample(gbuffer) if look.tone == "picture" else surface_tones(gbuffer)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from .image_noise import NOISE_MEAN
 from .pixel_field import PixelField
@@ -42,9 +42,7 @@ def disc_offsets(grain: float) -> np.ndarray:
     return np.floor(np.float32(DISC_GRAINS * grain) * UNIT_DISC + np.float32(0.5)).astype(np.int32)
 
 
-def undirected_texture_task(
-    field: PixelField, noise: np.ndarray, grain: float
-) -> Task[np.ndarray | None]:
+def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np.ndarray | None:
     """Average the noise over a disc around each pixel where the field is undefined.
 
     Samples of the disc beyond the pixels of the field are left out.
@@ -76,7 +74,7 @@ def undirected_texture_task(
         band = undefined[slice(*_entries(field, field.pixel[undefined], *rows))]
         if not len(band):
             continue
-        yield Progress(first_row / field.height, STEP_LABEL)
+        report(first_row / field.height, STEP_LABEL)
         around = slice(*_entries(field, field.pixel, rows[0] - margin, rows[1] + margin))
         # Sums of noise and of samples, as complex numbers.
         samples = np.zeros((band_rows + 2 * margin) * stride, dtype=np.complex64)
@@ -84,7 +82,7 @@ def undirected_texture_task(
         mean = noise[around].mean(axis=1) - np.float32(NOISE_MEAN)
         samples[_padded(field, field.pixel[around], stride) - first_cell] = mean + 1j
         for block in pixel_blocks(len(band)):
-            yield Progress(first_row / field.height, STEP_LABEL)
+            report(first_row / field.height, STEP_LABEL)
             cell = _padded(field, field.pixel[band[block]], stride) - first_cell
             total = np.zeros(len(cell), dtype=np.complex64)
             for dx, dy in offsets.tolist():

@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..deterministic_trig import cos_sin, unit_phasor
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.rest_coordinates import rest_coordinates_task
+from ..projection.rest_coordinates import rest_coordinates
 from .look import Look, is_hatched
 from .look_units import cell_size_args
 from .pixel_field import PixelField, product
@@ -60,11 +60,6 @@ def wave_table() -> np.ndarray:
 
 
 def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
-    """Compute the wobble, without progress reports; see `wobble_angle_task`."""
-    return run_to_completion(wobble_angle_task(gbuffer, look))
-
-
-def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     """Compute the angle between lines and field at `Look.wobble` 1.
 
     Parameters
@@ -84,10 +79,11 @@ def wobble_angle_task(gbuffer: GBuffer, look: Look) -> Task[np.ndarray]:
     cell_size, rest = cell_size_args(look), None
     if look.anchor == "surface":
         units = instance_units(gbuffer, cell_size["pixel"])
-        rest = yield from subtask(rest_coordinates_task(gbuffer), 0.0, 0.5)
+        with progress(0.0, 0.5):
+            rest = rest_coordinates(gbuffer)
     angle = np.empty(count, dtype=np.float32)
     for block in pixel_blocks(count):
-        yield Progress(0.5 + 0.5 * block.start / count, "bending lines")
+        report(0.5 + 0.5 * block.start / count, "bending lines")
         if rest is None:
             row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
             position = np.stack([column, row, 0 * row]).astype(np.float32)
@@ -120,7 +116,7 @@ def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
     return np.float32(WOBBLE_STD) * _wave_sum(position, level)
 
 
-def rotate_pixel_field_task(field: PixelField, angle: np.ndarray) -> Task[PixelField]:
+def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
     """Rotate the directions of a pixel field in the view plane.
 
     Parameters
@@ -139,7 +135,7 @@ def rotate_pixel_field_task(field: PixelField, angle: np.ndarray) -> Task[PixelF
         for channel, values in field.channels.items()
     }
     for block in pixel_blocks(len(angle)):
-        yield Progress(block.start / len(angle), "bending lines")
+        report(block.start / len(angle), "bending lines")
         block_angle = angle[block].astype(np.float64)
         phase = unit_phasor(field.degree * block_angle)
         representation[block] = product(field.representation[block], phase)

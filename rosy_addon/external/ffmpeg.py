@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..errors import RosyError
 from ..processes import process_task
-from ..progress import Task
+from ..progress import report, run_with_report
 from ..turntable_video import Encoder
 
 
@@ -27,17 +27,15 @@ def find_encoder() -> Encoder | None:
         except RuntimeError:  # the package has none for this system
             return None
 
-    def encode_task(
-        folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
-    ) -> Task[None]:
+    def encode(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
         """Encode the pictures of a folder. See `Encoder`."""
         command = [
             program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
             "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
         ]  # fmt: skip
-        status, output = yield from process_task(command, "encoding the video")
+        status, output = run_with_report(process_task(command, "encoding the video"), report)
         if status:
             message = (output.strip().splitlines() or ["it failed"])[-1]
             raise RosyError(f"ffmpeg: {message}")
 
-    return encode_task
+    return encode

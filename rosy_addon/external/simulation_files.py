@@ -26,9 +26,15 @@ from ..errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
 from ..field.mesh_io import SHARP_ANGLE
-from ..field.surface import Surface, face_area_vectors, mean_per_face, surface_task
+from ..field.surface import (
+    Surface,
+    face_area_vectors,
+    mean_per_face,
+)
+from ..field.surface import (
+    build_surface as field_build_surface,
+)
 from ..file_io import check_readable, open_file, read_bytes
-from ..progress import run_to_completion
 
 #: Files that VTK reads, and among them those that may hold several steps of time.
 VTK_SUFFIXES = (".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp")
@@ -233,7 +239,7 @@ def simulation_steps(
 
 def build_surface(mesh: SimulationMesh) -> Surface:
     """Return the surface of a mesh. As for other mesh files, edges are sharp above `SHARP_ANGLE`."""
-    return run_to_completion(surface_task(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE))
+    return field_build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
 
 
 def in_order(paths: list[Path]) -> list[Path]:

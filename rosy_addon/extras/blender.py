@@ -30,7 +30,7 @@ from ..cli.bake_workers import uses_workers
 from ..cli.presets import user_presets_folder
 from ..errors import RosyError
 from ..processes import process_task
-from ..progress import Task
+from ..progress import report, run_with_report
 from ..turntable_video import Encoder
 
 #: The oldest version of Blender that RoSy runs in.
@@ -421,15 +421,13 @@ def blender_encoder(requested: str | None) -> Encoder | None:
         return None
     script = PACKAGE_FOLDER / "scene" / "video_encoding.py"
 
-    def encode_task(
-        folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
-    ) -> Task[None]:
+    def encode(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
         """Encode the pictures of a folder. See `Encoder`."""
         command = [program, *BLENDER_OPTIONS, "--python", str(script), "--"]
         command += map(str, (folder, count, *size, repr(fps), path))
-        status, output = yield from process_task(command, "encoding the video")
+        status, output = run_with_report(process_task(command, "encoding the video"), report)
         if status or not path.is_file():
             message = (output.strip().splitlines() or ["it failed"])[-1]
             raise RosyError(f"{path}: {program} cannot encode a video: {message}")
 
-    return encode_task
+    return encode

@@ -216,7 +216,7 @@ class SimulationFields(Sequence[api.Field]):
     ----------
     steps : sequence of Step
     array, degree, nonfinite
-        See `field.array_field.array_field_task`.
+        See `field.array_field.array_field`.
     up : {"y", "z"}
         The upward axis of the meshes.
     """

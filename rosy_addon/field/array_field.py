@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
-from .field_io import field_from_raw_task
+from ..progress import progress, report
+from .field_io import field_from_raw
 from .formats.raw_field import RawField
 from .frames import dot
 from .representation import face_frames, from_representation, to_representation
@@ -22,7 +22,7 @@ from .validate import (
     VERTEX_TOLERANCE_DEG,
     apply_nonfinite_policy,
     as_float64,
-    tangent_normals_task,
+    tangent_normals,
 )
 
 #: Degree of an array of vectors, if the caller gives none.
@@ -94,7 +94,7 @@ def find_array(arrays: SurfaceArrays, name: str | None = None) -> FieldArray:
     arrays : SurfaceArrays
     name : str, optional
         Its name, or "point:NAME" or "cell:NAME" if both have one. If not given, there must be a
-        single array that can be a field: see `array_field_task`. Without a name, only arrays of
+        single array that can be a field: see `array_field`. Without a name, only arrays of
         floating-point numbers count, as integers are usually labels or colors, and no normals.
 
     Raises
@@ -174,22 +174,6 @@ def array_field(
     degree: int | None = None,
     nonfinite: str = "error",
 ) -> RosyField:
-    """Run `array_field_task` to its end.
-
-    Examples
-    --------
-    >>> arrays = SurfaceArrays("flow", surface, {"velocity": velocity}, {})
-    >>> field = array_field(arrays, "velocity")
-    """
-    return run_to_completion(array_field_task(arrays, name, degree, nonfinite))
-
-
-def array_field_task(
-    arrays: SurfaceArrays,
-    name: str | None = None,
-    degree: int | None = None,
-    nonfinite: str = "error",
-) -> Task[RosyField]:
     """Make a field from one of the arrays of a surface.
 
     The count of numbers at each point or cell says what they are:
@@ -244,7 +228,7 @@ def array_field_task(
         raise RosyError(
             f"{source} gives a field of degree {raw.degree}, but degree {degree} was requested"
         )
-    yield Progress(0.0, _LABEL)
+    report(0.0, _LABEL)
     if raw.tensors and raw.domain == "vertex":
         apply_nonfinite_policy(raw.values, source, "vertex", nonfinite)
         corner_values = raw.values.reshape(-1, 9)[surface.corner_vertex]
@@ -253,12 +237,12 @@ def array_field_task(
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]
         apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
-        task = _tangential_task(surface, vectors, raw.domain, degree)
-        tangential = yield from subtask(task, 0.0, 0.5, _LABEL)
+        with progress(0.0, 0.5, _LABEL):
+            tangential = _compute_tangential(surface, vectors, raw.domain, degree)
         if tangential is not None:
             raw = replace(raw, values=tangential[:, None], domain="face")
-    task = field_from_raw_task(raw, surface, degree, source, nonfinite)
-    return (yield from subtask(task, 0.5, 1.0))
+    with progress(0.5, 1.0):
+        return field_from_raw(raw, surface, degree, source, nonfinite)
 
 
 def _raw_field(array: FieldArray, source: str) -> RawField:
@@ -285,17 +269,17 @@ def _raw_field(array: FieldArray, source: str) -> RawField:
     return RawField(matrices, 4, domain=array.domain, tensors=True)
 
 
-def _tangential_task(
+def _compute_tangential(
     surface: Surface, vectors: np.ndarray, domain: str, degree: int
-) -> Task[np.ndarray | None]:
+) -> np.ndarray | None:
     """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
-    normal = yield from tangent_normals_task(surface, domain)
+    normal = tangent_normals(surface, domain)
     tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
     length = np.sqrt(dot(vectors, vectors))
     is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(tolerance_deg)) * length
     if is_off.sum() <= MAX_OUTLIER_FRACTION * np.count_nonzero(length):
         return None
-    yield Progress(0.5, _LABEL)
+    report(0.5, _LABEL)
     if domain == "face":
         return _tangential(vectors, surface.face_normal)
     vectors = vectors[surface.corner_vertex]

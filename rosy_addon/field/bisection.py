@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from .frames import dot
 
 #: Factor by which longer edges are allowed while there would be too many triangles.
@@ -87,13 +87,6 @@ class BisectionTree:
 def bisect(
     vertices: np.ndarray, triangle_vertex: np.ndarray, max_length: float, max_triangles: int
 ) -> BisectionTree:
-    """Run `bisection_task` to its end."""
-    return run_to_completion(bisection_task(vertices, triangle_vertex, max_length, max_triangles))
-
-
-def bisection_task(
-    vertices: np.ndarray, triangle_vertex: np.ndarray, max_length: float, max_triangles: int
-) -> Task[BisectionTree]:
     """Bisect triangles until their edges are short. Neighbors keep sharing their edges.
 
     Parameters
@@ -104,10 +97,6 @@ def bisection_task(
         Longer edges are bisected, in the units of the vertices.
     max_triangles : int
         If there would be more triangles, longer edges are allowed.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -122,7 +111,7 @@ def bisection_task(
     split_edges = [np.zeros(root_count, dtype=np.int8)]
     node_count = root_count
     while True:
-        yield Progress(0.5, STEP_LABEL)
+        report(0.5, STEP_LABEL)
         lengths = _edge_lengths(vertices, leaf_vertex)
         long = lengths > max_length
         while len(leaf_vertex) + np.count_nonzero(long) > max_triangles and long.any():
@@ -140,7 +129,7 @@ def bisection_task(
         low, high = np.divmod(unique_key, len(vertices))
         vertices = np.concatenate([vertices, 0.5 * (vertices[low] + vertices[high])])
         while True:
-            yield Progress(0.5, STEP_LABEL)
+            report(0.5, STEP_LABEL)
             parent = np.flatnonzero((midpoint >= 0).any(axis=1))
             if not len(parent):
                 break
@@ -172,7 +161,7 @@ def bisection_task(
             leaf_weights = np.concatenate([leaf_weights, second_weights])
             leaf_root = np.concatenate([leaf_root, leaf_root[parent]])
             leaf_node = np.concatenate([leaf_node, child + 1])
-    yield Progress(1.0, STEP_LABEL)
+    report(1.0, STEP_LABEL)
     leaf = np.full(node_count, -1, dtype=np.int32)
     leaf[leaf_node] = np.arange(len(leaf_node), dtype=np.int32)
     return BisectionTree(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 
 #: Rows of an array (faces, corners, edges) in a step. A step with them takes hundredths of a second.
 ROWS_PER_STEP = 1 << 16
@@ -32,11 +32,9 @@ def blocks_by_count(count: np.ndarray, limit: int) -> Iterator[slice]:
         start, done = stop, int(total[stop - 1])
 
 
-def by_rows_task(
-    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
-    *arrays: np.ndarray,
-    label: str,
-) -> Task[np.ndarray | tuple[np.ndarray, ...]]:
+def by_rows(
+    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]], *arrays: np.ndarray, label: str
+) -> np.ndarray | tuple[np.ndarray, ...]:
     """Apply a function of arrays to blocks of their rows, and join the results.
 
     Parameters
@@ -51,9 +49,9 @@ def by_rows_task(
     count = len(arrays[0])
     parts = []
     for block in row_blocks(count):
-        yield Progress(block.start / max(count, 1), label)
+        report(block.start / max(count, 1), label)
         parts.append(function(*(array[block] for array in arrays)))
-    yield Progress(1.0, label)
+    report(1.0, label)
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)

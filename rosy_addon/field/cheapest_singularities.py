@@ -13,17 +13,17 @@ from functools import partial
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, subtask
-from .conjugate_gradient import conjugate_gradient_task
-from .face_graph import LABEL, FaceGraph, face_graph_task
+from ..progress import progress, report
+from .conjugate_gradient import conjugate_gradient
+from .face_graph import LABEL, FaceGraph, face_graph
 from .prescribed import index_at_nodes
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .singularities import singularities_task
-from .smoothest import eigenproblem_task, spectral_shift
-from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
+from .singularities import find_singularities
+from .smoothest import eigenproblem, spectral_shift
+from .sparse_multigrid import CSRMatrix, from_coo, hierarchy, w_cycle
 from .surface import Surface, face_area_vectors
-from .turning_angles import least_angles_task, potential_matrix_task
+from .turning_angles import least_angles, potential_matrix
 
 #: Largest number of steps to neighboring vertices.
 MAX_STEPS = 60
@@ -39,9 +39,9 @@ EDGE_RESISTANCE = 1 / 3
 MIN_SHARE = 0.05
 
 
-def cheapest_singularities_task(
+def cheapest_singularities(
     surface: Surface, degree: int, vertex: np.ndarray, index: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the singularities that are missing where a field with all of them is smooth.
 
     Parameters
@@ -51,10 +51,6 @@ def cheapest_singularities_task(
         N.
     vertex, index : (K,) int ndarray
         The given singularities, in units of 1 / N.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -72,25 +68,28 @@ def cheapest_singularities_task(
     x, y = face_frames(surface)
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    graph = yield from subtask(face_graph_task(surface, x, y), 0.0, 0.1, LABEL)
+    with progress(0.0, 0.1, LABEL):
+        graph = face_graph(surface, x, y)
     area = np.linalg.norm(
         face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
     )
     given = index_at_nodes(surface, graph, vertex, index)
     required = 2 * np.pi / degree * (given - _spread(surface, graph, area, given))
-    task = least_angles_task(graph, degree, required, [], 0.0)
-    angle = graph.conductance * (yield from subtask(task, 0.1, 0.3))
+    with progress(0.1, 0.3):
+        angle = graph.conductance * least_angles(graph, degree, required, [], 0.0)
     mass = np.maximum(area, 1e-12 * area.mean())
-    task = _energy_task(graph, degree, angle, spectral_shift(mass) * mass)
-    matrix = yield from subtask(task, 0.3, 0.35)
-    task = eigenproblem_task(matrix, mass, graph.component)
-    z, _ = yield from subtask(task, 0.35, 0.6)
+    with progress(0.3, 0.35):
+        matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
+    with progress(0.35, 0.6):
+        z, _ = eigenproblem(matrix, mass, graph.component)
     modulus = np.abs(z)
     z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
     field = RosyField(degree, from_representation(z, x, y, degree))
-    found, found_index = yield from subtask(singularities_task(surface, field), 0.6, 0.65)
+    with progress(0.6, 0.65):
+        found, found_index = find_singularities(surface, field)
     total = index_at_nodes(surface, graph, found, found_index)
-    added = yield from subtask(_settled_task(graph, degree, given, total - given), 0.65, 1.0)
+    with progress(0.65, 1.0):
+        added = _settled(graph, degree, given, total - given)
     node = np.flatnonzero(added)
     vertex_of_node = np.empty(graph.node_count, dtype=np.int64)
     vertex_of_node[graph.corner_node] = surface.corner_vertex
@@ -109,27 +108,23 @@ def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndar
     return node_area * (total / np.where(component_area > 0, component_area, 1))[component]
 
 
-def _settled_task(
-    graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
-) -> Task[np.ndarray]:
+def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
     """(n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
     if not added.any():
         return added
-    matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.05)
-    levels = yield from subtask(hierarchy_task(matrix), 0.05, 0.2)
+    with progress(0.0, 0.05):
+        matrix = potential_matrix(graph)
+    with progress(0.05, 0.2):
+        levels = hierarchy(matrix)
     unit = 2 * np.pi / degree
     neighbors = _Neighbors(graph)
     best, least, share = added, np.inf, 1.0
     potential = np.zeros(graph.node_count)
     for step in range(MAX_STEPS):
-        yield Progress(1 - 0.8 * 0.95**step, LABEL)
+        report(1 - 0.8 * 0.95**step, LABEL)
         charge = unit * (given + added) - graph.defect
-        solution = yield from conjugate_gradient_task(
-            matrix,
-            charge[graph.is_interior],
-            TOLERANCE,
-            partial(w_cycle, levels),
-            LABEL,
+        solution = conjugate_gradient(
+            matrix, charge[graph.is_interior], TOLERANCE, partial(w_cycle, levels), LABEL
         )
         energy = float(charge[graph.is_interior] @ solution)
         # Those that are still at given singularities have to leave them, whatever it costs.
@@ -190,11 +185,9 @@ class _Neighbors:
         return result
 
 
-def _energy_task(
-    graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray
-) -> Task[CSRMatrix]:
+def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
     """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
-    yield Progress(0.0, LABEL)
+    report(0.0, LABEL)
     count, weight = len(diagonal), 1 / graph.conductance
     source, target = graph.source, graph.target
     transport = np.exp(1j * degree * (graph.unfolding + angle))
@@ -203,4 +196,5 @@ def _energy_task(
     row = np.concatenate([target, source, faces]).astype(np.intp)
     column = np.concatenate([source, target, faces]).astype(np.intp)
     value = np.concatenate([-weight * transport, -weight * transport.conj(), diagonal])
-    return (yield from subtask(from_coo_task(row, column, value, count, count), 0.0, 1.0))
+    with progress(0.0, 1.0):
+        return from_coo(row, column, value, count, count)

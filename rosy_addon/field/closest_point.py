@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from .frames import dot
 from .surface import Surface
 
@@ -22,13 +22,6 @@ MAX_PAIRS = 1 << 18
 def closest_triangles(
     surface: Surface, points: np.ndarray, max_distance: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Run `closest_triangles_task` to its end."""
-    return run_to_completion(closest_triangles_task(surface, points, max_distance))
-
-
-def closest_triangles_task(
-    surface: Surface, points: np.ndarray, max_distance: float = np.inf
-) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Find the triangle closest to each point.
 
     Parameters
@@ -47,9 +40,9 @@ def closest_triangles_task(
         Distance of the point from the triangle, Blender units; infinite if no triangle was found.
     """
     label = "finding the closest faces"
-    yield Progress(0.0, label)
+    report(0.0, label)
     grid = _TriangleGrid(surface)
-    yield from grid.fill_task()
+    grid.fill()
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
     triangle = np.zeros(len(points), dtype=np.int32)
     distance = np.full(len(points), np.inf)
@@ -67,8 +60,8 @@ def closest_triangles_task(
     # triangle, or only ones beyond the maximum distance.
     ring = 0
     while len(unfinished):
-        yield Progress(1 - len(unfinished) / len(points), label)
-        yield from grid.search_ring_task(points, unfinished, ring, triangle, distance)
+        report(1 - len(unfinished) / len(points), label)
+        grid.search_ring(points, unfinished, ring, triangle, distance)
         ring += 1
         searched_distance = (ring - 1) * grid.cell_size + grid.distance_to_cell_border(
             points[unfinished]
@@ -97,28 +90,28 @@ class _TriangleGrid:
         self.max_ring = int(self.shape.max()) + 1
         self._low, self._high = low, high
 
-    def fill_task(self) -> Task[None]:
+    def fill(self) -> None:
         """Find the cells of the triangles. Call this first."""
         label = "finding the closest faces"
         low, high = self._low, self._high
-        yield Progress(0.0, label)
+        report(0.0, label)
         first = self._cells_of(low)
-        yield Progress(0.0, label)
+        report(0.0, label)
         last = self._cells_of(high)
-        yield Progress(0.0, label)
+        report(0.0, label)
         is_large = (last - first).max(axis=1) >= MAX_CELLS_PER_AXIS
         self.large_triangles = np.flatnonzero(is_large).astype(np.int32)
-        yield Progress(0.0, label)
+        report(0.0, label)
         small = np.flatnonzero(~is_large)
         span = last[small] - first[small] + 1
         count = span.prod(axis=1)
-        yield Progress(0.0, label)
+        report(0.0, label)
         entry = np.repeat(np.arange(len(small)), count)
-        yield Progress(0.0, label)
+        report(0.0, label)
         cell_number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        yield Progress(0.0, label)
+        report(0.0, label)
         spans = span[entry]
-        yield Progress(0.0, label)
+        report(0.0, label)
         offset = np.stack(
             [
                 cell_number // (spans[:, 1] * spans[:, 2]),
@@ -127,11 +120,11 @@ class _TriangleGrid:
             ],
             axis=1,
         )
-        yield Progress(0.0, label)
+        report(0.0, label)
         cell_key = self._keys_of(first[small][entry] + offset)
-        yield Progress(0.0, label)
+        report(0.0, label)
         order = np.argsort(cell_key, kind="stable")
-        yield Progress(0.0, label)
+        report(0.0, label)
         self.key, self.cell_triangle = cell_key[order], small[entry][order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
@@ -153,14 +146,14 @@ class _TriangleGrid:
         fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
 
-    def search_ring_task(
+    def search_ring(
         self,
         points: np.ndarray,
         selection: np.ndarray,
         ring: int,
         triangle: np.ndarray,
         distance: np.ndarray,
-    ) -> Task[None]:
+    ) -> None:
         """Test the selected points against the triangles in one ring of cells around their own.
 
         Parameters
@@ -178,7 +171,7 @@ class _TriangleGrid:
         offset = offset[np.abs(offset).max(axis=1) == ring]
         block = max(MAX_PAIRS // (8 * len(offset)), 1)
         for start in range(0, len(selection), block):
-            yield Progress(1 - (len(selection) - start) / len(points), "finding the closest faces")
+            report(1 - (len(selection) - start) / len(points), "finding the closest faces")
             chunk = selection[start : start + block]
             cell = (self._cells_of(points[chunk])[:, None] + offset).reshape(-1, 3)
             exists = ((cell >= 0) & (cell < self.shape)).all(axis=1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .convert import check_rosy
 from .guided import unit_representations
@@ -70,35 +70,35 @@ class Combing:
         changed = np.unique(self.system.surface.triangle_face[corner // 3])
         self._set_face_z(self.system.face_representations_at(self._z, changed), changed)
 
-    def settle_task(self, tolerance: float = RELATIVE_TOLERANCE) -> Task[None]:
+    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> None:
         """Solve the whole system. Without any guide, the field stays."""
         if not self.guides.any():
             return
-        task = self._node_guides_task()
-        self._node_guides = yield from subtask(task, 0.0, 0.1)
-        task = self.system.solve_task(self._node_guides, self._z, tolerance)
-        self._z = yield from subtask(task, 0.1, 0.95)
-        yield Progress(0.95, "averaging the field on the faces")
+        with progress(0.0, 0.1):
+            self._node_guides = self._compute_node_guides()
+        with progress(0.1, 0.95):
+            self._z = self.system.solve(self._node_guides, self._z, tolerance)
+        report(0.95, "averaging the field on the faces")
         self._set_face_z(self.system.face_representations(self._z), np.arange(len(self.guides)))
 
     def _update_node_guides(self, node: np.ndarray) -> None:
         """Bring the guides at nodes up to date."""
         if self._node_guides is None:
-            self._node_guides = run_to_completion(self._node_guides_task())
+            self._node_guides = self._compute_node_guides()
             return
         corner = self.system.corners_of_nodes(node)
-        new = run_to_completion(self._node_guides_task(corner))
+        new = self._compute_node_guides(corner)
         for name, values in vars(new).items():
             getattr(self._node_guides, name)[node] = values[node]
 
-    def _node_guides_task(self, corner: np.ndarray | slice = slice(None)) -> Task[NodeGuides]:
+    def _compute_node_guides(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
         firmness = np.abs(self.guides)
         target = np.divide(
             self.guides, firmness, out=np.zeros_like(self.guides), where=firmness > 0
         )
         edge_length = self.system.surface.mean_edge_length
         weight, is_exact = firmness_weights(firmness, edge_length)
-        return self.system.node_guides_task(target, weight, is_exact, corner)
+        return self.system.node_guides(target, weight, is_exact, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
         """Set the field from its representations on (m,) faces."""

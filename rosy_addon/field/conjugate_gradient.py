@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
-from .sparse_multigrid import CSRMatrix, hierarchy_task, w_cycle
+from ..progress import progress, report
+from .sparse_multigrid import CSRMatrix, hierarchy, w_cycle
 
 #: Residual norm relative to that of the right-hand side at which the iteration stops, by default.
 RELATIVE_TOLERANCE = 1e-9
@@ -17,7 +17,7 @@ MAX_ITERATIONS = 400
 ROUNDING_ERROR = float(np.finfo(float).eps)
 
 
-def conjugate_gradient_task(
+def conjugate_gradient(
     matrix: CSRMatrix,
     rhs: np.ndarray,
     tolerance: float = RELATIVE_TOLERANCE,
@@ -26,7 +26,7 @@ def conjugate_gradient_task(
     start: np.ndarray | None = None,
     is_fixed: np.ndarray | None = None,
     max_iterations: int = MAX_ITERATIONS,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Solve ``matrix @ solution = rhs`` by preconditioned conjugate gradients.
 
     Parameters
@@ -48,17 +48,14 @@ def conjugate_gradient_task(
         Unknowns that keep the values of `start`. Their equations are left out.
     max_iterations : int
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (n,) complex or float ndarray
         The last iterate.
     """
     if precondition is None:
-        levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.5)
+        with progress(0.0, 0.5):
+            levels = hierarchy(matrix)
         precondition = partial(w_cycle, levels)
     # Squares of scaled numbers stay in range. A power of two, in range itself, keeps all their digits.
     scale = 0.5 ** np.clip(np.frexp(_largest_part(rhs, start))[1], -1000, 1000)
@@ -78,7 +75,7 @@ def conjugate_gradient_task(
     smallest_residual = max(tolerance * norm, ROUNDING_ERROR * _norm(residual))
     direction, previous = None, 1.0
     for iteration in range(max_iterations):
-        yield Progress(0.5 + 0.5 * (1 - 0.9**iteration), label)
+        report(0.5 + 0.5 * (1 - 0.9**iteration), label)
         if _norm(residual) <= smallest_residual:
             break
         preconditioned = precondition(residual)

@@ -19,10 +19,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .frames import dot
-from .sparse_multigrid import CSRMatrix, from_coo_task
-from .surface import Surface, connected_components, edges_task, next_corners
+from .sparse_multigrid import CSRMatrix, from_coo
+from .surface import Surface, build_edges, connected_components, next_corners
 
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
 MAX_COTANGENT = 1e3
@@ -85,18 +85,14 @@ class Connection:
 
 
 def build_connection(surface: Surface) -> Connection:
-    """Run `connection_task` to its end."""
-    return run_to_completion(connection_task(surface))
-
-
-def connection_task(surface: Surface) -> Task[Connection]:
     """Build the connection of the triangles of a surface, at `Surface.vertices`."""
     label = "building the connection Laplacian"
-    yield Progress(0.0, label)
+    report(0.0, label)
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
-    edges = yield from subtask(edges_task(vertex, start), 0.0, 0.2, label)
-    yield Progress(0.2, label)
+    with progress(0.0, 0.2, label):
+        edges = build_edges(vertex, start)
+    report(0.2, label)
     corner = np.arange(len(vertex), dtype=np.int32)
     next_corner = next_corners(start)
     previous_corner = next_corner[next_corner]
@@ -104,18 +100,18 @@ def connection_task(surface: Surface) -> Task[Connection]:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     twin[a], twin[b] = b, a
 
-    yield Progress(0.3, label)
-    task = _corner_geometry_task(surface.vertices, surface.triangle_vertex)
-    corner_angle, cotangent, area = yield from subtask(task, 0.3, 0.5, label)
+    report(0.3, label)
+    with progress(0.3, 0.5, label):
+        corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
     # In counter-clockwise order around a vertex, the previous corner lies across the edge that
     # leaves from this corner.
-    yield Progress(0.5, label)
+    report(0.5, label)
     previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
-    task = _umbrella_starts_task(previous_in_umbrella, int(np.bincount(vertex).max()))
-    is_first, closed = yield from subtask(task, 0.5, 0.6, label)
-    task = _accumulate_angles_task(previous_in_umbrella, is_first, corner_angle)
-    first_corner, offset = yield from subtask(task, 0.6, 0.7, label)
-    yield Progress(0.7, label)
+    with progress(0.5, 0.6, label):
+        is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
+    with progress(0.6, 0.7, label):
+        first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
+    report(0.7, label)
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
     node_count = int(node_of_corner[-1]) + 1
@@ -126,7 +122,7 @@ def connection_task(surface: Surface) -> Task[Connection]:
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
-    yield Progress(0.8, label)
+    report(0.8, label)
     # Each edge once: from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
@@ -139,12 +135,12 @@ def connection_task(surface: Surface) -> Task[Connection]:
         edge_direction[head_corner]
         + corner_angle[head_corner] * angle_scale[corner_node[head_corner]],
     )
-    yield Progress(0.9, label)
+    report(0.9, label)
     weight = 0.5 * (
         cotangent[previous_corner[tail_corner]]
         + np.where(twin_of_tail >= 0, cotangent[previous_corner[twin_of_tail]], 0)
     )
-    yield Progress(0.95, label)
+    report(0.95, label)
     return Connection(
         corner_node=corner_node,
         node_count=node_count,
@@ -161,11 +157,6 @@ def connection_task(surface: Surface) -> Task[Connection]:
 
 
 def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMatrix:
-    """Run `laplacian_task` to its end."""
-    return run_to_completion(laplacian_task(connection, degree, shift))
-
-
-def laplacian_task(connection: Connection, degree: int, shift: float = 0.0) -> Task[CSRMatrix]:
     """The matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
 
     Parameters
@@ -183,33 +174,33 @@ def laplacian_task(connection: Connection, degree: int, shift: float = 0.0) -> T
         r transports from node j to node i.
     """
     c, label = connection, "building the connection Laplacian"
-    yield Progress(0.0, label)
+    report(0.0, label)
     # Negative weights (of obtuse triangles) would make the matrix indefinite.
     weight = np.maximum(c.weight, 0)
     ends = np.concatenate([c.tail, c.head])
     # Nodes without weight get a nonzero diagonal, so that the matrix stays regular.
     diagonal = np.bincount(ends, np.tile(weight, 2), c.node_count) + shift * c.mass
     diagonal[diagonal <= 0] = max(float(diagonal.mean()), 1.0)
-    yield Progress(0.3, label)
+    report(0.3, label)
     off_diagonal = -weight * np.exp(1j * degree * c.transport_angle)
-    yield Progress(0.5, label)
+    report(0.5, label)
     nodes = np.arange(c.node_count)
     row = np.concatenate([c.tail, c.head, nodes]).astype(np.intp)
     column = np.concatenate([c.head, c.tail, nodes]).astype(np.intp)
-    yield Progress(0.6, label)
+    report(0.6, label)
     value = np.concatenate([off_diagonal, off_diagonal.conj(), diagonal])
-    task = from_coo_task(row, column, value, c.node_count, c.node_count)
-    return (yield from subtask(task, 0.6, 1.0, label))
+    with progress(0.6, 1.0, label):
+        return from_coo(row, column, value, c.node_count, c.node_count)
 
 
-def _corner_geometry_task(
+def _corner_geometry(
     vertices: np.ndarray, triangles: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
     corner_angle, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
     area = np.empty(len(triangles))
     for first in range(0, len(triangles), BLOCK_TRIANGLES):
-        yield Progress(first / len(triangles), "measuring angles")
+        report(first / len(triangles), "measuring angles")
         block = slice(first, first + BLOCK_TRIANGLES)
         points = [vertices.take(column, axis=0) for column in triangles[block].T]
         edges = [points[(k + 1) % 3] - points[k] for k in range(3)]
@@ -227,9 +218,9 @@ def _corner_geometry_task(
     return corner_angle.ravel(), cotangent.ravel(), area
 
 
-def _umbrella_starts_task(
+def _umbrella_starts(
     previous_in_umbrella: np.ndarray, max_corners: int
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Find the first corner of each umbrella, and which umbrellas are closed.
 
     A closed umbrella begins with its corner of smallest index.
@@ -252,17 +243,17 @@ def _umbrella_starts_task(
     smallest, pointer = corner, np.where(previous_in_umbrella >= 0, previous_in_umbrella, corner)
     rounds = max_corners.bit_length()
     for index in range(rounds):
-        yield Progress(index / rounds, "ordering triangles around vertices")
+        report(index / rounds, "ordering triangles around vertices")
         smallest, pointer = np.minimum(smallest, smallest[pointer]), pointer[pointer]
-    yield Progress(1.0, "ordering triangles around vertices")
+    report(1.0, "ordering triangles around vertices")
     closed = previous_in_umbrella[pointer] >= 0
     first = (previous_in_umbrella < 0) | (closed & (smallest == corner))
     return first, closed[first]
 
 
-def _accumulate_angles_task(
+def _accumulate_angles(
     previous_in_umbrella: np.ndarray, is_first: np.ndarray, angle: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Sum the angles from the first corner of each umbrella up to each corner.
 
     Returns
@@ -275,7 +266,7 @@ def _accumulate_angles_task(
     pointer = np.where(is_first, np.arange(len(previous_in_umbrella)), previous_in_umbrella)
     angle_sum = np.where(is_first, 0.0, angle[pointer])
     while True:
-        yield Progress(0.5, "ordering triangles around vertices")
+        report(0.5, "ordering triangles around vertices")
         next_pointer = pointer[pointer]
         if np.array_equal(next_pointer, pointer):
             return pointer, angle_sum

@@ -7,18 +7,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
-from .conjugate_gradient import conjugate_gradient_task
-from .connection import connection_task, laplacian_task
-from .curvature import magnitude_task
+from ..progress import progress, report
+from .conjugate_gradient import conjugate_gradient
+from .connection import build_connection, laplacian
+from .curvature import compute_magnitude
 from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
-from .prescribed import TurningError, change_singularities_task
+from .prescribed import TurningError, change_singularities
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .singularities import singularities_task
-from .singularity_pairs import opposite_pairs_task
+from .singularities import find_singularities
+from .singularity_pairs import opposite_pairs
 from .smoothest import corner_frame_angles, node_sum_per_face
 from .sparse_multigrid import from_coo
 from .surface import Surface, connected_components
@@ -51,16 +51,7 @@ class Conversion:
 
 
 def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyField:
-    """Convert a field; see `convert_task`."""
-    return run_to_completion(convert_task(surface, field, conversion))
-
-
-def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> Task[RosyField]:
     """Apply the steps of a conversion to a field.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -69,24 +60,22 @@ def convert_task(surface: Surface, field: RosyField, conversion: Conversion) -> 
     Raises
     ------
     RosyError
-        If a step is not possible; see `change_degree`, `diffuse_task` and `cancel_pairs_task`.
+        If a step is not possible; see `change_degree`, `diffuse_field` and `cancel_pairs`.
     """
-    yield Progress(0.0, "converting the field")
+    report(0.0, "converting the field")
     if conversion.degree is not None:
         field = change_degree(surface, field, conversion.degree)
-        yield Progress(0.0, "converting the field")
+        report(0.0, "converting the field")
     if conversion.rotation:
         field = rotate_field(surface, field, conversion.rotation)
     if conversion.smoothing_length >= MIN_SMOOTHING_LENGTH:
         time = (conversion.smoothing_length * surface.extent) ** 2
-        field = yield from diffuse_task(surface, field, max(time, np.finfo(np.float64).tiny))
+        field = diffuse_field(surface, field, max(time, np.finfo(np.float64).tiny))
     if conversion.pair_distance > 0:
-        field = yield from cancel_pairs_task(
-            surface, field, conversion.pair_distance * surface.extent
-        )
+        field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        magnitude = yield from magnitude_task(surface, magnitude)
+        magnitude = compute_magnitude(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 
 
@@ -184,11 +173,6 @@ def rotate_field(surface: Surface, field: RosyField, angle: np.ndarray | float) 
 
 
 def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
-    """Smooth a field by diffusion; see `diffuse_task`."""
-    return run_to_completion(diffuse_task(surface, field, time))
-
-
-def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyField]:
     """Smooth a field by diffusion of its representation.
 
     This is one implicit Euler step, ``(M + t L) z = M z_0``, with the mass matrix M and the
@@ -203,10 +187,6 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
     time : float
         Diffusion time t in square Blender units. Details smaller than about its square root are
         removed.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -223,18 +203,20 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
     x, y = face_frames(surface)
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
-    connection = yield from subtask(connection_task(surface), 0.0, 0.1)
+    with progress(0.0, 0.1):
+        connection = build_connection(surface)
     frame_angle = corner_frame_angles(surface, connection, x, y)
-    yield Progress(0.1, "smoothing the field")
+    report(0.1, "smoothing the field")
     corner_area = np.repeat(connection.area / 3, 3)
     corner_face = np.repeat(surface.triangle_face, 3)
     to_node = np.exp(-1j * degree * frame_angle)
     rhs = complex_bincount(
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
-    yield Progress(0.15, "smoothing the field")
-    matrix = yield from subtask(laplacian_task(connection, degree), 0.15, 0.2)
-    yield Progress(0.2, "smoothing the field")
+    report(0.15, "smoothing the field")
+    with progress(0.15, 0.2):
+        matrix = laplacian(connection, degree)
+    report(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)
     matrix = from_coo(
@@ -244,8 +226,9 @@ def diffuse_task(surface: Surface, field: RosyField, time: float) -> Task[RosyFi
         connection.node_count,
         connection.node_count,
     )
-    solution = yield from subtask(conjugate_gradient_task(matrix, rhs), 0.2, 0.95)
-    yield Progress(0.95, "smoothing the field")
+    with progress(0.2, 0.95):
+        solution = conjugate_gradient(matrix, rhs)
+    report(0.95, "smoothing the field")
     area = np.bincount(surface.triangle_face, connection.area, surface.face_count)
     mean = (
         node_sum_per_face(surface, connection, solution, frame_angle, degree)
@@ -268,7 +251,7 @@ def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField
     return replace(field, vectors=normalize(field.vectors) * magnitude, source_directions=None)
 
 
-def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -> Task[RosyField]:
+def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> RosyField:
     """Remove pairs of singularities with opposite indices.
 
     Far from them, the field turns by an angle that falls with the distance. All other singularities stay, and
@@ -282,10 +265,6 @@ def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -
     max_distance : float
         Largest length of a path along edges between the two of a pair, in object space.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     RosyField
@@ -297,17 +276,18 @@ def cancel_pairs_task(surface: Surface, field: RosyField, max_distance: float) -
         If the directions are not a RoSy.
     """
     check_rosy(surface, field)
-    vertex, index = yield from subtask(singularities_task(surface, field), 0.0, 0.2)
-    task = opposite_pairs_task(surface, vertex, index, max_distance)
-    pairs = yield from subtask(task, 0.2, 0.4)
+    with progress(0.0, 0.2):
+        vertex, index = find_singularities(surface, field)
+    with progress(0.2, 0.4):
+        pairs = opposite_pairs(surface, vertex, index, max_distance)
     start = 0.4
     while len(pairs):
         chosen = pairs.ravel()
-        task = change_singularities_task(
-            surface, field, vertex[chosen], -index[chosen], max_distance
-        )
         try:
-            return (yield from subtask(task, start, 1.0))
+            with progress(start, 1.0):
+                return change_singularities(
+                    surface, field, vertex[chosen], -index[chosen], max_distance
+                )
         except TurningError as error:
             pairs = pairs[~_are_near(surface, vertex[pairs], error.vertices)]
         start = 0.5 * (start + 1.0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion
-from .blocks import by_rows_task
+from ..progress import report
+from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
 from .representation import complex_bincount, power
 from .surface import Surface, face_blocks, next_corners
@@ -41,19 +41,19 @@ def corner_rotations(
     return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
 
 
-def corner_rotations_task(
+def compute_corner_rotations(
     face_normal: np.ndarray,
     face_x: np.ndarray,
     corner_face: np.ndarray,
     corner_normal: np.ndarray,
     label: str,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """`corner_rotations` in steps, with the label of their progress."""
 
     def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
         return corner_rotations(face_normal, face_x, face, normal)
 
-    return (yield from by_rows_task(rotations, corner_face, corner_normal, label=label))
+    return by_rows(rotations, corner_face, corner_normal, label=label)
 
 
 def average_over_fans(
@@ -84,11 +84,6 @@ def average_over_fans(
 
 
 def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndarray:
-    """Run `corner_angles_task` to its end."""
-    return run_to_completion(corner_angles_task(surface, points))
-
-
-def corner_angles_task(surface: Surface, points: np.ndarray | None = None) -> Task[np.ndarray]:
     """The angle between the two edges at each corner of the faces.
 
     Parameters
@@ -105,7 +100,7 @@ def corner_angles_task(surface: Surface, points: np.ndarray | None = None) -> Ta
     points = surface.vertices if points is None else points
     angles = np.empty(len(surface.corner_vertex))
     for faces, corners, starts in face_blocks(surface.face_start):
-        yield Progress(faces.start / surface.face_count, "measuring angles")
+        report(faces.start / surface.face_count, "measuring angles")
         positions, following = points[surface.corner_vertex[corners]], next_corners(starts)
         to_next = positions[following] - positions
         to_previous = np.empty_like(to_next)

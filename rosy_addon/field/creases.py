@@ -11,16 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from .frames import angle_between, dot
 from .salient_edges import (
     MIN_RATIO,
     NOISE_MULTIPLE,
     SHARP_ANGLE,
-    filtered_normals_task,
+    filtered_normals,
     largest_of_others,
 )
-from .surface import Edges, Surface, connected_components_task, edges_task
+from .surface import Edges, Surface, build_edges, connected_components
 
 #: A chain may contain edges with this share of the crease angle.
 WEAK_SHARE = 0.5
@@ -63,7 +63,7 @@ class Creases(NamedTuple):
     chain: np.ndarray
 
 
-def creases_task(surface: Surface, crease_angle: float) -> Task[Creases]:
+def compute_creases(surface: Surface, crease_angle: float) -> Creases:
     """Find the creases of a mesh.
 
     An edge is strong if the angle between the normals of its faces is at least the crease angle, and
@@ -78,20 +78,15 @@ def creases_task(surface: Surface, crease_angle: float) -> Task[Creases]:
     crease_angle : float
         Radians.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Creases
         Borders and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
-    edges = yield from subtask(
-        edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.3, STEP_LABEL
-    )
-    yield Progress(0.3, STEP_LABEL)
+    with progress(0.0, 0.3, STEP_LABEL):
+        edges = build_edges(surface.corner_vertex, surface.face_start)
+    report(0.3, STEP_LABEL)
     sides = surface.corner_face[edges.halfedges].T
     # Smaller angles have no effect.
     crease_angle = max(crease_angle, MIN_ANGLE)
@@ -99,16 +94,16 @@ def creases_task(surface: Surface, crease_angle: float) -> Task[Creases]:
     if angle.max(initial=0.0) < crease_angle:
         return none
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
-    yield Progress(0.4, STEP_LABEL)
-    task = filtered_normals_task(surface, edges, region)
-    normals, noise_angle = yield from subtask(task, 0.4, 0.8, STEP_LABEL)
+    report(0.4, STEP_LABEL)
+    with progress(0.4, 0.8, STEP_LABEL):
+        normals, noise_angle = filtered_normals(surface, edges, region)
     ends = edges.ends[edges.interior]
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.sqrt(dot(vector, vector))
     mean_length = max(float(length.mean()), 1e-300)
     density = min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
     noise_angle *= density
-    yield Progress(0.8, STEP_LABEL)
+    report(0.8, STEP_LABEL)
     bent = np.flatnonzero(angle >= WEAK_SHARE * crease_angle)
     least = np.maximum(density * MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
     bent = bent[angle_between(*normals[sides[:, bent]]) >= least]
@@ -119,10 +114,10 @@ def creases_task(surface: Surface, crease_angle: float) -> Task[Creases]:
     bent = bent[is_candidate]
     if not len(bent):
         return none
-    yield Progress(0.9, STEP_LABEL)
+    report(0.9, STEP_LABEL)
     ends, length, is_strong = ends[bent], length[bent], angle[bent] >= crease_angle
-    task = connected_components_task(len(surface.vertices), ends)
-    chain = (yield from subtask(task, 0.9, 1.0, STEP_LABEL))[ends[:, 0]]
+    with progress(0.9, 1.0, STEP_LABEL):
+        chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     total = np.bincount(chain, length)[chain]
     is_kept = np.bincount(chain, length * is_strong)[chain] >= MIN_STRONG_SHARE * total
     is_kept &= total >= MIN_EDGES_PER_NOISE * noise_angle * mean_length

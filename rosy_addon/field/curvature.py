@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
-from .corner_fans import corner_angles_task, corner_rotations_task, smooth_face_values
+from ..progress import progress, report
+from .corner_fans import compute_corner_rotations, corner_angles, smooth_face_values
 from .frames import dot
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, sum_per_face, surface_task
+from .surface import Surface, build_surface, sum_per_face
 
 #: The smallest number whose inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)
@@ -26,7 +26,7 @@ MAGNITUDES = {
 CURVATURE_SMOOTHING_ROUNDS = 2
 
 
-def magnitude_task(surface: Surface, kind: str) -> Task[np.ndarray]:
+def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
     """Compute magnitudes of one of the kinds in `MAGNITUDES`.
 
     "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
@@ -44,36 +44,32 @@ def magnitude_task(surface: Surface, kind: str) -> Task[np.ndarray]:
     if kind == "unit":
         return np.ones(surface.face_count)
     if kind == "confidence":
-        field = yield from curvature_task(surface, 4)
+        field = curvature_field(surface, 4)
         return field.magnitude
     if kind != "curvature":
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
-    smooth_surface = yield from smooth_normals_task(surface)
+    smooth_surface = smooth_normals(surface)
     x, y = face_frames(smooth_surface)
-    yield Progress(0.5, "computing the curvature")
-    mean, deviator = yield from subtask(face_curvature_task(smooth_surface, x, y), 0.5, 1.0)
+    report(0.5, "computing the curvature")
+    with progress(0.5, 1.0):
+        mean, deviator = face_curvature(smooth_surface, x, y)
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
-def smooth_normals_task(surface: Surface) -> Task[Surface]:
+def smooth_normals(surface: Surface) -> Surface:
     """The surface with smooth normals everywhere, without flat faces and sharp edges."""
-    task = surface_task(
-        surface.vertices,
-        surface.corner_vertex,
-        surface.face_start,
-        name=surface.name,
-        triangles=surface.triangles,
-        triangle_face=surface.triangle_face,
-    )
-    return (yield from subtask(task, 0.0, 0.3, "averaging normals"))
+    with progress(0.0, 0.3, "averaging normals"):
+        return build_surface(
+            surface.vertices,
+            surface.corner_vertex,
+            surface.face_start,
+            name=surface.name,
+            triangles=surface.triangles,
+            triangle_face=surface.triangle_face,
+        )
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:
-    """Compute a curvature field; see `curvature_task`."""
-    return run_to_completion(curvature_task(surface, degree))
-
-
-def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     """Compute a field along the principal directions of curvature.
 
     Degree 2 follows the direction of the greater signed curvature (positive where the surface is
@@ -85,10 +81,6 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     umbilics and in planes, which have no principal directions, and about 1 on cylinders and
     saddles. k0 is 0.02 divided by the root mean square radius of the mesh. It suppresses rounding
     errors in nearly flat regions.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -109,13 +101,14 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     if degree % 2:
         raise RosyError(f"a curvature field needs an even degree, not {degree}")
     label = "computing principal directions"
-    yield Progress(0.0, label)
-    smooth_surface = yield from smooth_normals_task(surface)
-    yield Progress(0.3, label)
+    report(0.0, label)
+    smooth_surface = smooth_normals(surface)
+    report(0.3, label)
     x, y = face_frames(smooth_surface)
-    yield Progress(0.4, label)
-    mean, deviator = yield from subtask(face_curvature_task(smooth_surface, x, y), 0.4, 0.6)
-    yield Progress(0.6, label)
+    report(0.4, label)
+    with progress(0.4, 0.6):
+        mean, deviator = face_curvature(smooth_surface, x, y)
+    report(0.6, label)
     deviator_norm = np.abs(deviator)
     center = smooth_surface.face_center.mean(axis=0)
     offset = smooth_surface.face_center - center
@@ -127,26 +120,25 @@ def curvature_task(surface: Surface, degree: int) -> Task[RosyField]:
     is_curved = deviator_norm > TINY
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
-    yield Progress(0.65, label)
-    task = corner_rotations_task(
-        smooth_surface.face_normal,
-        x,
-        smooth_surface.corner_face,
-        smooth_surface.corner_normal,
-        label,
-    )
-    rotation = yield from subtask(task, 0.65, 0.68)
-    weights = yield from subtask(corner_angles_task(smooth_surface), 0.68, 0.7, label)
+    report(0.65, label)
+    with progress(0.65, 0.68):
+        rotation = compute_corner_rotations(
+            smooth_surface.face_normal,
+            x,
+            smooth_surface.corner_face,
+            smooth_surface.corner_normal,
+            label,
+        )
+    with progress(0.68, 0.7, label):
+        weights = corner_angles(smooth_surface)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
-        yield Progress(0.7 + 0.1 * index, label)
+        report(0.7 + 0.1 * index, label)
         z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
-    yield Progress(0.95, label)
+    report(0.95, label)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
-def face_curvature_task(
-    surface: Surface, x: np.ndarray, y: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+def face_curvature(surface: Surface, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit the second fundamental form of each face.
 
     The symmetric matrix [[a, b], [b, c]] maps each edge (u, v) of the face to the difference (p, q)
@@ -164,10 +156,10 @@ def face_curvature_task(
     points = surface.vertices[surface.corner_vertex]
     edge = points[next_corner] - points
     normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
-    yield Progress(0.3, "computing principal directions")
+    report(0.3, "computing principal directions")
     u, v = dot(edge, x[face]), dot(edge, y[face])
     p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
-    yield Progress(0.6, "computing principal directions")
+    report(0.6, "computing principal directions")
     products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
     uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
     trace = uu + vv

@@ -24,12 +24,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
-from .blocks import by_rows_task, row_blocks
+from ..progress import progress, report
+from .blocks import by_rows, row_blocks
 from .frames import dot
-from .representation import face_frames, matching_angles_task, signed_power, to_representation
+from .representation import compute_matching_angles, face_frames, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, edges_task
+from .surface import Surface, build_edges
 from .symmetry import FieldSymmetry
 
 #: Directions within these tolerances count as a RoSy: the error of the angle between neighboring
@@ -47,11 +47,6 @@ MIN_FAMILY_AGREEMENT = 0.98
 
 
 def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField:
-    """Run `field_from_directions_task` to its end."""
-    return run_to_completion(field_from_directions_task(surface, directions))
-
-
-def field_from_directions_task(surface: Surface, directions: np.ndarray) -> Task[RosyField]:
     """Make a field from N directions on each face.
 
     Parameters
@@ -74,23 +69,23 @@ def field_from_directions_task(surface: Surface, directions: np.ndarray) -> Task
     rosy_addon.field.validate.validated_directions : Check directions from outside first.
     """
     label = "reading directions"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y = face_frames(surface)
-    yield Progress(0.1, label)
+    report(0.1, label)
 
     def coordinates(rows: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return dot(rows, x[:, None]) + 1j * dot(rows, y[:, None])
 
-    task = by_rows_task(coordinates, directions, x, y, label=label)
-    w = yield from subtask(task, 0.1, 0.2)
+    with progress(0.1, 0.2):
+        w = by_rows(coordinates, directions, x, y, label=label)
     within_tolerance = True
     for rows in row_blocks(len(w)):
         within_tolerance &= is_rosy(w[rows])
-        yield Progress(0.3, label)
+        report(0.3, label)
         if not within_tolerance:
             break
-    task = by_rows_task(closest_rosy, w, label=label)
-    first_angle, rho, direction_ratios = yield from subtask(task, 0.3, 0.6)
+    with progress(0.3, 0.6):
+        first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=label)
     if within_tolerance:
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
@@ -98,7 +93,8 @@ def field_from_directions_task(surface: Surface, directions: np.ndarray) -> Task
             np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
         )
     field = RosyField(directions.shape[1], vectors, direction_ratios)
-    return (yield from subtask(detect_families_task(surface, field), 0.6, 1.0, label))
+    with progress(0.6, 1.0, label):
+        return detect_families(surface, field)
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -162,17 +158,17 @@ def _relative_angles(w: np.ndarray) -> np.ndarray:
     return relative
 
 
-def detect_families_task(surface: Surface, field: RosyField) -> Task[RosyField]:
+def detect_families(surface: Surface, field: RosyField) -> RosyField:
     """Set the `family_count` of a field.
 
     It becomes the number of lines if the stored members are on matching lines across at least
     `MIN_FAMILY_AGREEMENT` of the edges. Otherwise the field is returned unchanged.
     """
-    yield Progress(0.0, "matching directions")
+    report(0.0, "matching directions")
     line_count = field_symmetry(field).line_count
     if line_count == 1:
         return field
-    faces, matching = yield from field_matching_task(surface, field)
+    faces, matching = field_matching(surface, field)
     defined = field.vectors.any(axis=1)[faces].all(axis=1)
     if not defined.any() or np.mean(matching[defined] % line_count == 0) < MIN_FAMILY_AGREEMENT:
         return field
@@ -232,11 +228,6 @@ def field_symmetry(field: RosyField) -> FieldSymmetry:
 
 
 def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
-    """Run `tensor_field_task` to its end."""
-    return run_to_completion(tensor_field_task(surface, tensors))
-
-
-def tensor_field_task(surface: Surface, tensors: np.ndarray) -> Task[RosyField]:
     """Make a field of degree 4 from the eigenvectors of tensors restricted to the faces.
 
     Parameters
@@ -253,10 +244,10 @@ def tensor_field_task(surface: Surface, tensors: np.ndarray) -> Task[RosyField]:
         zero where the two eigenvalues are equal.
     """
     label = "reading directions"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y = face_frames(surface)
-    task = by_rows_task(_tensor_directions, tensors, x, y, label=label)
-    vectors, direction_ratios = yield from subtask(task, 0.3, 1.0)
+    with progress(0.3, 1.0):
+        vectors, direction_ratios = by_rows(_tensor_directions, tensors, x, y, label=label)
     return RosyField(4, vectors, direction_ratios, 2)
 
 
@@ -284,11 +275,6 @@ def _tensor_directions(
 
 
 def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
-    """Run `field_matching_task` to its end."""
-    return run_to_completion(field_matching_task(surface, field))
-
-
-def field_matching_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Match the members of neighboring faces across each interior edge.
 
     Returns
@@ -301,19 +287,19 @@ def field_matching_task(surface: Surface, field: RosyField) -> Task[tuple[np.nda
         the stored ones. The same holds for directions.
     """
     label = "matching directions"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y = face_frames(surface)
-    yield Progress(0.1, label)
-    task = edges_task(surface.corner_vertex, surface.face_start)
-    edges = yield from subtask(task, 0.2, 0.3, label)
-    yield Progress(0.3, label)
+    report(0.1, label)
+    with progress(0.2, 0.3, label):
+        edges = build_edges(surface.corner_vertex, surface.face_start)
+    report(0.3, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)
-    task = matching_angles_task(surface, x, y, z, field.degree, a, b, label)
-    closest_angle = yield from subtask(task, 0.4, 0.7)
-    task = matching_angles_task(surface, x, y, z_stored, 1, a, b, label)
-    stored_angle = yield from subtask(task, 0.7, 1.0)
+    with progress(0.4, 0.7):
+        closest_angle = compute_matching_angles(surface, x, y, z, field.degree, a, b, label)
+    with progress(0.7, 1.0):
+        stored_angle = compute_matching_angles(surface, x, y, z_stored, 1, a, b, label)
     matching = (
         np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
         % field.degree

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges
 from .representation import edge_unfolding
-from .singularities import signed_corner_angles_task
-from .surface import Surface, connected_components, edges_task, next_corners
+from .singularities import signed_corner_angles
+from .surface import Surface, build_edges, connected_components, next_corners
 
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4
@@ -75,9 +75,9 @@ class FaceGraph:
         return np.bincount(self.head, angle, count) - np.bincount(self.tail, angle, count)
 
 
-def face_graph_task(
+def face_graph(
     surface: Surface, x: np.ndarray, y: np.ndarray, is_defined: np.ndarray | None = None
-) -> Task[FaceGraph]:
+) -> FaceGraph:
     """Build the graph of the faces of a surface.
 
     Parameters
@@ -88,8 +88,9 @@ def face_graph_task(
     is_defined : (F,) bool ndarray, optional
         Where there is a field. By default on all faces with an area.
     """
-    edges = yield from subtask(edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.3)
-    yield Progress(0.3, LABEL)
+    with progress(0.0, 0.3):
+        edges = build_edges(surface.corner_vertex, surface.face_start)
+    report(0.3, LABEL)
     if is_defined is None:
         is_defined = x.any(axis=1)
     halfedges = edges.halfedges
@@ -98,14 +99,14 @@ def face_graph_task(
     following = next_corners(surface.face_start)
     source, target = surface.corner_face[a], surface.corner_face[b]
     unfolding = edge_unfolding(surface, x, y, a, b)
-    yield Progress(0.5, LABEL)
+    report(0.5, LABEL)
     length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
     np.clip(
         conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
     )
-    yield Progress(0.6, LABEL)
+    report(0.6, LABEL)
     corner_count = len(surface.corner_vertex)
     pairs = np.concatenate(
         [np.stack([a, following[b]], axis=1), np.stack([following[a], b], axis=1)]
@@ -116,9 +117,10 @@ def face_graph_task(
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
-    yield Progress(0.8, LABEL)
-    corner_angle = yield from subtask(signed_corner_angles_task(surface, x, y), 0.8, 0.9)
-    yield Progress(0.9, LABEL)
+    report(0.8, LABEL)
+    with progress(0.8, 0.9):
+        corner_angle = signed_corner_angles(surface, x, y)
+    report(0.9, LABEL)
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
     node_component = np.zeros(len(is_interior), dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
@@ -179,9 +181,7 @@ class SpanningForest:
         return np.array(path, dtype=np.intp)
 
 
-def spanning_forest_task(
-    node_count: int, first: np.ndarray, second: np.ndarray
-) -> Task[SpanningForest]:
+def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> SpanningForest:
     """Find spanning trees, breadth first.
 
     Parameters
@@ -204,7 +204,7 @@ def spanning_forest_task(
     front, done = roots, 0
     while len(front):
         done += len(front)
-        yield Progress(done / node_count, LABEL)
+        report(done / node_count, LABEL)
         counts = start[front + 1] - start[front]
         entry = concatenated_ranges(start[front], counts)
         entry = entry[~is_reached[neighbor[entry]]]

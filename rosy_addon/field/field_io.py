@@ -8,40 +8,40 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import RosyError, counted
-from ..file_io import check_parsing_memory, check_writable, write_blocks_task
-from ..progress import Progress, Task, run_to_completion, subtask
-from .directional_field import field_directions, tensor_field_task
-from .formats.fieldgen import fieldgen_text_task, read_fieldgen_task
-from .formats.plain import directions_text, npy_blocks, read_npy_task, read_text_task
+from ..file_io import check_parsing_memory, check_writable, write_blocks
+from ..progress import progress, report
+from .directional_field import field_directions, tensor_field
+from .formats.fieldgen import fieldgen_text, read_fieldgen
+from .formats.plain import directions_text, npy_blocks, read_npy, read_text
 from .formats.raw_field import RawField
 from .formats.rosy_rawfield import (
     rawfield_text,
-    read_rawfield_task,
-    read_rosy_task,
+    read_rawfield,
+    read_rosy,
     rosy_text,
 )
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
 from .formats.text_rows import ROWS_PER_STEP
 from .mesh_io import READERS as MESH_READERS
-from .mesh_io import SHARP_ANGLE, read_mesh_task
+from .mesh_io import SHARP_ANGLE, read_mesh
 from .rosy_field import RosyField
-from .singularities import singularities_task
-from .surface import Surface, surface_task
-from .transfer import transfer_field_task
+from .singularities import find_singularities
+from .surface import Surface, build_surface
+from .transfer import transfer_field
 from .validate import (
     apply_nonfinite_policy,
     infer_domain,
-    validated_directions_task,
-    validated_field_task,
+    validated_directions,
+    validated_field,
 )
 
 #: The reader of each file name extension.
-_READERS: dict[str, Callable[[Path], Task[RawField]]] = {
-    ".rosy": read_rosy_task,
-    ".rawfield": read_rawfield_task,
-    ".obj": read_fieldgen_task,
-    ".txt": read_text_task,
-    ".npy": read_npy_task,
+_READERS: dict[str, Callable[[Path], RawField]] = {
+    ".rosy": read_rosy,
+    ".rawfield": read_rawfield,
+    ".obj": read_fieldgen,
+    ".txt": read_text,
+    ".npy": read_npy,
 }
 READ_SUFFIXES = tuple(_READERS)
 WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUFFIXES)
@@ -78,17 +78,6 @@ def load_field(
     nonfinite: str = "error",
     mesh: str | os.PathLike[str] | None = None,
 ) -> LoadedField:
-    """Run `load_field_task` to its end."""
-    return run_to_completion(load_field_task(path, surface, degree, nonfinite, mesh))
-
-
-def load_field_task(
-    path: str | os.PathLike[str],
-    surface: Surface,
-    degree: int | None = None,
-    nonfinite: str = "error",
-    mesh: str | os.PathLike[str] | None = None,
-) -> Task[LoadedField]:
     """Read a field from a file and fit it to a mesh.
 
     ============  ==================================================================
@@ -138,20 +127,21 @@ def load_field_task(
             f"{path}: is not a field file: its name must end in {_join_names(READ_SUFFIXES)}"
         )
     check_parsing_memory(path, NPY_MEMORY)
-    raw = yield from subtask(reader(path), 0.0, 0.5)
+    with progress(0.0, 0.5):
+        raw = reader(path)
     if degree is not None and raw.degree is not None and raw.degree != degree:
         raise RosyError(
             f"{path}: the field has degree {raw.degree}, but degree {degree} was requested"
         )
-    task = _source_surface_task(path, raw, surface, mesh)
-    source_surface = yield from subtask(task, 0.5, 0.6)
+    with progress(0.5, 0.6):
+        source_surface = _source_surface(path, raw, surface, mesh)
     if source_surface is None:
-        task = field_from_raw_task(raw, surface, degree, str(path), nonfinite)
-        return LoadedField((yield from subtask(task, 0.6, 1.0)), "")
-    task = field_from_raw_task(raw, source_surface, degree, str(path), nonfinite)
-    field = yield from subtask(task, 0.6, 0.7)
-    task = transfer_field_task(source_surface, field, surface, str(path))
-    field = yield from subtask(task, 0.7, 1.0)
+        with progress(0.6, 1.0):
+            return LoadedField(field_from_raw(raw, surface, degree, str(path), nonfinite), "")
+    with progress(0.6, 0.7):
+        field = field_from_raw(raw, source_surface, degree, str(path), nonfinite)
+    with progress(0.7, 1.0):
+        field = transfer_field(source_surface, field, surface, str(path))
     return LoadedField(
         field,
         f"{path.name}: the field has {counted(source_surface.face_count, 'face')}, but the mesh has "
@@ -160,9 +150,9 @@ def load_field_task(
     )
 
 
-def field_from_raw_task(
+def field_from_raw(
     raw: RawField, surface: Surface, degree: int | None, source: str, nonfinite: str
-) -> Task[RosyField]:
+) -> RosyField:
     """Make a field from raw rows, on the surface that the rows refer to.
 
     Parameters
@@ -178,7 +168,7 @@ def field_from_raw_task(
     Raises
     ------
     RosyError
-        As of `load_field_task`.
+        As of `load_field`.
     """
     _check_count(raw, surface, source)
     values = raw.values
@@ -188,16 +178,12 @@ def field_from_raw_task(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
         apply_nonfinite_policy(values, source, "face", nonfinite)
-        yield Progress(0.2, "reading directions")
-        return (yield from tensor_field_task(surface, values))
+        report(0.2, "reading directions")
+        return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE
-        task = validated_field_task(
-            surface, values[:, 0], known_degree, source, nonfinite, raw.domain
-        )
-        return (yield from task)
-    task = validated_directions_task(surface, values, source, nonfinite, raw.domain)
-    return (yield from task)
+        return validated_field(surface, values[:, 0], known_degree, source, nonfinite, raw.domain)
+    return validated_directions(surface, values, source, nonfinite, raw.domain)
 
 
 def _check_count(raw: RawField, surface: Surface, source: str) -> None:
@@ -221,19 +207,18 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
         )
 
 
-def _source_surface_task(
+def _source_surface(
     path: Path, raw: RawField, surface: Surface, mesh: str | os.PathLike[str] | None
-) -> Task[Surface | None]:
+) -> Surface | None:
     """The surface that the rows of a file refer to, if it is not `surface`; None if it is."""
     if mesh is not None:
-        return (yield from read_mesh_task(mesh))
+        return read_mesh(mesh)
     count = len(raw.values)
     if raw.polygons is not None:
         counts = len(raw.polygons.vertices), raw.polygons.face_count
         if counts == (len(surface.vertices), surface.face_count):
             return None
-        task = surface_task(*raw.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
-        return (yield from task)
+        return build_surface(*raw.polygons, name=str(path), sharp_angle=SHARP_ANGLE)
     if count == surface.face_count:
         return None
     candidates = [
@@ -242,19 +227,12 @@ def _source_surface_task(
     mesh_path = next((candidate for candidate in candidates if candidate.is_file()), None)
     if mesh_path is None:
         return None
-    source = yield from read_mesh_task(mesh_path)
+    source = read_mesh(mesh_path)
     # The rows may match the vertices of `surface`, but belong to the faces of the mesh file.
     return source if count == source.face_count or infer_domain(surface, count) is None else None
 
 
 def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> None:
-    """Run `write_field_task` to its end."""
-    run_to_completion(write_field_task(path, field, surface))
-
-
-def write_field_task(
-    path: str | os.PathLike[str], field: RosyField, surface: Surface
-) -> Task[None]:
     """Write a field to a file, with one row for each face.
 
     `.obj` files contain the mesh and one row for each vertex. `.sings` and `.sing` files contain
@@ -286,27 +264,28 @@ def write_field_task(
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     check_writable(path)
-    yield Progress(0.0, "writing the file")
-    blocks = yield from subtask(_contents_task(suffix, field, surface), 0.0, 0.4)
+    report(0.0, "writing the file")
+    with progress(0.0, 0.4):
+        blocks = _contents(suffix, field, surface)
     row_count = surface.face_count + (3 * len(surface.vertices) if suffix == ".obj" else 0)
-    task = write_blocks_task(path, blocks, 1 + row_count / ROWS_PER_STEP)
-    yield from subtask(task, 0.4, 1.0)
+    with progress(0.4, 1.0):
+        write_blocks(path, blocks, 1 + row_count / ROWS_PER_STEP)
 
 
-def _contents_task(suffix: str, field: RosyField, surface: Surface) -> Task[Iterator[bytes]]:
+def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes]:
     """The contents of a field file, as blocks that are formatted one by one."""
     if suffix == ".rosy":
         text = rosy_text(field)
     elif suffix == ".obj":
-        text = yield from fieldgen_text_task(surface, field)
+        text = fieldgen_text(surface, field)
     elif suffix in SINGULARITY_SUFFIXES:
-        text = sings_text(field.degree, *(yield from singularities_task(surface, field)))
+        text = sings_text(field.degree, *find_singularities(surface, field))
     else:
         rows = field.source_directions
         if rows is None:
-            yield Progress(0.0, "computing directions")
+            report(0.0, "computing directions")
             rows = field_directions(surface, field)
-            yield Progress(1.0, "computing directions")
+            report(1.0, "computing directions")
         if suffix == ".npy":
             return npy_blocks(rows)
         text = rawfield_text(rows) if suffix == ".rawfield" else directions_text(rows)

@@ -11,18 +11,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
-from .connection import connection_task, laplacian_task
+from ..progress import progress, report
+from .connection import build_connection, laplacian
 from .frames import dot, normalize
-from .guided import guided_or_smoothest_task
+from .guided import guided_or_smoothest
 from .guides import guides_from_edges
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .salient_edges import filtered_normals_task, salient_edges_task, weighted_median
-from .smoothest import smoothest_task
-from .surface import Surface, edges_task, smooth_fans_task
-from .surface_averages import SurfaceAverages, bounded_curvature_task, of_unit_extent
-from .vertex_noise import noise_sample_task
+from .salient_edges import filtered_normals, salient_edges, weighted_median
+from .smoothest import smoothest_field
+from .surface import Surface, build_edges, smooth_fans
+from .surface_averages import SurfaceAverages, bounded_curvature, of_unit_extent
+from .vertex_noise import noise_sample
 
 #: Lengths over which curvature is averaged, relative to `Surface.extent`.
 SCALES = (0.01, 0.02, 0.04, 0.08)
@@ -53,7 +53,7 @@ def follows_curvature(degree: int) -> bool:
     return degree == 2 or degree % 4 == 0
 
 
-def form_task(surface: Surface, degree: int) -> Task[RosyField]:
+def form(surface: Surface, degree: int) -> RosyField:
     """Generate a field that follows the form of a surface.
 
     For degree 2 and the multiples of 4. Fields of other degrees cannot follow principal directions, and
@@ -64,10 +64,6 @@ def form_task(surface: Surface, degree: int) -> Task[RosyField]:
     surface : Surface
     degree : int
         N.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -87,35 +83,36 @@ def form_task(surface: Surface, degree: int) -> Task[RosyField]:
     """
     degree = check_degree(degree)
     if not follows_curvature(degree) or not surface.face_normal.any():
-        return (yield from smoothest_task(surface, degree))
+        return smoothest_field(surface, degree)
     original, surface = surface, of_unit_extent(surface)
-    edges = yield from subtask(
-        edges_task(surface.corner_vertex, surface.face_start), 0.0, 0.04, "finding edges"
-    )
-    normals, noise_angle = yield from subtask(filtered_normals_task(surface, edges), 0.04, 0.1)
-    task = salient_edges_task(surface, edges, normals, noise_angle)
-    ends = yield from subtask(task, 0.1, 0.12, "finding sharp edges")
-    noise = yield from subtask(noise_sample_task(surface, edges, noise_angle), 0.12, 0.15)
-    guides, confidence = yield from subtask(
-        _curvature_guides_task(surface, degree, ends, noise), 0.15, 0.5
-    )
+    with progress(0.0, 0.04, "finding edges"):
+        edges = build_edges(surface.corner_vertex, surface.face_start)
+    with progress(0.04, 0.1):
+        normals, noise_angle = filtered_normals(surface, edges)
+    with progress(0.1, 0.12, "finding sharp edges"):
+        ends = salient_edges(surface, edges, normals, noise_angle)
+    with progress(0.12, 0.15):
+        noise = noise_sample(surface, edges, noise_angle)
+    with progress(0.15, 0.5):
+        guides, confidence = _curvature_guides(surface, degree, ends, noise)
     weight = (confidence / REACH) ** 2
-    yield Progress(0.5, "finding guides")
+    report(0.5, "finding guides")
     edge_guides = guides_from_edges(surface, ends, degree)
-    yield Progress(0.5, "finding guides")
+    report(0.5, "finding guides")
     at_edge = edge_guides.any(axis=1)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     if not guides.any():
-        return (yield from subtask(smoothest_task(original, degree), 0.5, 1.0))
-    task = guided_or_smoothest_task(
-        surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
-    )
-    return (yield from subtask(task, 0.5, 1.0))
+        with progress(0.5, 1.0):
+            return smoothest_field(original, degree)
+    with progress(0.5, 1.0):
+        return guided_or_smoothest(
+            surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
+        )
 
 
-def _curvature_guides_task(
+def _curvature_guides(
     surface: Surface, degree: int, ends: np.ndarray, noise: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Find principal directions, and how clear they are.
 
     Parameters
@@ -135,24 +132,28 @@ def _curvature_guides_task(
         From 0 to 1.
     """
     x, y = face_frames(surface)
-    yield Progress(0.02, "computing principal directions")
-    task = smooth_fans_task(
-        surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
-    )
-    fans = yield from subtask(task, 0.02, 0.1)
-    mean, deviator = yield from subtask(bounded_curvature_task(surface, fans, x, y), 0.1, 0.2)
+    report(0.02, "computing principal directions")
+    with progress(0.02, 0.1):
+        fans = smooth_fans(
+            surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
+        )
+    with progress(0.1, 0.2):
+        mean, deviator = bounded_curvature(surface, fans, x, y)
     with_noise = replace(surface, vertices=surface.vertices + noise)
-    yield Progress(0.2, "computing principal directions")
+    report(0.2, "computing principal directions")
     normal = with_noise.face_normal
     x_noise = normalize(x - dot(x, normal)[:, None] * normal)
-    task = bounded_curvature_task(with_noise, fans, x_noise, np.cross(normal, x_noise))
-    _, deviator_noise = yield from subtask(task, 0.2, 0.3)
-    connection = yield from subtask(connection_task(surface), 0.3, 0.38)
-    yield Progress(0.38, "averaging curvature")
+    with progress(0.2, 0.3):
+        _, deviator_noise = bounded_curvature(with_noise, fans, x_noise, np.cross(normal, x_noise))
+    with progress(0.3, 0.38):
+        connection = build_connection(surface)
+    report(0.38, "averaging curvature")
     averages = SurfaceAverages(surface, connection, x, y)
-    yield Progress(0.38, "averaging curvature")
-    matrix = yield from subtask(laplacian_task(connection, 2), 0.38, 0.4)
-    flat_matrix = yield from subtask(laplacian_task(connection, 0), 0.4, 0.42)
+    report(0.38, "averaging curvature")
+    with progress(0.38, 0.4):
+        matrix = laplacian(connection, 2)
+    with progress(0.4, 0.42):
+        flat_matrix = laplacian(connection, 0)
     matrix = matrix.with_values(matrix.data.astype(np.complex64))
     flat_matrix = flat_matrix.with_values(flat_matrix.data.real.astype(np.float32))
     deviators = averages.node_sums(deviator, 2), averages.node_sums(deviator_noise - deviator, 2)
@@ -160,31 +161,31 @@ def _curvature_guides_task(
     for index, scale in enumerate(SCALES):
         area = scale**2
         start = 0.45 + 0.1 * index
-        z = yield from subtask(averages.smooth_task(matrix, area, deviators[0], z), start, start)
-        z_noise = yield from subtask(
-            averages.smooth_task(matrix, area, deviators[1], z_noise), start, start
-        )
+        with progress(start):
+            z = averages.smooth(matrix, area, deviators[0], z)
+            z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
         # The angle of a cross is a quarter of that of the square of a deviator.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
         modulus = np.abs(z)
         clear = averages.mass * modulus / (modulus + 1)
         if weighted_median(turn, clear) <= MAX_TURN:
             break
-    task = averages.smooth_task(flat_matrix, area, averages.node_sums(mean, 0))
-    mean = yield from subtask(task, 0.85, 0.85)
+    with progress(0.85):
+        mean = averages.smooth(flat_matrix, area, averages.node_sums(mean, 0))
     power = averages.mass * np.abs(z_noise) ** 2
-    power = yield from subtask(averages.smooth_task(flat_matrix, 4 * area, power), 0.9, 0.9)
-    yield Progress(0.95, "averaging curvature")
+    with progress(0.9):
+        power = averages.smooth(flat_matrix, 4 * area, power)
+    report(0.95, "averaging curvature")
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2
     modulus = np.abs(z)
     curvature = np.maximum(np.abs(mean), modulus) + FLAT_CURVATURE
-    yield Progress(0.96, "averaging curvature")
+    report(0.96, "averaging curvature")
     signal = modulus**2
     confidence = modulus / curvature * (signal / np.maximum(signal + power, 1e-300))
     confidence = np.clip((confidence - MIN_CONFIDENCE) / (1 - MIN_CONFIDENCE), 0.0, 1.0)
     z = confidence * np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
     face_z = averages.face_means(z, 2)
-    yield Progress(0.98, "averaging curvature")
+    report(0.98, "averaging curvature")
     confidence = np.abs(face_z)
     phase = np.divide(face_z, confidence, out=np.zeros_like(face_z), where=confidence > 0)
     return from_representation(phase ** (degree // 2), x, y, degree), confidence

@@ -13,24 +13,24 @@ import numpy as np
 
 from ..errors import NoFeaturesError, RosyError
 from ..memory import check_memory
-from ..progress import Progress, Task, run_to_completion, subtask
-from .cheapest_singularities import cheapest_singularities_task
-from .curvature import TINY, curvature_task
-from .form import form_task
+from ..progress import progress, report
+from .cheapest_singularities import cheapest_singularities
+from .curvature import TINY, curvature_field
+from .form import form
 from .frames import normalize, unit_direction
-from .guided import guided_or_smoothest_task
+from .guided import guided_or_smoothest
 from .guided_system import firmness_weights
 from .guides import (
     average_guides,
-    feature_edges_task,
+    feature_edges,
     guides_from_axes,
     guides_from_edges,
     guides_from_strokes,
-    uv_guides_task,
+    guides_from_uv,
 )
-from .prescribed import prescribed_task
+from .prescribed import prescribed_field
 from .rosy_field import RosyField, check_degree
-from .smoothest import smoothest_task
+from .smoothest import smoothest_field
 from .surface import Surface
 
 #: Smallest distance of smoothing, relative to `Surface.extent`. Shorter ones change nothing.
@@ -117,13 +117,6 @@ class GeneratorSettings:
 
 
 def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -> RosyField:
-    """Generate a field; see `generate_task`."""
-    return run_to_completion(generate_task(surface, settings, degree))
-
-
-def generate_task(
-    surface: Surface, settings: GeneratorSettings | str, degree: int
-) -> Task[RosyField]:
     """Generate a field of one of the kinds in `GENERATORS`.
 
     Parameters
@@ -133,10 +126,6 @@ def generate_task(
         A string is a kind, with the default settings.
     degree : int
         N.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -154,27 +143,28 @@ def generate_task(
         f"{surface.name}: a field on {surface.face_count:,} faces",
         "choose a smaller mesh, or another kind of field",
     )
-    yield Progress(0.0, "generating the field")
+    report(0.0, "generating the field")
     if settings.kind == "form":
-        return (yield from form_task(surface, degree))
+        return form(surface, degree)
     if settings.kind == "smoothest":
-        return (yield from smoothest_task(surface, degree))
+        return smoothest_field(surface, degree)
     if settings.kind == "axis":
         return axis_field(surface, degree, settings.axis)
     if settings.kind == "curvature":
         split = 0.4 if settings.smoothing_length else 1.0
-        field = yield from subtask(curvature_task(surface, degree), 0.0, split)
+        with progress(0.0, split):
+            field = curvature_field(surface, degree)
         if not settings.smoothing_length or not field.vectors.any():
             return field
         # The extent is zero if all faces are points; then so is the magnitude.
         length = max(settings.smoothing_length * surface.extent, TINY)
         weight = (field.magnitude / length) ** 2
-        task = guided_or_smoothest_task(surface, degree, normalize(field.vectors), weight)
-        return (yield from subtask(task, split, 1.0))
+        with progress(split, 1.0):
+            return guided_or_smoothest(surface, degree, normalize(field.vectors), weight)
     if settings.kind == "features":
-        return (yield from _features_task(surface, settings, degree))
+        return _features(surface, settings, degree)
     if settings.kind == "guided":
-        return (yield from _guides_task(surface, settings, degree))
+        return _guides(surface, settings, degree)
     if settings.kind == "prescribed":
         if settings.singularities is None:
             raise RosyError(
@@ -182,21 +172,20 @@ def generate_task(
             )
         singularities, start = settings.singularities, 0.0
         if settings.add_missing:
-            task = cheapest_singularities_task(surface, degree, *singularities)
-            singularities, start = (yield from subtask(task, 0.0, 0.5)), 0.5
+            with progress(0.0, 0.5):
+                singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5
         reach = settings.smoothing_length * surface.extent
-        task = prescribed_task(surface, degree, *singularities, settings.vectors, reach)
-        return (yield from subtask(task, start, 1.0))
+        with progress(start, 1.0):
+            return prescribed_field(surface, degree, *singularities, settings.vectors, reach)
     if settings.kind == "uv":
         if settings.uv is None:
             raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")
-        task = uv_guides_task(surface, settings.uv, check_degree(degree))
-        return RosyField(degree, (yield from task))
+        return RosyField(degree, guides_from_uv(surface, settings.uv, check_degree(degree)))
     raise RosyError(f"unknown generator '{settings.kind}': choose {', '.join(GENERATORS)}")
 
 
 def _peak_memory(surface: Surface, settings: GeneratorSettings) -> int:
-    """Estimate the bytes that `generate_task` takes at its peak."""
+    """Estimate the bytes that `generate` takes at its peak."""
     triangle_count = len(surface.triangles)
     if settings.kind == "prescribed" and settings.vectors is not None and settings.smoothing_length:
         return BENT_BYTES_PER_TRIANGLE * triangle_count
@@ -206,14 +195,14 @@ def _peak_memory(surface: Surface, settings: GeneratorSettings) -> int:
     return max(CURVATURE_BYTES_PER_FACE * surface.face_count, reach_bytes)
 
 
-def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
+def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """A field along the given edges or, without any, along border and sharp edges."""
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
-        task = feature_edges_task(surface, settings.sharp_angle)
-        ends = yield from subtask(task, 0.0, 0.0, "finding guides")
-        yield Progress(0.0, "finding guides")
+        with progress(0.0, label="finding guides"):
+            ends = feature_edges(surface, settings.sharp_angle)
+        report(0.0, "finding guides")
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
@@ -224,28 +213,28 @@ def _features_task(surface: Surface, settings: GeneratorSettings, degree: int) -
             f"{surface.name}: on each face, the edges cancel each other in a field of degree "
             f"{degree}: choose another degree"
         )
-    return (yield from guided_or_smoothest_task(surface, degree, guides))
+    return guided_or_smoothest(surface, degree, guides)
 
 
-def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> Task[RosyField]:
+def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """A field along the mean of all guides in the settings."""
     degree = check_degree(degree)
     guide_sets, label = [], "finding guides"
     if settings.edges is not None:
         guide_sets.append(guides_from_edges(surface, settings.edges, degree))
-        yield Progress(0.0, label)
+        report(0.0, label)
     if settings.strokes:
         guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
-        yield Progress(0.0, label)
+        report(0.0, label)
     if settings.axis_guides:
         position, axis, radius = (
             np.array(column, dtype=np.float64) for column in zip(*settings.axis_guides, strict=True)
         )
         guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
-        yield Progress(0.0, label)
+        report(0.0, label)
     if settings.uv is not None:
-        task = uv_guides_task(surface, settings.uv, degree)
-        guide_sets.append((yield from subtask(task, 0.0, 0.0)))
+        with progress(0.0):
+            guide_sets.append(guides_from_uv(surface, settings.uv, degree))
     if settings.vectors is not None:
         guide_sets.append(normalize(settings.vectors))
     if not guide_sets:
@@ -253,7 +242,7 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
             f"{surface.name}: no guides are given: give strokes, edges, a UV map, vectors or axes"
         )
     faces = np.tile(np.arange(surface.face_count), len(guide_sets))
-    yield Progress(0.0, label)
+    report(0.0, label)
     guides = average_guides(surface, faces, np.concatenate(guide_sets), degree)
     firmness = np.ones(surface.face_count)
     if settings.vectors is not None and settings.vectors_have_firmness:
@@ -262,7 +251,7 @@ def _guides_task(surface: Surface, settings: GeneratorSettings, degree: int) -> 
             firmness[guide.any(axis=1)] = 1.0
     reach = settings.smoothing_length * surface.extent
     weight, is_exact = firmness_weights(firmness, surface.mean_edge_length, reach)
-    return (yield from guided_or_smoothest_task(surface, degree, guides, weight, is_exact))
+    return guided_or_smoothest(surface, degree, guides, weight, is_exact)
 
 
 def axis_field(

@@ -6,12 +6,12 @@ import numpy as np
 
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .conjugate_gradient import RELATIVE_TOLERANCE
-from .guided_system import guided_system_task
+from .guided_system import guided_system
 from .representation import from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .smoothest import smoothest_task
+from .smoothest import smoothest_field
 from .surface import Surface
 
 
@@ -21,19 +21,8 @@ def guided_field(
     guides: np.ndarray,
     weight: np.ndarray | float,
     hard: np.ndarray | None = None,
-) -> RosyField:
-    """Compute a guided field; see `guided_task`."""
-    return run_to_completion(guided_task(surface, degree, guides, weight, hard))
-
-
-def guided_task(
-    surface: Surface,
-    degree: int,
-    guides: np.ndarray,
-    weight: np.ndarray | float,
-    hard: np.ndarray | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
-) -> Task[RosyField]:
+) -> RosyField:
     """Compute the smooth field that follows guides.
 
     Parameters
@@ -51,10 +40,6 @@ def guided_task(
     tolerance : float
         Residual norm relative to that of the right-hand side at which the solver stops.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     RosyField
@@ -67,15 +52,18 @@ def guided_task(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    system = yield from subtask(guided_system_task(surface, degree), 0.0, 0.1)
+    with progress(0.0, 0.1):
+        system = guided_system(surface, degree)
     target = to_representation(np.asarray(guides, dtype=np.float64), system.x, system.y, degree)
     if not target.any():
         raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
     is_hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
-    node_guides = yield from subtask(system.node_guides_task(target, weight, is_hard), 0.1, 0.12)
-    z = yield from subtask(system.solve_task(node_guides, tolerance=tolerance), 0.12, 0.95)
-    yield Progress(0.95, "averaging the field on the faces")
+    with progress(0.1, 0.12):
+        node_guides = system.node_guides(target, weight, is_hard)
+    with progress(0.12, 0.95):
+        z = system.solve(node_guides, tolerance=tolerance)
+    report(0.95, "averaging the field on the faces")
     face_z = unit_representations(system.face_representations(z))
     face_z[is_hard] = target[is_hard] / np.abs(target[is_hard])
     return RosyField(degree, from_representation(face_z, system.x, system.y, degree))
@@ -88,24 +76,25 @@ def unit_representations(z: np.ndarray) -> np.ndarray:
     return np.divide(z, modulus, out=np.zeros_like(z), where=is_defined)
 
 
-def guided_or_smoothest_task(
+def guided_or_smoothest(
     surface: Surface,
     degree: int,
     guides: np.ndarray,
     weight: np.ndarray | float | None = None,
     hard: np.ndarray | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
-) -> Task[RosyField]:
+) -> RosyField:
     """A guided field, with the smoothest field on connected components without a guide.
 
-    Without `weight`, all guides are followed exactly. The parameters are those of `guided_task`.
+    Without `weight`, all guides are followed exactly. The parameters are those of `guided_field`.
     """
     if weight is None:
         weight, hard = 0.0, guides.any(axis=1)
-    task = guided_task(surface, degree, guides, weight, hard, tolerance)
-    field = yield from subtask(task, 0.0, 0.6)
+    with progress(0.0, 0.6):
+        field = guided_field(surface, degree, guides, weight, hard, tolerance)
     unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
     if not unguided.any():
         return field
-    smoothest = yield from subtask(smoothest_task(surface, degree), 0.6, 1.0)
+    with progress(0.6, 1.0):
+        smoothest = smoothest_field(surface, degree)
     return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))

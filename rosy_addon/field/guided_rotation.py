@@ -13,11 +13,11 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
-from .conjugate_gradient import conjugate_gradient_task
+from ..progress import progress, report
+from .conjugate_gradient import conjugate_gradient
 from .face_graph import FaceGraph
 from .representation import complex_bincount
-from .sparse_multigrid import CSRMatrix, Level, from_coo_task, hierarchy_task, w_cycle
+from .sparse_multigrid import CSRMatrix, Level, from_coo, hierarchy, w_cycle
 from .turning_angles import added_resistance
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
@@ -37,14 +37,14 @@ REGULARIZATION = 1e-9
 LABEL = "turning the field to the guides"
 
 
-def guided_rotation_task(
+def guided_rotation(
     graph: FaceGraph,
     degree: int,
     turning: np.ndarray,
     z: np.ndarray,
     target: np.ndarray,
     penalty: np.ndarray,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Compute the angle by which a field turns to follow guides.
 
     Parameters
@@ -61,10 +61,6 @@ def guided_rotation_task(
     penalty : (F,) ndarray
         Weight of the squared difference from the guide, relative to that of squared angles at edges whose
         conductance is 1.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -83,18 +79,18 @@ def guided_rotation_task(
     angle = None
     for attempt in range(MAX_ATTEMPTS):
         start, stop = 1 - 0.5**attempt, 1 - 0.5 ** (attempt + 1)
-        matrix = yield from subtask(_system_task(graph, stiffness, penalty), start, start, LABEL)
-        levels = yield from subtask(hierarchy_task(matrix), start, 0.5 * (start + stop))
+        with progress(start, label=LABEL):
+            matrix = _system(graph, stiffness, penalty)
+        with progress(start, 0.5 * (start + stop)):
+            levels = hierarchy(matrix)
         if angle is None:
-            angle = yield from _initial_angle_task(
-                graph, stiffness, matrix, levels, offset, penalty
-            )
+            angle = _initial_angle(graph, stiffness, matrix, levels, offset, penalty)
             angle /= degree
         for _ in range(MAX_ROUNDS):
-            yield Progress(0.5 * (start + stop), LABEL)
+            report(0.5 * (start + stop), LABEL)
             multiple = np.rint((angle - wanted) / sector)
             rhs = penalty * (wanted + sector * multiple)
-            angle = yield from _solve_task(matrix, rhs, levels)
+            angle = _solve(matrix, rhs, levels)
             if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
                 break
         added = angle[graph.target] - angle[graph.source]
@@ -104,48 +100,46 @@ def guided_rotation_task(
     return angle
 
 
-def _system_task(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> Task[CSRMatrix]:
+def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
     """The Laplacian of the faces, with the penalty on its diagonal."""
     count = len(penalty)
     source, target = graph.source.astype(np.intp), graph.target.astype(np.intp)
     diagonal = np.bincount(np.concatenate([source, target]), np.tile(stiffness, 2), count)
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
     faces = np.arange(count)
-    return (
-        yield from from_coo_task(
-            np.concatenate([source, target, faces]),
-            np.concatenate([target, source, faces]),
-            np.concatenate([-stiffness, -stiffness, diagonal]),
-            count,
-            count,
-        )
+    return from_coo(
+        np.concatenate([source, target, faces]),
+        np.concatenate([target, source, faces]),
+        np.concatenate([-stiffness, -stiffness, diagonal]),
+        count,
+        count,
     )
 
 
-def _initial_angle_task(
+def _initial_angle(
     graph: FaceGraph,
     stiffness: np.ndarray,
     matrix: CSRMatrix,
     levels: list[Level],
     offset: np.ndarray,
     penalty: np.ndarray,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
     modulus = np.abs(offset)
     unit = np.divide(offset, modulus, out=np.zeros_like(offset), where=modulus > 0)
-    mean = yield from _solve_task(matrix, penalty * unit, levels)
+    mean = _solve(matrix, penalty * unit, levels)
     difference = np.angle(mean[graph.target] * mean[graph.source].conj())
     count = len(offset)
     divergence = np.bincount(graph.target, stiffness * difference, count)
     divergence -= np.bincount(graph.source, stiffness * difference, count)
-    laplacian = yield from _system_task(graph, stiffness, np.zeros(count))
-    angle = yield from _solve_task(laplacian, divergence, None)
+    laplacian = _system(graph, stiffness, np.zeros(count))
+    angle = _solve(laplacian, divergence, None)
     rest = penalty * unit * np.exp(-1j * angle)
     parts = int(graph.component.max(initial=-1)) + 1
     return angle + np.angle(complex_bincount(graph.component, rest, parts))[graph.component]
 
 
-def _solve_task(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> Task[np.ndarray]:
-    """Solve a system; see `conjugate_gradient_task`."""
+def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
+    """Solve a system; see `conjugate_gradient`."""
     precondition = None if levels is None else partial(w_cycle, levels)
-    return (yield from conjugate_gradient_task(matrix, rhs, TOLERANCE, precondition, LABEL))
+    return conjugate_gradient(matrix, rhs, TOLERANCE, precondition, LABEL)

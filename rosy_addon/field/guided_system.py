@@ -14,12 +14,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
-from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient_task
-from .connection import Connection, connection_task, laplacian_task
+from ..progress import progress, report
+from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
+from .connection import Connection, build_connection, laplacian
 from .representation import complex_bincount, face_frames
 from .smoothest import corner_frame_angles, node_sum_per_face
-from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy_task, w_cycle
+from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
 from .surface import Surface
 
 #: Residual norm, relative to that of the right-hand side, at which a solution near some nodes stops.
@@ -82,13 +82,13 @@ class GuidedSystem:
     laplacian: CSRMatrix
     levels: list[Level] = field(default_factory=list)
 
-    def node_guides_task(
+    def node_guides(
         self,
         target: np.ndarray,
         weight: np.ndarray,
         is_hard: np.ndarray,
         corner: np.ndarray | slice = slice(None),
-    ) -> Task[NodeGuides]:
+    ) -> NodeGuides:
         """Average guides on the faces at the nodes.
 
         Parameters
@@ -102,15 +102,15 @@ class GuidedSystem:
             Corners of triangles that are taken into account.
         """
         label = "averaging the guides at the vertices"
-        yield Progress(0.0, label)
+        report(0.0, label)
         node, count = self.connection.corner_node[corner], self.connection.node_count
         to_node = np.exp(-1j * self.degree * self.frame_angle[corner])
-        yield Progress(0.3, label)
+        report(0.3, label)
         face, area = self._corner_face[corner], self._corner_area[corner]
         penalty = np.bincount(node, area * weight[face], count)
-        yield Progress(0.5, label)
+        report(0.5, label)
         rhs = complex_bincount(node, area * (weight * target)[face] * to_node, count)
-        yield Progress(0.7, label)
+        report(0.7, label)
         # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
         fixed = complex_bincount(node, area * (is_hard * target)[face] * to_node, count)
         max_modulus = np.bincount(node, area * (is_hard * np.abs(target))[face], count)
@@ -119,12 +119,12 @@ class GuidedSystem:
         fixed[is_fixed] /= np.abs(fixed[is_fixed])
         return NodeGuides(penalty, rhs, is_fixed, fixed)
 
-    def solve_task(
+    def solve(
         self,
         guides: NodeGuides,
         start: np.ndarray | None = None,
         tolerance: float = RELATIVE_TOLERANCE,
-    ) -> Task[np.ndarray]:
+    ) -> np.ndarray:
         """Solve for the representations at the nodes.
 
         Parameters
@@ -141,24 +141,23 @@ class GuidedSystem:
         """
         label = "interpolating between the guides"
         if not self.levels:
-            self.levels.extend(
-                (yield from subtask(hierarchy_task(self.laplacian), 0.0, 0.5, label))
-            )
+            with progress(0.0, 0.5, label):
+                self.levels.extend(hierarchy(self.laplacian))
         # Fixed nodes are stiff in the preconditioner, so that it hardly changes them.
         diagonal = np.where(guides.is_fixed, self.laplacian.diagonal, guides.penalty)
-        yield Progress(0.5, label)
+        report(0.5, label)
         levels = add_diagonal(self.levels, diagonal)
         start = guides.fixed if start is None else np.where(guides.is_fixed, guides.fixed, start)
-        task = conjugate_gradient_task(
-            levels[0].matrix,
-            guides.rhs,
-            tolerance,
-            partial(w_cycle, levels),
-            label,
-            start,
-            guides.is_fixed,
-        )
-        return (yield from subtask(task, 0.5, 1.0, label))
+        with progress(0.5, 1.0, label):
+            return conjugate_gradient(
+                levels[0].matrix,
+                guides.rhs,
+                tolerance,
+                partial(w_cycle, levels),
+                label,
+                start,
+                guides.is_fixed,
+            )
 
     def solve_near(
         self, guides: NodeGuides, z: np.ndarray, nodes: np.ndarray, max_iterations: int
@@ -183,7 +182,7 @@ class GuidedSystem:
         z[nodes] = 0
         rows = self.laplacian.rows(nodes)
         matrix = rows.columns(nodes).plus_diagonal(guides.penalty[nodes])
-        task = conjugate_gradient_task(
+        return conjugate_gradient(
             matrix,
             guides.rhs[nodes] - rows @ z,
             NEAR_TOLERANCE,
@@ -192,7 +191,6 @@ class GuidedSystem:
             is_fixed=guides.is_fixed[nodes],
             max_iterations=max_iterations,
         )
-        return run_to_completion(task)
 
     def face_representations(self, z: np.ndarray) -> np.ndarray:
         """(F,) complex128 means of (n,) representations at the nodes, in the frames x, y."""
@@ -305,14 +303,16 @@ def firmness_weights(
     return weight, is_exact
 
 
-def guided_system_task(surface: Surface, degree: int) -> Task[GuidedSystem]:
+def guided_system(surface: Surface, degree: int) -> GuidedSystem:
     """Build the system of a surface."""
     label = "building the connection Laplacian"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y = face_frames(surface)
-    connection = yield from subtask(connection_task(surface), 0.0, 0.5)
-    yield Progress(0.5, label)
+    with progress(0.0, 0.5):
+        connection = build_connection(surface)
+    report(0.5, label)
     frame_angle = corner_frame_angles(surface, connection, x, y)
-    laplacian = yield from subtask(laplacian_task(connection, degree), 0.6, 1.0)
-    laplacian = laplacian.plus_diagonal(REGULAR_SHIFT * laplacian.diagonal)
-    return GuidedSystem(surface, degree, x, y, connection, frame_angle, laplacian)
+    with progress(0.6, 1.0):
+        laplacian_result = laplacian(connection, degree)
+    laplacian_result = laplacian_result.plus_diagonal(REGULAR_SHIFT * laplacian_result.diagonal)
+    return GuidedSystem(surface, degree, x, y, connection, frame_angle, laplacian_result)

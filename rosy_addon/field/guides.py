@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
-from .surface import Surface, edges_task, mean_per_face, sum_per_face
+from .surface import Surface, build_edges, mean_per_face, sum_per_face
 
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
 #: away are ignored.
@@ -61,11 +61,6 @@ def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.nda
 
 
 def feature_edges(surface: Surface, angle: float) -> np.ndarray:
-    """Run `feature_edges_task` to its end."""
-    return run_to_completion(feature_edges_task(surface, angle))
-
-
-def feature_edges_task(surface: Surface, angle: float) -> Task[np.ndarray]:
     """Find the border edges and the sharp edges of a surface.
 
     Parameters
@@ -80,12 +75,12 @@ def feature_edges_task(surface: Surface, angle: float) -> Task[np.ndarray]:
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
     label = "finding guides"
-    edges = yield from edges_task(surface.corner_vertex, surface.face_start)
-    yield Progress(0.0, label)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    report(0.0, label)
     is_feature = np.ones(len(edges.ends), dtype=bool)
     is_feature[edges.interior] = False
     normal = surface.face_normal
-    yield Progress(0.5, label)
+    report(0.5, label)
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
     # Faces without area have no normal, so their edges have no angle.
     dihedral = np.arccos(np.clip(dot(normal_a, normal_b), -1, 1))
@@ -177,11 +172,6 @@ def guides_from_axes(
 
 
 def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
-    """Run `uv_guides_task` to its end."""
-    return run_to_completion(uv_guides_task(surface, uv, degree))
-
-
-def uv_guides_task(surface: Surface, uv: np.ndarray, degree: int) -> Task[np.ndarray]:
     """Make guides along the axes of a UV map, in the direction of increasing u.
 
     Parameters
@@ -200,19 +190,19 @@ def uv_guides_task(surface: Surface, uv: np.ndarray, degree: int) -> Task[np.nda
     """
     label = "following the UV map"
     x, y = face_frames(surface)
-    yield Progress(0.3, label)
+    report(0.3, label)
     face = surface.corner_face
     offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
     position = dot(offset, x[face]) + 1j * dot(offset, y[face])
     mean_uv = mean_per_face(np.asarray(uv, dtype=np.float64), surface.face_start)
     u, v = (np.asarray(uv, dtype=np.float64) - mean_uv[face]).T
-    yield Progress(0.7, label)
+    report(0.7, label)
     # Least squares fit of the linear map from (u, v) to the face plane.
     uu, uv_sum, vv = (
         sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
     )
     up, vp = (sum_per_face(axis * position, surface.face_start) for axis in (u, v))
-    yield Progress(0.9, label)
+    report(0.9, label)
     area = uu * vv - uv_sum**2
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up

@@ -10,20 +10,20 @@ import numpy as np
 
 from ..errors import RosyError
 from ..file_io import check_parsing_memory
-from ..progress import Task, run_to_completion, subtask
-from .formats.obj import read_obj_task
-from .formats.off import read_off_task
-from .formats.ply import read_ply_task
+from ..progress import progress
+from .formats.obj import read_obj
+from .formats.off import read_off
+from .formats.ply import read_ply
 from .formats.polygons import Polygons
-from .formats.stl import read_stl_task
-from .surface import Surface, surface_task
+from .formats.stl import read_stl
+from .surface import Surface, build_surface
 
 #: The reader of each file name extension.
-READERS: dict[str, Callable[[Path], Task[Polygons]]] = {
-    ".obj": read_obj_task,
-    ".off": read_off_task,
-    ".ply": read_ply_task,
-    ".stl": read_stl_task,
+READERS: dict[str, Callable[[Path], Polygons]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
 }
 
 #: Bytes of memory that a byte of a binary file takes until its surface is built.
@@ -36,16 +36,6 @@ SHARP_ANGLE = np.radians(60)
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Surface:
-    """Read a mesh from a file; see `read_mesh_task`.
-
-    Examples
-    --------
-    >>> surface = read_mesh("bunny.obj")
-    """
-    return run_to_completion(read_mesh_task(path))
-
-
-def read_mesh_task(path: str | os.PathLike[str]) -> Task[Surface]:
     """Read a mesh from an .obj, .off, .ply or .stl file.
 
     Edges with an angle above `SHARP_ANGLE` are sharp.
@@ -62,14 +52,15 @@ def read_mesh_task(path: str | os.PathLike[str]) -> Task[Surface]:
     Raises
     ------
     RosyError
-        As of `read_polygons_task`, or if the file is not a mesh with faces.
+        As of `read_polygons`, or if the file is not a mesh with faces.
     """
-    polygons = yield from subtask(read_polygons_task(path), 0.0, 0.5)
-    task = surface_task(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
-    return (yield from subtask(task, 0.5, 1.0))
+    with progress(0.0, 0.5):
+        polygons = read_polygons(path)
+    with progress(0.5, 1.0):
+        return build_surface(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
 
 
-def read_polygons_task(path: str | os.PathLike[str]) -> Task[Polygons]:
+def read_polygons(path: str | os.PathLike[str]) -> Polygons:
     """Read the polygons of an .obj, .off, .ply or .stl file.
 
     Vertices and faces keep the order of the file, because field files refer to them by number.
@@ -97,4 +88,4 @@ def read_polygons_task(path: str | os.PathLike[str]) -> Task[Polygons]:
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
-    return (yield from reader(path))
+    return reader(path)

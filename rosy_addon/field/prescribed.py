@@ -11,14 +11,14 @@ import numpy as np
 
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
-from ..progress import Progress, Task, run_to_completion, subtask
-from .face_graph import LABEL, FaceGraph, face_graph_task
+from ..progress import progress, report
+from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
-from .guided_rotation import guided_rotation_task
+from .guided_rotation import guided_rotation
 from .representation import complex_bincount, face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, face_area_vectors, next_corners
-from .turning_angles import turning_angles_task
+from .turning_angles import turning_angles
 
 
 class TurningError(RosyError):
@@ -43,18 +43,6 @@ def prescribed_field(
     guides: np.ndarray | None = None,
     reach: float = 0.0,
 ) -> RosyField:
-    """Compute a field with given singularities; see `prescribed_task`."""
-    return run_to_completion(prescribed_task(surface, degree, vertex, index, guides, reach))
-
-
-def prescribed_task(
-    surface: Surface,
-    degree: int,
-    vertex: np.ndarray,
-    index: np.ndarray,
-    guides: np.ndarray | None = None,
-    reach: float = 0.0,
-) -> Task[RosyField]:
     """Compute the smoothest field with given singularities, and no other ones.
 
     Parameters
@@ -73,10 +61,6 @@ def prescribed_task(
         If it is above 0, the field also bends to the guides. Their influence falls off over this distance, in
         object space.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     RosyField
@@ -92,15 +76,16 @@ def prescribed_task(
     raise_mmap_threshold()
     vertex, index = np.asarray(vertex, dtype=np.int64), np.asarray(index, dtype=np.int64)
     x, y = face_frames(surface)
-    graph = yield from subtask(face_graph_task(surface, x, y), 0.0, 0.2, LABEL)
-    yield Progress(0.2, LABEL)
+    with progress(0.0, 0.2, LABEL):
+        graph = face_graph(surface, x, y)
+    report(0.2, LABEL)
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, graph.defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - graph.defect
-    task = turning_angles_task(surface, graph, degree, required)
-    angle, direction = yield from subtask(task, 0.2, 0.85)
+    with progress(0.2, 0.85):
+        angle, direction = turning_angles(surface, graph, degree, required)
     _check_angles(surface, graph, degree, angle)
-    yield Progress(0.85, LABEL)
+    report(0.85, LABEL)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
     edge = surface.vertices[surface.corner_vertex[next_corners(surface.face_start)]]
     edge = edge - surface.vertices[surface.corner_vertex]
@@ -111,21 +96,14 @@ def prescribed_task(
         target = to_representation(normalize(np.asarray(guides, dtype=np.float64)), x, y, degree)
         z *= _rotation_to(target, z, graph.component)
         if reach > 0:
-            task = _bent_task(surface, graph, degree, angle, z, target, reach)
-            z = yield from subtask(task, 0.9, 1.0)
+            with progress(0.9, 1.0):
+                z = _bent(surface, graph, degree, angle, z, target, reach)
     return RosyField(degree, from_representation(z, x, y, degree))
 
 
 def change_singularities(
     surface: Surface, field: RosyField, vertex: np.ndarray, change: np.ndarray, reach: float
 ) -> RosyField:
-    """Change the singularities of a field; see `change_singularities_task`."""
-    return run_to_completion(change_singularities_task(surface, field, vertex, change, reach))
-
-
-def change_singularities_task(
-    surface: Surface, field: RosyField, vertex: np.ndarray, change: np.ndarray, reach: float
-) -> Task[RosyField]:
     """Change the singularities of a field near them.
 
     Parameters
@@ -138,10 +116,6 @@ def change_singularities_task(
         What is added to the index of each vertex, in units of 1 / N.
     reach : float
         Distance over which the change of direction falls off, in object space.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -162,8 +136,9 @@ def change_singularities_task(
     z = to_representation(field.vectors, x, y, degree)
     is_defined = z != 0
     z[is_defined] /= np.abs(z[is_defined])
-    graph = yield from subtask(face_graph_task(surface, x, y, is_defined), 0.0, 0.2, LABEL)
-    yield Progress(0.2, LABEL)
+    with progress(0.0, 0.2, LABEL):
+        graph = face_graph(surface, x, y, is_defined)
+    report(0.2, LABEL)
     node_change = index_at_nodes(
         surface, graph, np.asarray(vertex, dtype=np.int64), np.asarray(change, dtype=np.int64)
     )
@@ -171,18 +146,18 @@ def change_singularities_task(
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
     required = 2 * np.pi / degree * node_change
-    task = turning_angles_task(surface, graph, degree, required, present)
-    added, direction = yield from subtask(task, 0.2, 0.85)
+    with progress(0.2, 0.85):
+        added, direction = turning_angles(surface, graph, degree, required, present)
     _check_angles(surface, graph, degree, present + added)
-    yield Progress(0.85, LABEL)
+    report(0.85, LABEL)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
-    task = _bent_task(surface, graph, degree, present + added, turned, z, reach)
-    turned = yield from subtask(task, 0.9, 1.0)
+    with progress(0.9, 1.0):
+        turned = _bent(surface, graph, degree, present + added, turned, z, reach)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
 
 
-def _bent_task(
+def _bent(
     surface: Surface,
     graph: FaceGraph,
     degree: int,
@@ -190,11 +165,11 @@ def _bent_task(
     z: np.ndarray,
     target: np.ndarray,
     reach: float,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(F,) the representation z, turned to a target where there is one, with the same singularities."""
     area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     penalty = np.linalg.norm(area, axis=1) / reach / reach
-    angle = yield from guided_rotation_task(graph, degree, turning, z, target, penalty)
+    angle = guided_rotation(graph, degree, turning, z, target, penalty)
     _check_angles(surface, graph, degree, turning + angle[graph.target] - angle[graph.source])
     return z * np.exp(1j * degree * angle)
 

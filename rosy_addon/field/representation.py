@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Task
-from .blocks import by_rows_task
+from .blocks import by_rows
 from .frames import dot, normalize
 from .rosy_field import RosyField
 from .surface import Surface, face_blocks, next_corners
@@ -167,7 +166,7 @@ def matching_angles(
     return np.angle(z[target_face] * (z[source_face] * power(unfolding, degree)).conj()) / degree
 
 
-def matching_angles_task(
+def compute_matching_angles(
     surface: Surface,
     x: np.ndarray,
     y: np.ndarray,
@@ -176,10 +175,10 @@ def matching_angles_task(
     a: np.ndarray,
     b: np.ndarray,
     label: str,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """`matching_angles` in steps, with the label of their progress."""
 
     def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return matching_angles(surface, x, y, z, degree, a, b)
 
-    return (yield from by_rows_task(angles, a, b, label=label))
+    return by_rows(angles, a, b, label=label)

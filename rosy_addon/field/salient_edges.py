@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 from .frames import angle_between, dot, normalize
-from .surface import Edges, Surface, connected_components_task, face_area_vectors
+from .surface import Edges, Surface, connected_components, face_area_vectors
 
 #: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
 FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35
@@ -32,9 +32,9 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
-def filtered_normals_task(
+def filtered_normals(
     surface: Surface, edges: Edges, region: np.ndarray | None = None
-) -> Task[tuple[np.ndarray, float]]:
+) -> tuple[np.ndarray, float]:
     """Smooth the face normals over edges, but not across large angles.
 
     Parameters
@@ -70,12 +70,12 @@ def filtered_normals_task(
     area = np.sqrt(dot(vectors, vectors))
     area /= max(float(area.max(initial=0.0)), 1e-300)
     for index in range(FILTER_ROUNDS):
-        yield Progress(index / FILTER_ROUNDS, label)
+        report(index / FILTER_ROUNDS, label)
         normal_a, normal_b = normals[face_a], normals[face_b]
         difference = normal_a - normal_b
         weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
         weight_a, weight_b = weight * area[face_b], weight * area[face_a]
-        yield Progress((index + 0.5) / FILTER_ROUNDS, label)
+        report((index + 0.5) / FILTER_ROUNDS, label)
         total = normals * area[:, None]
         for axis in range(3):
             total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
@@ -89,9 +89,9 @@ def filtered_normals_task(
     return normals, noise_angle
 
 
-def salient_edges_task(
+def salient_edges(
     surface: Surface, edges: Edges, normals: np.ndarray, noise_angle: float
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Find the borders and the edges at which the surface bends more sharply than around them.
 
     On a coarse mesh of a smooth surface, neighboring edges have similar angles, and none of them is
@@ -102,7 +102,7 @@ def salient_edges_task(
     surface : Surface
     edges : Edges
     normals, noise_angle
-        From `filtered_normals_task`.
+        From `filtered_normals`.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def salient_edges_task(
     angle = np.zeros(len(edges.ends))
     # Faces without area have no normal, so their edges have no angle.
     angle[edges.interior] = angle_between(normals[face_a], normals[face_b])
-    yield Progress(0.3, label)
+    report(0.3, label)
     interior = angle[edges.interior]
     others = np.maximum(*largest_of_others(surface, angle[edges.corner_edge], edges.halfedges))
     noise = NOISE_MULTIPLE * noise_angle
@@ -125,7 +125,7 @@ def salient_edges_task(
     ends = edges.ends[is_salient]
     if not len(ends):
         return ends
-    line = yield from connected_components_task(len(surface.vertices), ends)
+    line = connected_components(len(surface.vertices), ends)
     line = line[ends[:, 0]]
     edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.bincount(line, np.sqrt(dot(edge, edge)))[line]

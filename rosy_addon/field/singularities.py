@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import counted
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .frames import dot
-from .representation import face_frames, matching_angles_task, to_representation
+from .representation import compute_matching_angles, face_frames, to_representation
 from .rosy_field import RosyField
-from .surface import Surface, build_edges, edges_task, face_blocks, next_corners
+from .surface import Surface, build_edges, face_blocks, next_corners
 
 
 def euler_characteristic(surface: Surface) -> int:
@@ -25,11 +25,6 @@ def euler_characteristic(surface: Surface) -> int:
 
 
 def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
-    """Run `singularities_task` to its end."""
-    return run_to_completion(singularities_task(surface, field))
-
-
-def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Find the singular vertices of a field, and their indices.
 
     A field on faces is singular at vertices. The rotation of the field around a vertex is the sum
@@ -54,28 +49,29 @@ def singularities_task(surface: Surface, field: RosyField) -> Task[tuple[np.ndar
         Singularity indices in units of 1 / N; never 0.
     """
     label = "counting singularities"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y = face_frames(surface)
-    yield Progress(0.1, label)
+    report(0.1, label)
     z = to_representation(field.vectors, x, y, field.degree)
-    yield Progress(0.2, label)
-    task = edges_task(surface.corner_vertex, surface.face_start)
-    edges = yield from subtask(task, 0.2, 0.3, label)
-    yield Progress(0.4, label)
+    report(0.2, label)
+    with progress(0.2, 0.3, label):
+        edges = build_edges(surface.corner_vertex, surface.face_start)
+    report(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    task = matching_angles_task(surface, x, y, z, field.degree, a, b, label)
-    matching = yield from subtask(task, 0.4, 0.7)
+    with progress(0.4, 0.7):
+        matching = compute_matching_angles(surface, x, y, z, field.degree, a, b, label)
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
-    yield Progress(0.7, label)
+    report(0.7, label)
     # A counter-clockwise loop around the head of an edge crosses it from side a to side b, a loop
     # around its tail from b to a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
-    yield Progress(0.8, label)
-    corner_angles = yield from subtask(signed_corner_angles_task(surface, x, y), 0.8, 0.9, label)
+    report(0.8, label)
+    with progress(0.8, 0.9, label):
+        corner_angles = signed_corner_angles(surface, x, y)
     angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
-    yield Progress(0.9, label)
+    report(0.9, label)
     angle_sum = angle_sum + angle_defect
     index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
 
@@ -96,9 +92,7 @@ def format_index(index: int, degree: int) -> str:
     return f"{numerator:+d}" if denominator == 1 else f"{numerator:+d}/{denominator}"
 
 
-def description_task(
-    fields: Sequence[tuple[Surface, RosyField]], *, count_singularities: bool
-) -> Task[str]:
+def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularities: bool) -> str:
     """Describe fields for a message.
 
     Parameters
@@ -115,7 +109,7 @@ def description_task(
     if count_singularities:
         count = 0
         for surface, field in fields:
-            vertices, _ = yield from singularities_task(surface, field)
+            vertices, _ = find_singularities(surface, field)
             count += len(vertices)
         parts.append(counted(count, "singularity", "singularities"))
     undefined = sum(int((~field.vectors.any(axis=1)).sum()) for _, field in fields)
@@ -124,11 +118,11 @@ def description_task(
     return ", ".join(parts)
 
 
-def signed_corner_angles_task(surface: Surface, x: np.ndarray, y: np.ndarray) -> Task[np.ndarray]:
+def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))
     for faces, corners, starts in face_blocks(surface.face_start):
-        yield Progress(faces.start / surface.face_count, "measuring angles")
+        report(faces.start / surface.face_count, "measuring angles")
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
         edge = points[following] - points
         face = surface.corner_face[corners]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 from .surface import Surface
 
 #: Singularities match if they are nearer than this fraction of the longest side of the mesh.
@@ -32,12 +32,12 @@ class SingularityMatching(NamedTuple):
     distance: np.ndarray
 
 
-def match_on_surface_task(
+def match_on_surface(
     surface: Surface,
     singularities: tuple[np.ndarray, np.ndarray],
     other: tuple[np.ndarray, np.ndarray],
     reach: float = DEFAULT_REACH,
-) -> Task[SingularityMatching]:
+) -> SingularityMatching:
     """Match the singularities of two fields of the same degree on a surface.
 
     Parameters
@@ -49,7 +49,7 @@ def match_on_surface_task(
         Largest distance of a pair, as a fraction of the longest side of the mesh.
     """
     (vertex, index), (other_vertex, other_index) = singularities, other
-    return match_singularities_task(
+    return match_singularities(
         surface.vertices[vertex],
         index,
         surface.vertices[other_vertex],
@@ -58,13 +58,13 @@ def match_on_surface_task(
     )
 
 
-def match_singularities_task(
+def match_singularities(
     points: np.ndarray,
     index: np.ndarray,
     other_points: np.ndarray,
     other_index: np.ndarray,
     reach: float,
-) -> Task[SingularityMatching]:
+) -> SingularityMatching:
     """Match singularities of the same index, the nearest pairs first, each at most once.
 
     Parameters
@@ -78,23 +78,17 @@ def match_singularities_task(
     reach : float
         Largest distance of a pair, a straight line, in Blender units.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     SingularityMatching
         In the order of `first`.
     """
-    first, second, distance = yield from _candidates_task(
-        points, index, other_points, other_index, reach
-    )
+    first, second, distance = _candidates(points, index, other_points, other_index, reach)
     order = np.lexsort((second, first, distance))
     first, second, distance = first[order], second[order], distance[order]
     matched = []
     while len(first):
-        yield Progress(1.0, "matching singularities")
+        report(1.0, "matching singularities")
         # A pair is the nearest of both its singularities if it is the first with each of them.
         is_nearest = np.zeros(len(first), dtype=bool)
         is_nearest[np.unique(first, return_index=True)[1]] = True
@@ -111,19 +105,19 @@ def match_singularities_task(
     return SingularityMatching(first[order], second[order], distance[order])
 
 
-def _candidates_task(
+def _candidates(
     points: np.ndarray,
     index: np.ndarray,
     other_points: np.ndarray,
     other_index: np.ndarray,
     reach: float,
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find all pairs within reach whose indices are the same: both singularities, and distances."""
     empty = np.empty(0, dtype=np.intp)
     found = [(empty, empty, np.empty(0))]
     rows = max(DISTANCES_PER_STEP // max(len(other_index), 1), 1)
     for start in range(0, len(index), rows):
-        yield Progress(start / len(index), "matching singularities")
+        report(start / len(index), "matching singularities")
         block = slice(start, start + rows)
         squared = np.zeros((len(index[block]), len(other_index)))
         for coordinate in range(3):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .convert import check_rosy
-from .prescribed import change_singularities_task
+from .prescribed import change_singularities
 from .rosy_field import RosyField
-from .singularities import singularities_task
+from .singularities import find_singularities
 from .surface import Surface
 
 #: Stands for no vertex: what is moved there leaves the surface over a border.
@@ -22,13 +22,6 @@ MIN_REACH = 0.01
 def move_index(
     surface: Surface, field: RosyField, source: int, target: int, index: int = 0, reach: float = 0.0
 ) -> RosyField:
-    """Move a singularity index from one vertex to another; see `move_index_task`."""
-    return run_to_completion(move_index_task(surface, field, source, target, index, reach))
-
-
-def move_index_task(
-    surface: Surface, field: RosyField, source: int, target: int, index: int = 0, reach: float = 0.0
-) -> Task[RosyField]:
     """Move a singularity index from one vertex to another.
 
     All ways to edit singularities by hand are such moves. The index of a singularity that is moved onto
@@ -47,10 +40,6 @@ def move_index_task(
     reach : float
         Distance over which the change of direction falls off, in object space. The distance between the
         vertices is used if that is larger.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -71,7 +60,8 @@ def move_index_task(
             f"{surface.name}: vertex {source} is both source and target: choose another target"
         )
     if index == 0:
-        vertex, indices = yield from subtask(singularities_task(surface, field), 0.0, 0.2)
+        with progress(0.0, 0.2):
+            vertex, indices = find_singularities(surface, field)
         index = int(indices[vertex == source].sum())
         if index == 0:
             raise RosyError(
@@ -81,10 +71,10 @@ def move_index_task(
     ends = np.array([source, target])
     is_vertex = ends != OUTSIDE
     change = np.array([-index, index])[is_vertex]
-    yield Progress(0.2, "moving a singularity")
+    report(0.2, "moving a singularity")
     reach = max(reach, _distance(surface, ends), MIN_REACH * surface.extent)
-    task = change_singularities_task(surface, field, ends[is_vertex], change, reach)
-    return (yield from subtask(task, 0.2, 1.0))
+    with progress(0.2, 1.0):
+        return change_singularities(surface, field, ends[is_vertex], change, reach)
 
 
 def _distance(surface: Surface, ends: np.ndarray) -> float:

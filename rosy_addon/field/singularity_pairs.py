@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from .blocks import concatenated_ranges
-from .surface import Surface, edges_task
+from .surface import Surface, build_edges
 
 #: Label of all steps.
 LABEL = "pairing singularities"
 
 
-def opposite_pairs_task(
+def opposite_pairs(
     surface: Surface, vertex: np.ndarray, index: np.ndarray, max_distance: float
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Pair singularities with opposite indices, the nearest ones first.
 
     Parameters
@@ -25,16 +25,12 @@ def opposite_pairs_task(
     max_distance : float
         Largest length of a path along edges between the two of a pair, in object space.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (P, 2) intp ndarray
         Pairs of positions in `vertex`; each occurs once at most.
     """
-    first, second, distance = yield from _near_task(surface, vertex, max_distance)
+    first, second, distance = _near(surface, vertex, max_distance)
     is_opposite = (first < second) & (index[first] == -index[second])
     order = np.flatnonzero(is_opposite)[np.argsort(distance[is_opposite], kind="stable")]
     is_free = np.ones(len(vertex), dtype=bool)
@@ -46,9 +42,9 @@ def opposite_pairs_task(
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
 
-def _near_task(
+def _near(
     surface: Surface, vertex: np.ndarray, max_distance: float
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find which of some vertices are near to each other.
 
     Returns
@@ -58,8 +54,8 @@ def _near_task(
     distance : (n,) float64 ndarray
         Length of the shortest path along edges.
     """
-    task = edges_task(surface.corner_vertex, surface.face_start)
-    ends = (yield from subtask(task, 0.0, 0.3, LABEL)).ends
+    with progress(0.0, 0.3, LABEL):
+        ends = build_edges(surface.corner_vertex, surface.face_start).ends
     count = len(surface.vertices)
     length = np.linalg.norm(surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]], axis=1)
     near = length <= max_distance
@@ -73,7 +69,7 @@ def _near_task(
     distance = np.zeros(len(vertex))
     known_state, known_distance = state, distance
     while len(state):
-        yield Progress(0.5, LABEL)
+        report(0.5, LABEL)
         source, place = np.divmod(state, count)
         counts = start[place + 1] - start[place]
         entry = concatenated_ranges(start[place], counts)

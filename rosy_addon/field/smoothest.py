@@ -11,12 +11,12 @@ import numpy as np
 
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
-from ..progress import Progress, Task, run_to_completion, subtask
-from .connection import BLOCK_TRIANGLES, Connection, connection_task, laplacian_task
+from ..progress import progress, report
+from .connection import BLOCK_TRIANGLES, Connection, build_connection, laplacian
 from .frames import dot
 from .representation import complex_bincount, face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .sparse_multigrid import CSRMatrix, Level, hierarchy_task, w_cycle
+from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
@@ -35,11 +35,6 @@ SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the smoothest field; see `smoothest_task`."""
-    return run_to_completion(smoothest_task(surface, degree))
-
-
-def smoothest_task(surface: Surface, degree: int) -> Task[RosyField]:
     """Compute the field of least Dirichlet energy among those of equal L2 norm, made unit.
 
     Parameters
@@ -47,10 +42,6 @@ def smoothest_task(surface: Surface, degree: int) -> Task[RosyField]:
     surface : Surface
     degree : int
         N.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -65,19 +56,20 @@ def smoothest_task(surface: Surface, degree: int) -> Task[RosyField]:
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    connection = yield from subtask(connection_task(surface), 0.0, 0.1)
+    with progress(0.0, 0.1):
+        connection = build_connection(surface)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    z, _ = yield from subtask(smallest_eigenvectors_task(connection, degree), 0.1, 0.95)
-    yield Progress(0.95, "aligning the field")
+    with progress(0.1, 0.95):
+        z, _ = smallest_eigenvectors(connection, degree)
+    report(0.95, "aligning the field")
     z = _align_to_edges(connection, z, degree)
-    vectors = yield from subtask(face_vectors_task(surface, connection, z, degree), 0.95, 1.0)
+    with progress(0.95, 1.0):
+        vectors = face_vectors(surface, connection, z, degree)
     return RosyField(degree, vectors)
 
 
-def smallest_eigenvectors_task(
-    connection: Connection, degree: int
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Compute the eigenvector of L z = e M z with the smallest e on each connected component.
 
     Returns
@@ -87,12 +79,13 @@ def smallest_eigenvectors_task(
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
-    yield Progress(0.0, "building the connection Laplacian")
+    report(0.0, "building the connection Laplacian")
     mass = connection.positive_mass
     shift = spectral_shift(mass)
-    matrix = yield from subtask(laplacian_task(connection, degree, shift), 0.05, 0.1)
-    task = eigenproblem_task(matrix, mass, connection.component)
-    z, energy = yield from subtask(task, 0.1, 1.0)
+    with progress(0.05, 0.1):
+        matrix = laplacian(connection, degree, shift)
+    with progress(0.1, 1.0):
+        z, energy = eigenproblem(matrix, mass, connection.component)
     return z, energy - shift
 
 
@@ -101,9 +94,9 @@ def spectral_shift(mass: np.ndarray) -> float:
     return SPECTRAL_SHIFT * 4 * np.pi / float(mass.sum())
 
 
-def eigenproblem_task(
+def eigenproblem(
     matrix: CSRMatrix, mass: np.ndarray, component: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Compute the eigenvector of A z = e M z with the smallest e on each connected component.
 
     Parameters
@@ -122,7 +115,8 @@ def eigenproblem_task(
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
-    levels = yield from subtask(hierarchy_task(matrix), 0.0, 0.35)
+    with progress(0.0, 0.35):
+        levels = hierarchy(matrix)
     masses, components = [mass], [component]
     for level in levels[:-1]:
         weight = np.abs(level.prolongation.data)
@@ -144,17 +138,17 @@ def eigenproblem_task(
         max_iterations = (
             MAX_ITERATIONS if is_finest or index == len(levels) - 1 else COARSE_ITERATIONS
         )
-        task = _lobpcg_task(levels[index:], masses[index], components[index], z, max_iterations)
         start = 0.5 - 0.1 * index / len(levels)
-        z, energy = yield from subtask(task, start, start + 0.1 / len(levels) if index else 1.0)
+        with progress(start, start + 0.1 / len(levels) if index else 1.0):
+            z, energy = _lobpcg(levels[index:], masses[index], components[index], z, max_iterations)
         if not is_finest:
             z = levels[index - 1].prolongation @ z
     return z, energy
 
 
-def _lobpcg_task(
+def _lobpcg(
     levels: list[Level], mass: np.ndarray, component: np.ndarray, z: np.ndarray, max_iterations: int
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Minimize the Rayleigh quotient of each component by LOBPCG (Knyazev 2001).
 
     Parameters
@@ -215,7 +209,7 @@ def _lobpcg_task(
     energy = _component_sums(component, z.conj() * image, component_count).real
     for iteration in range(max_iterations):
         # 20 to 50 iterations are usual; the progress bar is scaled for that.
-        yield Progress(1 - 0.95**iteration, "solving for the smoothest field")
+        report(1 - 0.95**iteration, "solving for the smoothest field")
         residual = image - broadcast(energy) * (mass * z)
         direction = w_cycle(levels, residual)
         direction -= (
@@ -305,23 +299,23 @@ def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.nd
     return z * rotation[component]
 
 
-def face_vectors_task(
+def face_vectors(
     surface: Surface, connection: Connection, z: np.ndarray, degree: int
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(F, 3) unit members on the faces, from (n,) representations at the nodes.
 
     Zero on faces where the mean is zero.
     """
     label = "averaging the field on the faces"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y = face_frames(surface)
-    yield Progress(0.3, label)
+    report(0.3, label)
     frame_angle = corner_frame_angles(surface, connection, x, y)
-    yield Progress(0.5, label)
+    report(0.5, label)
     mean = node_sum_per_face(surface, connection, z, frame_angle, degree)
     modulus = np.abs(mean)
     mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    yield Progress(0.9, label)
+    report(0.9, label)
     return from_representation(mean, x, y, degree)
 
 

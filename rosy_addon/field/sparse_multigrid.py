@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 
 #: Relative increase of the diagonal of a matrix that is singular, and smallest value on a diagonal,
 #: relative to the largest one.
@@ -134,13 +134,6 @@ class CSRMatrix:
 def from_coo(
     row: np.ndarray, column: np.ndarray, value: np.ndarray, row_count: int, column_count: int
 ) -> CSRMatrix:
-    """Run `from_coo_task` to its end."""
-    return run_to_completion(from_coo_task(row, column, value, row_count, column_count))
-
-
-def from_coo_task(
-    row: np.ndarray, column: np.ndarray, value: np.ndarray, row_count: int, column_count: int
-) -> Task[CSRMatrix]:
     """Make a matrix from entries in any order.
 
     Entries with the same row and column add up. No row may be empty.
@@ -155,19 +148,18 @@ def from_coo_task(
     # only for integers of at most 16 bits.
     label = "sorting a matrix"
     order = np.argsort(row.astype(np.uint16), kind="stable")
-    yield Progress(0.3, label)
+    report(0.3, label)
     if row_count > 1 << 16:
         order = order.take(np.argsort((row >> 16).astype(np.uint16).take(order), kind="stable"))
-    yield Progress(0.6, label)
+    report(0.6, label)
     indptr = np.zeros(row_count + 1, dtype=np.intp)
     np.cumsum(np.bincount(row, minlength=row_count), out=indptr[1:])
     return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
 
 
-def matrix_product_task(a: CSRMatrix, b: CSRMatrix) -> Task[CSRMatrix]:
+def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
     """The matrix product a b."""
-    task = _assemble_by_rows_task(a, b.column_count, lambda part: _product_terms(a, b, part))
-    return (yield from task)
+    return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
 
 
 def _product_terms(
@@ -186,11 +178,11 @@ def _product_terms(
     return a.row_indices[block].take(entry), b.indices.take(source), value
 
 
-def _assemble_by_rows_task(
+def _assemble_by_rows(
     matrix: CSRMatrix,
     column_count: int,
     entries: Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]],
-) -> Task[CSRMatrix]:
+) -> CSRMatrix:
     """Build a matrix block by block of the rows of another one, so that sorting stays in the cache.
 
     Parameters
@@ -207,14 +199,14 @@ def _assemble_by_rows_task(
     row_counts, index_blocks, value_blocks = [], [], []
     for first in range(0, len(matrix), BLOCK_ROWS):
         if first % (BLOCKS_PER_STEP * BLOCK_ROWS) == 0:
-            yield Progress(first / len(matrix), "building multigrid levels")
+            report(first / len(matrix), "building multigrid levels")
         last = min(first + BLOCK_ROWS, len(matrix))
         row, column, value = entries(slice(matrix.indptr[first], matrix.indptr[last]))
         key, value = _sum_duplicates((row - first) << bits | column, value)
         row_counts.append(np.bincount(key >> bits, minlength=last - first))
         index_blocks.append(key & ((1 << bits) - 1))
         value_blocks.append(value)
-    yield Progress(1.0, "building multigrid levels")
+    report(1.0, "building multigrid levels")
     indptr = np.concatenate([[0], np.cumsum(np.concatenate(row_counts))])
     return CSRMatrix(
         indptr, np.concatenate(index_blocks), np.concatenate(value_blocks), column_count
@@ -251,15 +243,11 @@ class Level:
     inverse: np.ndarray | None
 
 
-def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
+def hierarchy(matrix: CSRMatrix) -> list[Level]:
     """Build the multigrid levels of a positive definite matrix.
 
     Coarsening stops when a level is small enough for a dense inverse, or when aggregation no longer
     reduces the number of unknowns by at least a fifth.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -272,35 +260,38 @@ def hierarchy_task(matrix: CSRMatrix) -> Task[list[Level]]:
     while True:
         start = 1 - len(matrix) / (unknown_count + 1)
         middle, stop = 1 - 0.7 * (1 - start), 1 - 0.4 * (1 - start)
-        yield Progress(start, label)
+        report(start, label)
         jacobi_weight = _jacobi_weights(matrix)
         aggregation = None
         if len(matrix) > DIRECT_SOLVE_SIZE:
-            aggregation = yield from subtask(_aggregates_task(matrix), start, middle, label)
+            with progress(start, middle, label):
+                aggregation = _aggregates(matrix)
         if aggregation is None or aggregation[1] > 0.8 * len(matrix):
             inverse = _dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
             levels.append(Level(matrix, None, jacobi_weight, inverse))
             return levels
-        task = _smoothed_prolongation_task(matrix, jacobi_weight, *aggregation)
-        prolongation = yield from subtask(task, middle, middle, label)
+        with progress(middle, label=label):
+            prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
         levels.append(Level(matrix, prolongation, jacobi_weight, None))
-        product = yield from subtask(matrix_product_task(matrix, prolongation), middle, stop)
-        yield Progress(stop, label)
+        with progress(middle, stop):
+            product = matrix_product(matrix, prolongation)
+        report(stop, label)
         adjoint = prolongation.adjoint
-        yield Progress(stop, label)
-        matrix = yield from subtask(matrix_product_task(adjoint, product), stop, stop, label)
+        report(stop, label)
+        with progress(stop, label=label):
+            matrix = matrix_product(adjoint, product)
 
 
 def add_diagonal(levels: list[Level], diagonal: np.ndarray) -> list[Level]:
     """Return multigrid levels for a matrix with other values on its diagonal.
 
-    This is much faster than `hierarchy_task`. Each coarser matrix gets the sum of what is added at the
+    This is much faster than `hierarchy`. Each coarser matrix gets the sum of what is added at the
     unknowns of its aggregates, which is an upper bound of their Galerkin product.
 
     Parameters
     ----------
     levels : list of Level
-        From `hierarchy_task`.
+        From `hierarchy`.
     diagonal : (n,) float64 ndarray
         Values that are added, not negative.
     """
@@ -326,7 +317,7 @@ def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     levels : list of Level
-        From `hierarchy_task`.
+        From `hierarchy`.
     rhs : (n,) complex or float ndarray
 
     Returns
@@ -378,13 +369,13 @@ def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
         return np.linalg.inv(dense)
 
 
-def _smoothed_prolongation_task(
+def _smoothed_prolongation(
     matrix: CSRMatrix,
     jacobi_weight: np.ndarray,
     aggregate: np.ndarray,
     count: int,
     phase: np.ndarray,
-) -> Task[CSRMatrix]:
+) -> CSRMatrix:
     """The prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
     unknowns = np.arange(len(matrix))
 
@@ -399,10 +390,10 @@ def _smoothed_prolongation_task(
             np.concatenate([value, phase.take(block_rows)]),
         )
 
-    return (yield from _assemble_by_rows_task(matrix, count, entries))
+    return _assemble_by_rows(matrix, count, entries)
 
 
-def _aggregates_task(matrix: CSRMatrix) -> Task[tuple[np.ndarray, int, np.ndarray]]:
+def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     """Group the unknowns into aggregates of strongly connected neighbors.
 
     Returns
@@ -430,7 +421,7 @@ def _aggregates_task(matrix: CSRMatrix) -> Task[tuple[np.ndarray, int, np.ndarra
     priority = np.random.default_rng(0).permutation(count)
     free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     while free.any():
-        yield Progress(1 - np.count_nonzero(free) / count, "building multigrid levels")
+        report(1 - np.count_nonzero(free) / count, "building multigrid levels")
         free_priority = np.where(free, priority, -1)
         new_roots = free & (max_over_neighbors(max_over_neighbors(free_priority)) == priority)
         root |= new_roots
@@ -439,7 +430,7 @@ def _aggregates_task(matrix: CSRMatrix) -> Task[tuple[np.ndarray, int, np.ndarra
     aggregate[root] = np.arange(np.count_nonzero(root))
     phase = np.ones(count, dtype=matrix.data.dtype)
     for _ in range(2):
-        yield Progress(1.0, "building multigrid levels")
+        report(1.0, "building multigrid levels")
         # A free unknown joins the aggregate of the neighbor with the strongest connection.
         weight = np.where(aggregate[column] >= 0, strength, 0)
         strongest = np.maximum.reduceat(weight, matrix.indptr[:-1])

@@ -25,9 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .blocks import row_blocks
-from .surface import edges_task, next_corners, sorted_with_order
+from .surface import build_edges, next_corners, sorted_with_order
 
 #: Label of all steps.
 STEP_LABEL = "spacing lines"
@@ -165,13 +165,6 @@ def _turn_fraction(weights: np.ndarray) -> np.ndarray:
 def stripe_pattern(
     triangle_vertex: np.ndarray, directions: CornerDirections, spacing: float
 ) -> StripePattern:
-    """Run `stripe_pattern_task` to its end."""
-    return run_to_completion(stripe_pattern_task(triangle_vertex, directions, spacing))
-
-
-def stripe_pattern_task(
-    triangle_vertex: np.ndarray, directions: CornerDirections, spacing: float
-) -> Task[StripePattern]:
     """Compute phases of evenly spaced lines along all directions of a field.
 
     Parameters
@@ -183,26 +176,26 @@ def stripe_pattern_task(
     spacing : float
         Distance between neighboring lines, in the units of the corners.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     StripePattern
     """
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     change = directions.phase_changes(spacing)
-    gluing = yield from subtask(_gluing_task(triangle_vertex, directions), 0.0, 0.1)
-    change = yield from subtask(_shared_changes_task(change, gluing, directions), 0.1, 0.2)
-    covering_task = _covering_task(triangle_vertex, gluing, directions)
-    covering = yield from subtask(covering_task, 0.2, 0.3)
-    graph = yield from subtask(_graph_task(covering, gluing, change, directions), 0.3, 0.4)
-    z = yield from subtask(_smoothest_task(graph), 0.4, 0.9)
+    with progress(0.0, 0.1):
+        gluing = _gluing(triangle_vertex, directions)
+    with progress(0.1, 0.2):
+        change = _shared_changes(change, gluing, directions)
+    with progress(0.2, 0.3):
+        covering = _covering(triangle_vertex, gluing, directions)
+    with progress(0.3, 0.4):
+        graph = _graph(covering, gluing, change, directions)
+    with progress(0.4, 0.9):
+        z = _smoothest(graph)
     phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
     index = np.empty(phase.shape[:2], dtype=np.float32)
     for block in row_blocks(len(phase)):
-        yield Progress(0.95, STEP_LABEL)
+        report(0.95, STEP_LABEL)
         corner = z[covering.node[block]]
         np.conjugate(corner, out=corner, where=covering.conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
@@ -236,18 +229,19 @@ class _Gluing:
     next_corner: np.ndarray
 
 
-def _gluing_task(triangle_vertex: np.ndarray, directions: CornerDirections) -> Task[_Gluing]:
+def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluing:
     """Match the directions of neighboring triangles, unfolded into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    edges = yield from subtask(edges_task(corner_vertex, start), 0.0, 0.6, STEP_LABEL)
-    yield Progress(0.6, STEP_LABEL)
+    with progress(0.0, 0.6, STEP_LABEL):
+        edges = build_edges(corner_vertex, start)
+    report(0.6, STEP_LABEL)
     a, b = edges.halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
     angle = (0.5 * (directions.angle + np.roll(directions.angle, -1, axis=1))).reshape(-1)
-    yield Progress(0.8, STEP_LABEL)
+    report(0.8, STEP_LABEL)
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
@@ -257,9 +251,9 @@ def _gluing_task(triangle_vertex: np.ndarray, directions: CornerDirections) -> T
     return _Gluing(twin, shift, next_corners(start))
 
 
-def _shared_changes_task(
+def _shared_changes(
     change: np.ndarray, gluing: _Gluing, directions: CornerDirections
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(T, 3, M) changes of phases that are exactly opposite in the two triangles of an edge."""
     families = directions.family_count
     flat = change.reshape(-1, families)
@@ -267,7 +261,7 @@ def _shared_changes_task(
     glued = np.flatnonzero(gluing.twin >= 0)
     twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
-        yield Progress(family / families, STEP_LABEL)
+        report(family / families, STEP_LABEL)
         direction = (family + shift) % directions.degree
         neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
         np.negative(neighbor, out=neighbor, where=direction < families)
@@ -297,9 +291,9 @@ class _Covering:
     is_singular: np.ndarray
 
 
-def _covering_task(
+def _covering(
     triangle_vertex: np.ndarray, gluing: _Gluing, directions: CornerDirections
-) -> Task[_Covering]:
+) -> _Covering:
     """Count the directions of all corners around a vertex from the same one."""
     degree, families = directions.degree, directions.family_count
     corner = np.arange(len(gluing.twin), dtype=np.int32)
@@ -308,19 +302,19 @@ def _covering_task(
     previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
     first, pointer = corner, previous
     for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
-        yield Progress(0.2, STEP_LABEL)
+        report(0.2, STEP_LABEL)
         first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
     # A closed fan begins at its first corner, an open one at the corner without a previous one.
     is_closed = has_previous[pointer]
     start = np.where(is_closed & (first == corner), corner, previous)
     shift = np.where(start != corner, gluing.shift, 0)
     while True:
-        yield Progress(0.6, STEP_LABEL)
+        report(0.6, STEP_LABEL)
         following = start[start]
         if np.array_equal(following, start):
             break
         shift, start = (shift + shift[start]) % degree, following
-    yield Progress(0.8, STEP_LABEL)
+    report(0.8, STEP_LABEL)
     closes = has_previous & (start == corner)
     turn = (gluing.shift + shift[previous]) % degree
     is_singular = (closes & (turn != 0))[start]
@@ -332,7 +326,7 @@ def _covering_task(
     node = np.empty((len(corner), families), dtype=np.int32)
     conjugated = np.empty(node.shape, dtype=bool)
     for family in range(families):
-        yield Progress(0.9, STEP_LABEL)
+        report(0.9, STEP_LABEL)
         direction = (family + shift) % degree
         node[:, family] = number * families + direction % families
         conjugated[:, family] = direction >= families
@@ -394,11 +388,11 @@ def _run_starts(values: np.ndarray) -> np.ndarray:
     return np.flatnonzero(is_first)
 
 
-def _graph_task(
+def _graph(
     covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
-) -> Task[_Graph]:
+) -> _Graph:
     """The graph of the edges of all triangles on the covering."""
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))
     has_twin = gluing.twin >= 0
@@ -413,53 +407,55 @@ def _graph_task(
         covering.node.reshape(-1, families),
         covering.conjugated.reshape(-1, families),
     )
-    yield Progress(0.2, STEP_LABEL)
+    report(0.2, STEP_LABEL)
     tail_flipped, head_flipped = conjugated[tail], conjugated[head]
     turn = change.reshape(-1, families)[tail]
     np.negative(turn, out=turn, where=head_flipped)
     value = np.exp((2j * np.pi) * turn)
     value *= weight[tail, None]
     flips = tail_flipped != head_flipped
-    yield Progress(0.5, STEP_LABEL)
+    report(0.5, STEP_LABEL)
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
-    task = _graph_of_entries_task(
-        covering.node_count,
-        np.concatenate([head_node, tail_node]),
-        np.concatenate([tail_node, head_node]),
-        np.concatenate([a, a.conj()]),
-        np.concatenate([b, b]),
-    )
-    return (yield from subtask(task, 0.5, 1.0))
+    with progress(0.5, 1.0):
+        return _graph_of_entries(
+            covering.node_count,
+            np.concatenate([head_node, tail_node]),
+            np.concatenate([tail_node, head_node]),
+            np.concatenate([a, a.conj()]),
+            np.concatenate([b, b]),
+        )
 
 
-def _graph_of_entries_task(
+def _graph_of_entries(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> Task[_Graph]:
+) -> _Graph:
     """A graph of entries in any order; those between the same nodes add up."""
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     entry = np.flatnonzero(row != column)
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)
-    yield Progress(0.4, STEP_LABEL)
+    report(0.4, STEP_LABEL)
     entry = entry[order]
     first = _run_starts(key)
     if len(first):
         a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
     row, column = np.divmod(key[first], max(node_count, 1))
-    yield Progress(1.0, STEP_LABEL)
+    report(1.0, STEP_LABEL)
     return _Graph(node_count, row, column, a[: len(row)], b[: len(row)])
 
 
-def _smoothest_task(graph: _Graph) -> Task[np.ndarray]:
+def _smoothest(graph: _Graph) -> np.ndarray:
     """(n,) complex128 values of modulus 1 that agree with their neighbors, from coarse to fine."""
     levels = [graph]
     clusterings: list[_Clustering] = []
     while graph.node_count > MIN_LEVEL_NODES and len(graph.row):
-        clustering = yield from subtask(_clustering_task(graph), 0.2, 0.2)
+        with progress(0.2):
+            clustering = _clustering(graph)
         if clustering.count * MIN_COARSENING > graph.node_count:
             break
-        graph = yield from subtask(_coarse_graph_task(graph, clustering), 0.2, 0.2)
+        with progress(0.2):
+            graph = _coarse_graph(graph, clustering)
         clusterings.append(clustering)
         levels.append(graph)
     z = np.ones(graph.node_count, dtype=np.complex128)
@@ -471,7 +467,7 @@ def _smoothest_task(graph: _Graph) -> Task[np.ndarray]:
             inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
         steps = SMOOTHING_STEPS * STEP_GROWTH ** len(clusterings)
         for _ in range(int(min(steps, MAX_SMOOTHING_STEPS))):
-            yield Progress(1 - 0.7 * len(clusterings) / len(levels), STEP_LABEL)
+            report(1 - 0.7 * len(clusterings) / len(levels), STEP_LABEL)
             z = _smoothed(graph, z, inertia)
         if not clusterings:
             return z
@@ -514,9 +510,9 @@ class _Clustering(NamedTuple):
     count: int
 
 
-def _clustering_task(graph: _Graph) -> Task[_Clustering]:
+def _clustering(graph: _Graph) -> _Clustering:
     """Group nodes into pairs and triples along their strongest edges."""
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     count = graph.node_count
     # A hash makes the strengths distinct, so that many nodes find a partner at once.
     low, high = np.minimum(graph.row, graph.column), np.maximum(graph.row, graph.column)
@@ -526,7 +522,7 @@ def _clustering_task(graph: _Graph) -> Task[_Clustering]:
     nodes = np.arange(count)
     entry = np.arange(len(graph.row))
     for _ in range(MATCHING_ROUNDS):
-        yield Progress(0.2, STEP_LABEL)
+        report(0.2, STEP_LABEL)
         free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
         entry = entry[free]
         if not len(entry):
@@ -538,7 +534,7 @@ def _clustering_task(graph: _Graph) -> Task[_Clustering]:
         mutual = choice[choice[chooser]] == chooser
         partner[chooser[mutual]] = choice[chooser[mutual]]
         link[chooser[mutual]] = chosen[mutual]
-    yield Progress(0.8, STEP_LABEL)
+    report(0.8, STEP_LABEL)
     # The first node of a pair is the root; the other and single neighbors of the root follow it.
     is_root = (partner < 0) | (partner > nodes)
     root = np.where(is_root, nodes, partner)
@@ -569,9 +565,9 @@ def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) 
     return candidate[_run_starts(row[candidate])]
 
 
-def _coarse_graph_task(graph: _Graph, clustering: _Clustering) -> Task[_Graph]:
+def _coarse_graph(graph: _Graph, clustering: _Clustering) -> _Graph:
     """The graph of clusters: the entries in terms of their values."""
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     cluster, p, q, count = clustering
     row, column = cluster[graph.row], cluster[graph.column]
     entry = np.flatnonzero(row != column)
@@ -579,9 +575,8 @@ def _coarse_graph_task(graph: _Graph, clustering: _Clustering) -> Task[_Graph]:
     a, b = graph.a[entry], graph.b[entry]
     # After the map of the column.
     a, b = a * p[tail] + b * q[tail].conj(), a * q[tail] + b * p[tail].conj()
-    yield Progress(0.3, STEP_LABEL)
+    report(0.3, STEP_LABEL)
     # Before the inverse map of the row: that of p is its conjugate, that of q is the map itself.
     a, b = p[head].conj() * a + q[head] * b.conj(), p[head].conj() * b + q[head] * a.conj()
-    return (
-        yield from subtask(_graph_of_entries_task(count, row[entry], column[entry], a, b), 0.5, 1.0)
-    )
+    with progress(0.5, 1.0):
+        return _graph_of_entries(count, row[entry], column[entry], a, b)

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..cache import content_hash
 from ..errors import RosyError, counted
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .frames import dot, normalize
-from .triangulate import triangulate_task
+from .triangulate import triangulate
 
 #: Largest coordinate and smallest extent of a mesh. Beyond them, squares and products of lengths
 #: leave the range of floating-point numbers.
@@ -155,13 +155,6 @@ class Surface:
 
 
 def build_surface(
-    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, **options
-) -> Surface:
-    """Run `surface_task` to its end."""
-    return run_to_completion(surface_task(vertices, corner_vertex, face_start, **options))
-
-
-def surface_task(
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
@@ -175,7 +168,7 @@ def surface_task(
     triangles: np.ndarray | None = None,
     triangle_face: np.ndarray | None = None,
     rest_vertices: np.ndarray | None = None,
-) -> Task[Surface]:
+) -> Surface:
     """Make a `Surface` from arrays, and compute the parts that are not given.
 
     Parameters
@@ -193,14 +186,10 @@ def surface_task(
     corner_normal : (C, 3) array_like, optional
         Shading normals. If not given, the face normals averaged over each fan, weighted by angle.
     corner_fan : (C,) array_like of int, optional
-        The result of `smooth_fans_task`, if it is known.
+        The result of `smooth_fans`, if it is known.
     triangles, triangle_face : (T, 3) and (T,) array_like of int, optional
         The result of `triangulate`, if it is known.
     rest_vertices : (V, 3) array_like, optional
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -216,19 +205,19 @@ def surface_task(
     corner_vertex = np.ascontiguousarray(corner_vertex, dtype=np.int32).ravel()
     face_start = np.ascontiguousarray(face_start, dtype=np.int32).ravel()
     _check_polygons(name, vertices, corner_vertex, face_start)
-    yield Progress(0.1, "reading the mesh")
+    report(0.1, "reading the mesh")
     if triangles is None:
-        task = triangulate_task(vertices, corner_vertex, face_start)
-        triangles, triangle_face = yield from subtask(task, 0.1, 0.3)
+        with progress(0.1, 0.3):
+            triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
     if corner_fan is None:
-        task = smooth_fans_task(
-            vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-        )
-        corner_fan = yield from subtask(task, 0.3, 0.8)
-    yield Progress(0.8, "computing normals")
+        with progress(0.3, 0.8):
+            corner_fan = smooth_fans(
+                vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+            )
+    report(0.8, "computing normals")
     if corner_normal is None:
-        task = _fan_normals_task(vertices, corner_vertex, face_start, corner_fan)
-        corner_normal = yield from subtask(task, 0.8, 1.0)
+        with progress(0.8, 1.0):
+            corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return Surface(
         name=name,
         vertices=vertices,
@@ -244,28 +233,27 @@ def surface_task(
     )
 
 
-def smooth_fans_task(
+def smooth_fans(
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
     sharp_edges: np.ndarray | None = None,
     sharp_angle: float | None = None,
     flat_faces: np.ndarray | None = None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(C,) int32: `Surface.corner_fan`; the parameters are those of `build_surface`.
 
     Without a sharp angle, the result does not depend on the vertex positions.
     """
     label = "finding smooth edges"
-    yield Progress(0.0, label)
-    task = _smooth_corner_pairs_task(
-        vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-    )
-    pairs = yield from subtask(task, 0.0, 0.5, label)
-    yield Progress(0.5, label)
-    return (
-        yield from subtask(connected_components_task(len(corner_vertex), pairs), 0.5, 1.0, label)
-    )
+    report(0.0, label)
+    with progress(0.0, 0.5, label):
+        pairs = _smooth_corner_pairs(
+            vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+        )
+    report(0.5, label)
+    with progress(0.5, 1.0, label):
+        return connected_components(len(corner_vertex), pairs)
 
 
 def corner_faces(face_start: np.ndarray) -> np.ndarray:
@@ -374,29 +362,24 @@ class Edges:
 
 
 def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
-    """Run `edges_task` to its end."""
-    return run_to_completion(edges_task(corner_vertex, face_start))
-
-
-def edges_task(corner_vertex: np.ndarray, face_start: np.ndarray) -> Task[Edges]:
     """Find the edges of a polygon mesh; the parameters are arrays of `Surface`."""
     label = "finding edges"
-    yield Progress(0.0, label)
+    report(0.0, label)
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
-    yield Progress(0.2, label)
+    report(0.2, label)
     key, corner_by_edge = sorted_with_order(
         np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
     )
-    yield Progress(0.6, label)
+    report(0.6, label)
     is_first = np.ones(len(key), dtype=bool)
     np.not_equal(key[1:], key[:-1], out=is_first[1:])
     first = np.flatnonzero(is_first)
     edge_key, face_count = key[first], np.diff(first, append=len(key))
     corner_edge = np.empty(len(key), dtype=np.int32)
     corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
-    yield Progress(0.8, label)
+    report(0.8, label)
     interior = np.flatnonzero(face_count == 2)
     a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
     opposite = tail[a] == head[b]
@@ -484,18 +467,19 @@ def _check_polygons(
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
 
 
-def _smooth_corner_pairs_task(
+def _smooth_corner_pairs(
     vertices: np.ndarray,
     corner_vertex: np.ndarray,
     face_start: np.ndarray,
     sharp_edges: np.ndarray | None,
     sharp_angle: float | None,
     flat_faces: np.ndarray | None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(K, 2) pairs of corners at the same vertex of two faces that share a smooth edge."""
     label = "finding smooth edges"
-    edges = yield from subtask(edges_task(corner_vertex, face_start), 0.0, 0.4, label)
-    yield Progress(0.4, label)
+    with progress(0.0, 0.4, label):
+        edges = build_edges(corner_vertex, face_start)
+    report(0.4, label)
     corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     smooth = np.ones(len(a), dtype=bool)
@@ -504,7 +488,7 @@ def _smooth_corner_pairs_task(
         smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
     if sharp_angle is not None:
         normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
-        yield Progress(0.7, label)
+        report(0.7, label)
         smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
     if sharp_edges is not None and len(sharp_edges):
         stride = int(corner_vertex.max()) + 1
@@ -518,11 +502,6 @@ def _smooth_corner_pairs_task(
 
 
 def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Run `connected_components_task` to its end."""
-    return run_to_completion(connected_components_task(count, pairs))
-
-
-def connected_components_task(count: int, pairs: np.ndarray) -> Task[np.ndarray]:
     """Label the connected components of a graph.
 
     Each node points to a root: the smallest node known to be in its component. Each round links the
@@ -535,10 +514,6 @@ def connected_components_task(count: int, pairs: np.ndarray) -> Task[np.ndarray]
     pairs : (n, 2) int ndarray
         Edges of the graph.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (count,) int32 ndarray
@@ -547,7 +522,7 @@ def connected_components_task(count: int, pairs: np.ndarray) -> Task[np.ndarray]
     root = np.arange(count, dtype=np.int32)
     a, b = pairs[:, 0], pairs[:, 1]
     while len(a):
-        yield Progress(1 - len(a) / len(pairs), "finding connected parts")
+        report(1 - len(a) / len(pairs), "finding connected parts")
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
         _lower(root, high, low)
         while True:
@@ -573,9 +548,9 @@ def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
     np.minimum.at(values, index, limits)
 
 
-def _fan_normals_task(
+def _fan_normals(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(C, 3) unit corner normals: face normals averaged over each fan, weighted by corner angle.
 
     Where the mean is zero, the face normal; (0, 0, 1) if that is zero, too.
@@ -583,20 +558,20 @@ def _fan_normals_task(
     label = "computing normals"
     angle = np.empty(len(corner_vertex))
     for faces, corners, starts in face_blocks(face_start):
-        yield Progress(0.5 * faces.start / len(face_start), label)
+        report(0.5 * faces.start / len(face_start), label)
         points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
         following = next_corners(starts)
         to_next = normalize(points[following] - points)
         to_previous = np.empty_like(to_next)
         to_previous[following] = -to_next
         angle[corners] = np.arccos(np.clip(dot(to_next, to_previous), -1, 1))
-    yield Progress(0.5, label)
+    report(0.5, label)
     face_normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
-    yield Progress(0.7, label)
+    report(0.7, label)
     face = corner_faces(face_start)
     fan_count = int(corner_fan.max()) + 1
     total = [np.bincount(corner_fan, angle * column[face], fan_count) for column in face_normal.T]
-    yield Progress(0.8, label)
+    report(0.8, label)
     normal = normalize(np.stack(total, axis=1))[corner_fan]
     undefined = ~normal.any(axis=1)
     normal[undefined] = face_normal[face[undefined]]

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from .connection import Connection
-from .curvature import TINY, face_curvature_task
+from .curvature import TINY, face_curvature
 from .frames import dot
 from .representation import complex_bincount
 from .smoothest import corner_frame_angles, node_sum_per_face
 from .sparse_multigrid import CSRMatrix
-from .surface import Surface, face_area_vectors, surface_task
+from .surface import Surface, build_surface, face_area_vectors
 
 #: Relative residual norm at which conjugate gradients stop.
 AVERAGE_TOLERANCE = 1e-2
@@ -31,24 +31,25 @@ def of_unit_extent(surface: Surface) -> Surface:
     return replace(surface, vertices=vertices, rest_vertices=None)
 
 
-def bounded_curvature_task(
+def bounded_curvature(
     surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Curvature of each face, with normals that are smooth within the given fans of corners.
 
     A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
     """
-    task = surface_task(
-        surface.vertices,
-        surface.corner_vertex,
-        surface.face_start,
-        name=surface.name,
-        corner_fan=corner_fan,
-        triangles=surface.triangles,
-        triangle_face=surface.triangle_face,
-    )
-    smooth = yield from subtask(task, 0.0, 0.6, "averaging normals")
-    mean, deviator = yield from subtask(face_curvature_task(smooth, x, y), 0.6, 1.0)
+    with progress(0.0, 0.6, "averaging normals"):
+        smooth = build_surface(
+            surface.vertices,
+            surface.corner_vertex,
+            surface.face_start,
+            name=surface.name,
+            corner_fan=corner_fan,
+            triangles=surface.triangles,
+            triangle_face=surface.triangle_face,
+        )
+    with progress(0.6, 1.0):
+        mean, deviator = face_curvature(smooth, x, y)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     limit = np.maximum(0.5 * np.sqrt(dot(vectors, vectors)), 1e-300) ** -0.5
     modulus = np.abs(deviator)
@@ -92,9 +93,9 @@ class SurfaceAverages:
         )
         return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
 
-    def smooth_task(
+    def smooth(
         self, matrix: CSRMatrix, area: float, sums: np.ndarray, start: np.ndarray | None = None
-    ) -> Task[np.ndarray]:
+    ) -> np.ndarray:
         """Solve (M + area L) z = sums by conjugate gradients, with M the masses and L the Laplacian.
 
         Parameters
@@ -132,7 +133,7 @@ class SurfaceAverages:
         limit = AVERAGE_TOLERANCE**2 * np.vdot(right, right / diagonal).real
         direction, previous = np.zeros_like(right), np.float32(1.0)
         for step in range(MAX_STEPS):
-            yield Progress(1 - 0.95**step, "averaging curvature")
+            report(1 - 0.95**step, "averaging curvature")
             preconditioned = residual / diagonal
             current = np.vdot(residual, preconditioned).real
             if current <= limit:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .blocks import row_blocks
-from .closest_point import closest_triangles_task
+from .closest_point import closest_triangles
 from .frames import dot, normalize, transport
 from .rosy_field import RosyField
 from .surface import Surface
@@ -24,13 +24,6 @@ MAX_UNMATCHED_FRACTION = 0.05
 def transfer_field(
     source: Surface, field: RosyField, target: Surface, field_name: str
 ) -> RosyField:
-    """Run `transfer_field_task` to its end."""
-    return run_to_completion(transfer_field_task(source, field, target, field_name))
-
-
-def transfer_field_task(
-    source: Surface, field: RosyField, target: Surface, field_name: str
-) -> Task[RosyField]:
     """Transfer a field to another mesh: each face takes the value of the closest source face.
 
     Parameters
@@ -55,11 +48,12 @@ def transfer_field_task(
     RosyError
         If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
     """
-    yield Progress(0.0, "transferring the field")
-    points = yield from subtask(_face_points_task(target), 0.0, 0.1)
-    task = closest_triangles_task(source, points)
-    triangle, distance = yield from subtask(task, 0.1, 0.9)
-    yield Progress(0.9, "transferring the field")
+    report(0.0, "transferring the field")
+    with progress(0.0, 0.1):
+        points = _face_points(target)
+    with progress(0.1, 0.9):
+        triangle, distance = closest_triangles(source, points)
+    report(0.9, "transferring the field")
     face = source.triangle_face[triangle]
     extent = max(source.extent, 1e-300)
     normal = target.face_normal
@@ -75,18 +69,18 @@ def transfer_field_task(
         )
     vectors = field.vectors[face]
     length = np.sqrt(dot(vectors, vectors))[:, None]
-    yield Progress(0.95, "transferring the field")
+    report(0.95, "transferring the field")
     vectors = normalize(transport(vectors, source.face_normal[face], normal)) * length
     vectors[undefined] = 0
     direction_ratios = None if field.direction_ratios is None else field.direction_ratios[face]
     return RosyField(field.degree, vectors, direction_ratios, field.family_count)
 
 
-def _face_points_task(surface: Surface) -> Task[np.ndarray]:
+def _face_points(surface: Surface) -> np.ndarray:
     """(F, 3) a point on each face: the centroid of its largest triangle."""
     points = np.empty((surface.face_count, 3))
     for faces in row_blocks(surface.face_count):
-        yield Progress(faces.start / surface.face_count, "transferring the field")
+        report(faces.start / surface.face_count, "transferring the field")
         limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])
         triangles = slice(*limits)
         face = surface.triangle_face[triangles]

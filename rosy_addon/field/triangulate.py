@@ -6,7 +6,7 @@ import heapq
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
@@ -24,13 +24,6 @@ FACES_PER_STEP = 1 << 14
 def triangulate(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Run `triangulate_task` to its end."""
-    return run_to_completion(triangulate_task(vertices, corner_vertex, face_start))
-
-
-def triangulate_task(
-    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Split each face with k corners into k - 2 triangles, in the order of the faces.
 
     Triangles of a concave face lie inside it, and collinear corners cause no triangles without
@@ -62,14 +55,13 @@ def triangulate_task(
     faces = np.flatnonzero(size > 3)
     ear_faces = faces[:0]
     if len(faces):
-        task = _fan_apexes_task(vertices, corner_vertex, face_start, faces)
-        apex[faces], needs_ears = yield from task
+        apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
         ear_faces = faces[needs_ears]
-    yield Progress(0.7, LABEL)
+    report(0.7, LABEL)
     triangles, triangle_face = _triangle_fans(face_start, apex)
     first_triangle = np.cumsum(size - 2) - (size - 2)
     for rank, face in enumerate(ear_faces):
-        yield Progress(0.8 + 0.2 * rank / len(ear_faces), LABEL)
+        report(0.8 + 0.2 * rank / len(ear_faces), LABEL)
         corners = np.arange(face_start[face], face_start[face + 1])
         ears = _ear_clip(_project_to_plane(vertices[corner_vertex[corners]]))
         first = first_triangle[face]
@@ -92,9 +84,9 @@ def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray
     return (first[:, None] + local_corners).astype(np.int32), triangle_face
 
 
-def _fan_apexes_task(
+def _fan_apexes(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, faces: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Choose the apex of the fan of each face, and find the faces that need ear clipping.
 
     Parameters
@@ -116,7 +108,7 @@ def _fan_apexes_task(
         same_size = np.flatnonzero(size == count)
         block_size = max(FACES_PER_STEP * 4 // int(count), 1)
         for start in range(0, len(same_size), block_size):
-            yield Progress(0.7 * start / len(same_size), LABEL)
+            report(0.7 * start / len(same_size), LABEL)
             group = same_size[start : start + block_size]
             corners = face_start[faces[group]][:, None] + np.arange(count)
             sine = _corner_sines(vertices[corner_vertex[corners]])

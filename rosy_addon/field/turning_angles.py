@@ -18,10 +18,10 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import Progress, Task, subtask
-from .conjugate_gradient import conjugate_gradient_task
-from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest_task
-from .sparse_multigrid import CSRMatrix, from_coo_task, hierarchy_task, w_cycle
+from ..progress import progress, report
+from .conjugate_gradient import conjugate_gradient
+from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest
+from .sparse_multigrid import CSRMatrix, from_coo, hierarchy, w_cycle
 from .surface import Surface, connected_components
 from .triangle_graph import triangle_graph
 
@@ -48,13 +48,13 @@ MIN_EIGENVALUE = 1e-8
 MAX_PAIRED_LOOPS = 20
 
 
-def turning_angles_task(
+def turning_angles(
     surface: Surface,
     graph: FaceGraph,
     degree: int,
     required: np.ndarray,
     present: np.ndarray | float = 0.0,
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Compute angles at the edges that have given sums around the vertices.
 
     Parameters
@@ -69,10 +69,6 @@ def turning_angles_task(
     present : (I,) ndarray or float
         Angles of a field to which these are added.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     angle : (I,) float64 ndarray
@@ -85,11 +81,12 @@ def turning_angles_task(
     triangles = triangle_graph(surface, graph)
     present_between = triangles.on_triangles(present)
     count = len(triangles.area)
-    task = spanning_forest_task(count, triangles.graph.source, triangles.graph.target)
-    tree = yield from subtask(task, 0.0, 0.1)
-    loops = yield from subtask(_loops_task(triangles.graph, tree), 0.1, 0.2)
-    task = least_angles_task(triangles.graph, degree, required, loops, present_between)
-    drop = yield from subtask(task, 0.2, 0.8)
+    with progress(0.0, 0.1):
+        tree = spanning_forest(count, triangles.graph.source, triangles.graph.target)
+    with progress(0.1, 0.2):
+        loops = _loops(triangles.graph, tree)
+    with progress(0.2, 0.8):
+        drop = least_angles(triangles.graph, degree, required, loops, present_between)
     between, to_center = triangles.graph.conductance * drop, triangles.turns_to_centers(drop)
     limit, angle = np.pi / degree, triangles.on_faces(between, to_center)
     for attempt in range(MAX_ATTEMPTS):
@@ -98,13 +95,15 @@ def turning_angles_task(
         factor = added_resistance(angle, present, limit)
         triangles = triangles.with_resistance(factor)
         start, stop = 1 - 0.2 * 0.5**attempt, 1 - 0.1 * 0.5**attempt
-        task = _least_angles_near_task(
-            triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
-        )
-        changed = yield from subtask(task, start, stop)
+        with progress(start, stop):
+            changed = _least_angles_near(
+                triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
+            )
         if changed is None:
-            task = least_angles_task(triangles.graph, degree, required, loops, present_between)
-            changed = triangles.graph.conductance * (yield from subtask(task, start, stop))
+            with progress(start, stop):
+                changed = triangles.graph.conductance * least_angles(
+                    triangles.graph, degree, required, loops, present_between
+                )
         # Resistance is of angles between triangles.
         is_changed = changed != between
         to_center[triangles.graph.source[is_changed]] = 0
@@ -114,13 +113,13 @@ def turning_angles_task(
     return angle, triangles.directions_of_faces(direction, between, to_center)
 
 
-def _least_angles_near_task(
+def _least_angles_near(
     graph: FaceGraph,
     required: np.ndarray,
     loops: list[tuple[np.ndarray, np.ndarray]],
     angle: np.ndarray,
     changed: np.ndarray,
-) -> Task[np.ndarray | None]:
+) -> np.ndarray | None:
     """(I,) angles of least squares near changed edges, where the other angles stay.
 
     The result is None if the angles around loops would change, because the neighborhoods of the edges surround
@@ -129,7 +128,7 @@ def _least_angles_near_task(
     is_near = np.zeros(graph.node_count, dtype=bool)
     is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
     for step in range(REACH):
-        yield Progress(0.2 * step / REACH, LABEL)
+        report(0.2 * step / REACH, LABEL)
         touches = is_near[graph.tail] | is_near[graph.head]
         is_near[graph.tail[touches]] = is_near[graph.head[touches]] = True
     edges = np.flatnonzero(is_near[graph.tail] & is_near[graph.head])
@@ -146,8 +145,10 @@ def _least_angles_near_task(
         node_component=connected_components(int(is_near.sum()), np.stack([tail, head], axis=1)),
     )
     rest = (required - graph.turn_around_nodes(fixed))[is_near]
-    solver = yield from subtask(_potential_solver_task(near), 0.2, 0.5)
-    fixed[edges] = near.conductance * (yield from subtask(solver(rest), 0.5, 1.0))
+    with progress(0.2, 0.5):
+        solver = _potential_solver(near)
+    with progress(0.5, 1.0):
+        fixed[edges] = near.conductance * solver(rest)
     change = [(signs * (fixed - angle)[crossed]).sum() for crossed, signs in loops]
     return fixed if np.abs(change).max(initial=0.0) < MAX_LOOP_CHANGE else None
 
@@ -161,25 +162,29 @@ def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: floa
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
 
 
-def least_angles_task(
+def least_angles(
     graph: FaceGraph,
     degree: int,
     required: np.ndarray,
     loops: list[tuple[np.ndarray, np.ndarray]],
     present: np.ndarray | float,
-) -> Task[np.ndarray]:
-    """(I,) angles of least squares, divided by the conductances; see `turning_angles_task`."""
-    yield Progress(0.0, LABEL)
-    solver = yield from subtask(_potential_solver_task(graph), 0.0, 0.5)
+) -> np.ndarray:
+    """(I,) angles of least squares, divided by the conductances; see `turning_angles`."""
+    report(0.0, LABEL)
+    with progress(0.0, 0.5):
+        solver = _potential_solver(graph)
     share = 0.5 / (len(loops) + 1)
-    drop = yield from subtask(solver(required), 0.5, 0.5 + share)
+    with progress(0.5, 0.5 + share):
+        drop = solver(required)
     harmonics = []
     for number, (edges, signs) in enumerate(loops, 1):
         crossing = np.zeros(len(drop))
         np.add.at(crossing, edges, signs)
-        task = solver(-graph.turn_around_nodes(graph.conductance * crossing))
         start = 0.5 + number * share
-        harmonics.append(crossing + (yield from subtask(task, start, start + share)))
+        with progress(start, start + share):
+            harmonics.append(
+                crossing + solver(-graph.turn_around_nodes(graph.conductance * crossing))
+            )
     if loops:
         turn = 2 * np.pi / degree
         total = graph.conductance * drop + present + graph.unfolding
@@ -196,25 +201,28 @@ def least_angles_task(
     return drop
 
 
-def _potential_solver_task(graph: FaceGraph) -> Task[Callable[[np.ndarray], Task[np.ndarray]]]:
+def _potential_solver(graph: FaceGraph) -> Callable[[np.ndarray], np.ndarray]:
     """A function that computes the (I,) differences of the potential with (n,) sums around the nodes."""
     matrix = levels = None
     if graph.is_interior.any():
-        matrix = yield from subtask(potential_matrix_task(graph), 0.0, 0.2)
-        levels = yield from subtask(hierarchy_task(matrix), 0.2, 1.0)
+        with progress(0.0, 0.2):
+            matrix = potential_matrix(graph)
+        with progress(0.2, 1.0):
+            levels = hierarchy(matrix)
 
-    def solve_task(sums: np.ndarray) -> Task[np.ndarray]:
+    def solve(sums: np.ndarray) -> np.ndarray:
         potential = np.zeros(graph.node_count)
         if matrix is not None:
             rhs, precondition = sums[graph.is_interior], partial(w_cycle, levels)
-            task = conjugate_gradient_task(matrix, rhs, TOLERANCE, precondition, LABEL)
-            potential[graph.is_interior] = yield from task
+            potential[graph.is_interior] = conjugate_gradient(
+                matrix, rhs, TOLERANCE, precondition, LABEL
+            )
         return potential[graph.head] - potential[graph.tail]
 
-    return solve_task
+    return solve
 
 
-def potential_matrix_task(graph: FaceGraph) -> Task[CSRMatrix]:
+def potential_matrix(graph: FaceGraph) -> CSRMatrix:
     """The Laplacian of potentials at interior nodes, which are 0 at the others.
 
     On closed components, the first node is tied to 0 as well; the sums of a solvable equation do not change
@@ -236,7 +244,7 @@ def potential_matrix_task(graph: FaceGraph) -> Task[CSRMatrix]:
     )
     row = np.concatenate([tail, head, nodes]).astype(np.intp)
     column = np.concatenate([head, tail, nodes]).astype(np.intp)
-    return (yield from from_coo_task(row, column, value, count, count))
+    return from_coo(row, column, value, count, count)
 
 
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:
@@ -268,9 +276,7 @@ def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: fl
     return inverse @ (sums + turn * multiple)
 
 
-def _loops_task(
-    graph: FaceGraph, tree: SpanningForest
-) -> Task[list[tuple[np.ndarray, np.ndarray]]]:
+def _loops(graph: FaceGraph, tree: SpanningForest) -> list[tuple[np.ndarray, np.ndarray]]:
     """Find loops of faces that no vertex can contract: edges that they cross, and 1 or -1 for each.
 
     They are closed by the edges that are neither in the spanning forest of the faces nor in one of the
@@ -284,12 +290,12 @@ def _loops_task(
     first_border = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.intp)
     first_border[component[border[::-1]]] = border[::-1]
     node[border] = first_border[component[border]]
-    task = spanning_forest_task(graph.node_count, node[graph.tail[rest]], node[graph.head[rest]])
-    primal = yield from subtask(task, 0.0, 0.5)
+    with progress(0.0, 0.5):
+        primal = spanning_forest(graph.node_count, node[graph.tail[rest]], node[graph.head[rest]])
     closing = rest[~primal.has_edge]
     loops = []
     for edge in closing.tolist():
-        yield Progress(0.5 + 0.5 * len(loops) / len(closing), LABEL)
+        report(0.5 + 0.5 * len(loops) / len(closing), LABEL)
         edges, signs = [np.array([edge])], [np.array([1.0])]
         for face, sign in ((graph.target[edge], -1.0), (graph.source[edge], 1.0)):
             path = tree.path_to_root(int(face))

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import RosyError, counted
-from ..progress import Progress, Task, run_to_completion, subtask
-from .blocks import by_rows_task, row_blocks
-from .corner_fans import corner_angles_task, corner_rotations_task
+from ..progress import progress, report
+from .blocks import by_rows, row_blocks
+from .corner_fans import compute_corner_rotations, corner_angles
 from .directional_field import (
     closest_rosy,
-    detect_families_task,
-    field_from_directions_task,
+    detect_families,
+    field_from_directions,
     is_rosy,
     ratio_harmonics,
     ratios_from_harmonics,
@@ -66,20 +66,6 @@ def validated_field(
     nonfinite: str = "error",
     domain: str | None = None,
 ) -> RosyField:
-    """Run `validated_field_task` to its end."""
-    return run_to_completion(
-        validated_field_task(surface, vectors, degree, source, nonfinite, domain)
-    )
-
-
-def validated_field_task(
-    surface: Surface,
-    vectors: np.ndarray,
-    degree: int,
-    source: str,
-    nonfinite: str = "error",
-    domain: str | None = None,
-) -> Task[RosyField]:
     """Make a field from one member vector for each face or vertex, after checking them.
 
     Vectors slightly off the tangent plane are rotated into it and keep their length. Vertex values
@@ -123,15 +109,20 @@ def validated_field_task(
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
-    yield Progress(0.0, LABEL)
-    normal = yield from subtask(tangent_normals_task(surface, domain), 0.0, 0.4, LABEL)
+    report(0.0, LABEL)
+    with progress(0.0, 0.4, LABEL):
+        normal = tangent_normals(surface, domain)
     if domain == "face":
-        task = project_to_tangent_task(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
-        return RosyField(degree, (yield from subtask(task, 0.4, 1.0)))
-    task = project_to_tangent_task(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
-    vectors = yield from subtask(task, 0.4, 0.6)
-    task = _average_to_faces_task(surface.in_rest_shape(), vectors, normal, degree)
-    return RosyField(degree, (yield from subtask(task, 0.6, 1.0)))
+        with progress(0.4, 1.0):
+            return RosyField(
+                degree, project_to_tangent(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
+            )
+    with progress(0.4, 0.6):
+        vectors = project_to_tangent(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
+    with progress(0.6, 1.0):
+        return RosyField(
+            degree, _average_to_faces(surface.in_rest_shape(), vectors, normal, degree)
+        )
 
 
 def validated_directions(
@@ -141,19 +132,6 @@ def validated_directions(
     nonfinite: str = "error",
     domain: str | None = None,
 ) -> RosyField:
-    """Run `validated_directions_task` to its end."""
-    return run_to_completion(
-        validated_directions_task(surface, directions, source, nonfinite, domain)
-    )
-
-
-def validated_directions_task(
-    surface: Surface,
-    directions: np.ndarray,
-    source: str,
-    nonfinite: str = "error",
-    domain: str | None = None,
-) -> Task[RosyField]:
     """Make a field from N directions for each face or vertex, after checking them.
 
     The directions need not be a RoSy.
@@ -184,51 +162,55 @@ def validated_directions_task(
         unusable = ~has_finite_square(rows).all(axis=(1, 2))
         return unusable, np.where(unusable[:, None, None], 0.0, rows)
 
-    task = by_rows_task(usable_rows, directions, label=LABEL)
-    unusable, usable_directions = yield from subtask(task, 0.0, 0.1)
+    with progress(0.0, 0.1):
+        unusable, usable_directions = by_rows(usable_rows, directions, label=LABEL)
     source_directions = usable_directions if domain == "face" else None
     directions[unusable] = np.nan
     count_matches = domain is not None and count == _element_count(surface, domain)
     are_rosys = True
     if count_matches:
-        normal = yield from subtask(tangent_normals_task(surface, domain), 0.1, 0.2, LABEL)
+        with progress(0.1, 0.2, LABEL):
+            normal = tangent_normals(surface, domain)
         for rows in row_blocks(count):
-            yield Progress(0.2 + 0.1 * rows.start / count, LABEL)
+            report(0.2 + 0.1 * rows.start / count, LABEL)
             x, y = tangent_frame(normal[rows])
             usable = usable_directions[rows]
             are_rosys &= is_rosy(dot(usable, x[:, None]) + 1j * dot(usable, y[:, None]))
             if not are_rosys:
                 break
-    yield Progress(0.3, LABEL)
+    report(0.3, LABEL)
     if are_rosys:
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
-        task = validated_field_task(surface, vectors, degree, source, nonfinite, domain)
-        field = yield from subtask(task, 0.3, 0.6)
-        task = detect_families_task(surface.in_rest_shape(), field)
-        return replace(
-            (yield from subtask(task, 0.6, 1.0, LABEL)), source_directions=source_directions
-        )
+        with progress(0.3, 0.6):
+            field = validated_field(surface, vectors, degree, source, nonfinite, domain)
+        with progress(0.6, 1.0, LABEL):
+            return replace(
+                detect_families(surface.in_rest_shape(), field), source_directions=source_directions
+            )
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
-    yield Progress(0.3, LABEL)
+    report(0.3, LABEL)
     tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
     flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    task = project_to_tangent_task(flat_directions, normals, tolerance_deg, source, domain)
-    directions = (yield from subtask(task, 0.3, 0.5)).reshape(count, degree, 3)
+    with progress(0.3, 0.5):
+        directions = project_to_tangent(
+            flat_directions, normals, tolerance_deg, source, domain
+        ).reshape(count, degree, 3)
     surface = surface.in_rest_shape()
     if domain == "face":
-        task = field_from_directions_task(surface, directions)
-        return replace(
-            (yield from subtask(task, 0.5, 1.0, LABEL)), source_directions=source_directions
-        )
-    task = _average_directions_to_faces_task(surface, directions, normal)
-    field = yield from subtask(task, 0.5, 0.8)
-    return (yield from subtask(detect_families_task(surface, field), 0.8, 1.0, LABEL))
+        with progress(0.5, 1.0, LABEL):
+            return replace(
+                field_from_directions(surface, directions), source_directions=source_directions
+            )
+    with progress(0.5, 0.8):
+        field = _average_directions_to_faces(surface, directions, normal)
+    with progress(0.8, 1.0, LABEL):
+        return detect_families(surface, field)
 
 
-def _average_directions_to_faces_task(
+def _average_directions_to_faces(
     surface: Surface, directions: np.ndarray, normal: np.ndarray
-) -> Task[RosyField]:
+) -> RosyField:
     """Average (V, N, 3) directions onto the faces, as means of z and of each harmonic.
 
     (V, 3) `normal` are the vertex normals.
@@ -236,34 +218,30 @@ def _average_directions_to_faces_task(
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
     w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-    yield Progress(0.0, LABEL)
-    task = by_rows_task(closest_rosy, w, label=LABEL)
-    first_angle, rho, direction_ratios = yield from subtask(task, 0.0, 0.2)
+    report(0.0, LABEL)
+    with progress(0.0, 0.2):
+        first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
     face_x, face_y = face_frames(surface)
-    yield Progress(0.3, LABEL)
-    task = corner_rotations_task(
-        surface.face_normal,
-        face_x,
-        surface.corner_face,
-        normal[surface.corner_vertex],
-        LABEL,
-    )
-    rotation = yield from subtask(task, 0.3, 0.5)
+    report(0.3, LABEL)
+    with progress(0.3, 0.5):
+        rotation = compute_corner_rotations(
+            surface.face_normal, face_x, surface.corner_face, normal[surface.corner_vertex], LABEL
+        )
 
     def corner_mean(values: np.ndarray, order: int) -> np.ndarray:
         face_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
         return mean_per_face(face_values, surface.face_start)
 
     z = corner_mean(rho * np.exp(1j * degree * first_angle), degree)
-    yield Progress(0.6, LABEL)
+    report(0.6, LABEL)
     member = np.exp(1j * np.angle(z) / degree)
     harmonics = ratio_harmonics(direction_ratios)
     coefficients = {}
     for j, values in harmonics.items():
-        yield Progress(0.7 + 0.2 * len(coefficients) / len(harmonics), LABEL)
+        report(0.7 + 0.2 * len(coefficients) / len(harmonics), LABEL)
         mean = corner_mean(values * np.exp(-1j * j * first_angle), -j)
         coefficients[j] = mean * signed_power(member, j)
-    yield Progress(0.9, LABEL)
+    report(0.9, LABEL)
     vectors = from_representation(z, face_x, face_y, degree)
     return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
 
@@ -284,11 +262,6 @@ def infer_domain(surface: Surface, count: int) -> str | None:
 
 
 def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
-    """Run `tangent_normals_task` to its end."""
-    return run_to_completion(tangent_normals_task(surface, domain))
-
-
-def tangent_normals_task(surface: Surface, domain: str) -> Task[np.ndarray]:
     """The normals of the tangent planes of faces or vertices, in the rest shape.
 
     Returns
@@ -298,18 +271,13 @@ def tangent_normals_task(surface: Surface, domain: str) -> Task[np.ndarray]:
         on vertices without a face.
     """
     surface = surface.in_rest_shape()
-    yield Progress(0.0, "computing normals")
+    report(0.0, "computing normals")
     if domain == "face":
         return surface.face_normal
-    return (yield from vertex_normals_task(surface))
+    return vertex_normals(surface)
 
 
 def vertex_normals(surface: Surface) -> np.ndarray:
-    """Run `vertex_normals_task` to its end."""
-    return run_to_completion(vertex_normals_task(surface))
-
-
-def vertex_normals_task(surface: Surface) -> Task[np.ndarray]:
     """Average the face normals around each vertex, weighted by corner angle.
 
     Sharp edges are ignored. The normals are those of `Surface.vertices`, the deformed shape.
@@ -321,11 +289,12 @@ def vertex_normals_task(surface: Surface) -> Task[np.ndarray]:
     """
     count = len(surface.vertices)
     label = "computing normals"
-    angles = yield from subtask(corner_angles_task(surface), 0.0, 0.5, label)
+    with progress(0.0, 0.5, label):
+        angles = corner_angles(surface)
     face_normal = surface.face_normal
-    yield Progress(0.7, label)
+    report(0.7, label)
     weighted = face_normal[surface.corner_face] * angles[:, None]
-    yield Progress(0.8, label)
+    report(0.8, label)
     columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
     return normalize(np.stack(columns, axis=1))
 
@@ -333,15 +302,6 @@ def vertex_normals_task(surface: Surface) -> Task[np.ndarray]:
 def project_to_tangent(
     vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
 ) -> np.ndarray:
-    """Run `project_to_tangent_task` to its end."""
-    return run_to_completion(
-        project_to_tangent_task(vectors, normal, tolerance_deg, source, domain)
-    )
-
-
-def project_to_tangent_task(
-    vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
-) -> Task[np.ndarray]:
     """Project vectors to tangent planes and restore their length.
 
     Parameters
@@ -363,7 +323,7 @@ def project_to_tangent_task(
     RosyError
         If more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
     """
-    tangent, angle, is_zero = yield from by_rows_task(_project, vectors, normal, label=LABEL)
+    tangent, angle, is_zero = by_rows(_project, vectors, normal, label=LABEL)
     outlier = angle > tolerance_deg
     if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(~is_zero):
         worst = int(np.argmax(angle))
@@ -440,19 +400,21 @@ def has_finite_square(values: np.ndarray) -> np.ndarray:
         return np.abs(values) < MAX_COMPONENT
 
 
-def _average_to_faces_task(
+def _average_to_faces(
     surface: Surface, vectors: np.ndarray, normal: np.ndarray, degree: int
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(F, 3) members of the mean RoSy of the vertices of each face, transported to its plane.
 
     (V, 3) `vectors` are members at the vertices, (V, 3) `normal` the vertex normals.
     """
     z = to_representation(vectors, *tangent_frame(normal), degree)[surface.corner_vertex]
-    yield Progress(0.0, LABEL)
+    report(0.0, LABEL)
     x, y = face_frames(surface)
-    yield Progress(0.2, LABEL)
+    report(0.2, LABEL)
     corner_normal = normal[surface.corner_vertex]
-    task = corner_rotations_task(surface.face_normal, x, surface.corner_face, corner_normal, LABEL)
-    rotation = yield from subtask(task, 0.2, 0.8)
+    with progress(0.2, 0.8):
+        rotation = compute_corner_rotations(
+            surface.face_normal, x, surface.corner_face, corner_normal, LABEL
+        )
     mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)
     return from_representation(mean, x, y, degree)

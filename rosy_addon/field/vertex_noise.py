@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 from .frames import angle_between, dot, normalize
 from .salient_edges import weighted_median
 from .surface import Edges, Surface, face_area_vectors
@@ -17,7 +17,7 @@ SEED = 777
 PROBE = 1e-3
 
 
-def noise_sample_task(surface: Surface, edges: Edges, noise_angle: float) -> Task[np.ndarray]:
+def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
     """Sample noise as strong as that of the vertices along their normals.
 
     Two properties are compared with those of white noise of unit amplitude: the angle by which it
@@ -30,7 +30,7 @@ def noise_sample_task(surface: Surface, edges: Edges, noise_angle: float) -> Tas
     surface : Surface
     edges : Edges
     noise_angle : float
-        From `salient_edges.filtered_normals_task`.
+        From `salient_edges.filtered_normals`.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def noise_sample_task(surface: Surface, edges: Edges, noise_angle: float) -> Tas
     )
     normal = normalize(normal)
     sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
-    yield Progress(0.3, label)
+    report(0.3, label)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     area = np.sqrt(dot(vectors, vectors))
     probe = PROBE * np.sqrt(area.mean())
@@ -53,10 +53,10 @@ def noise_sample_task(surface: Surface, edges: Edges, noise_angle: float) -> Tas
     )
     turn = weighted_median(angle_between(vectors, displaced), area)
     by_angle = probe * noise_angle / turn if turn > 0 else 0.0
-    yield Progress(0.6, label)
+    report(0.6, label)
     used = surface.used_vertices
     actual = np.median(np.abs(_roughness(surface.vertices, normal, edges.ends)[used]))
-    yield Progress(0.8, label)
+    report(0.8, label)
     unit = np.median(np.abs(_roughness(sample, normal, edges.ends)[used]))
     by_roughness = actual / unit if unit > 0 else 0.0
     return min(by_angle, by_roughness) * sample

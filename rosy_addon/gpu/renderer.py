@@ -21,12 +21,12 @@ from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import Progress, Task, as_task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
-from ..rendering.arrowheads import with_arrowheads_task
-from ..rendering.singularities import with_singularities_task
+from ..rendering.arrowheads import with_arrowheads
+from ..rendering.singularities import with_singularities
 from ..rendering.view_input import Background, ViewInput
 from . import lookup_tables, passes
 from .background import draw_background
@@ -93,9 +93,9 @@ class GpuRenderer:
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
         picture = Picture(rgba, (), color_range=self._color_range(view))
-        picture = yield from with_arrowheads_task(picture, view, self._arrowhead_cache)
+        picture = yield from as_task(with_arrowheads, picture, view, self._arrowhead_cache)
         self._arrowhead_cache.evict_over_limit()
-        return (yield from with_singularities_task(picture, view))
+        return (yield from as_task(with_singularities, picture, view))
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
         """As `ViewportRenderer.prepare_task`."""

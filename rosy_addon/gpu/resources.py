@@ -12,16 +12,16 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
-from ..field.feature_curvature import feature_curvature_task
+from ..field.feature_curvature import feature_curvature
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import Task, subtask
+from ..progress import Task, as_task, subtask
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
-from ..projection.outline_mesh import cached_outline_mesh_task
+from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.rest_coordinates import matrix_scale
-from ..projection.surface_lines import cached_surface_lines_task, rest_matrix
+from ..projection.surface_lines import cached_surface_lines, rest_matrix
 from .device import Device
 from .field_kind import FieldKind, field_kinds
 from .line_records import line_records
@@ -218,7 +218,7 @@ class GpuResources:
         """
         key = "feature curvature", surface.rest_shape_key
         if key not in self._images:
-            curvature = yield from feature_curvature_task(surface)
+            curvature = yield from as_task(feature_curvature, surface)
             self._images[key] = self._texture_of(to_texture_rows(curvature))
         self._last_used[key] = self._upload_count
         return self._images[key]
@@ -238,7 +238,9 @@ class GpuResources:
         if current is not None and current.crease_angle == crease_angle:
             return current
         linear, _ = split_matrix(item.instance.matrix)
-        found = yield from cached_outline_mesh_task(surface, linear, crease_angle, self._mesh_cache)
+        found = yield from as_task(
+            cached_outline_mesh, surface, linear, crease_angle, self._mesh_cache
+        )
         self._mesh_cache.evict_over_limit()
         points = found.crease_points(surface, linear).reshape(-1, 3) - mesh.buffers.center
         parts = np.empty((0, 4)) if found.triangle_part is None else found.triangle_part
@@ -326,8 +328,14 @@ class GpuResources:
         key = rest_matrix(instance.matrix).tobytes(), display, spacing
         if key not in textures:
             surface = instance.surface
-            lines = yield from cached_surface_lines_task(
-                surface, instance.matrix, instance.field, display, spacing, self._mesh_cache
+            lines = yield from as_task(
+                cached_surface_lines,
+                surface,
+                instance.matrix,
+                instance.field,
+                display,
+                spacing,
+                self._mesh_cache,
             )
             self._mesh_cache.evict_over_limit()
             rows, node_count = line_records(lines)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 
 #: Numbers of levels of red, green and blue in the palette of color pictures, 252 colors in all.
 PALETTE_LEVELS = (6, 7, 6)
@@ -22,11 +22,6 @@ MAX_CODE_BITS = 12
 
 
 def gif_bytes(frames: Sequence[np.ndarray], rate: float) -> bytes:
-    """Encode frames as an animated GIF file that repeats forever; see `gif_task`."""
-    return run_to_completion(gif_task(frames, rate))
-
-
-def gif_task(frames: Sequence[np.ndarray], rate: float) -> Task[bytes]:
     """Encode frames as an animated GIF file that repeats forever.
 
     If all frames are gray, the palette has 256 grays and nothing is dithered.
@@ -37,11 +32,6 @@ def gif_task(frames: Sequence[np.ndarray], rate: float) -> Task[bytes]:
         Display values (sRGB), rows from the top. All frames have the same size. At least one.
     rate : float
         Frames per second. The duration of a frame is rounded to hundredths of a second, at least 2.
-
-    Yields
-    ------
-    Progress
-        Before each frame.
 
     Returns
     -------
@@ -55,7 +45,7 @@ def gif_task(frames: Sequence[np.ndarray], rate: float) -> Task[bytes]:
     parts = [b"GIF89a", screen_descriptor, palette.astype(np.uint8).tobytes(), _LOOP_EXTENSION]
     delay = max(round(100 / rate), 2)  # Many viewers slow down shorter delays.
     for number, frame in enumerate(frames):
-        yield Progress(number / len(frames), "encoding the video")
+        report(number / len(frames), "encoding the video")
         index = frame[..., 0] if is_gray else _dither(frame)
         parts.append(struct.pack("<BBBBHBB", 0x21, 0xF9, 4, 0, delay, 0, 0))
         parts.append(struct.pack("<BHHHHB", 0x2C, 0, 0, width, height, 0))

@@ -12,7 +12,7 @@ from ..color import to_display, to_linear
 from ..errors import RosyError
 from ..file_io import read_bytes, write_bytes
 from ..memory import check_memory
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0
@@ -39,7 +39,7 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
     RosyError
         If the file cannot be written.
     """
-    write_bytes(path, run_to_completion(png_task(rgba)))
+    write_bytes(path, compute_png(rgba))
 
 
 def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
@@ -53,7 +53,7 @@ def _to_uint8(values: np.ndarray) -> np.ndarray:
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
-def png_task(rgba: np.ndarray, *, is_color: bool = True) -> Task[bytes]:
+def compute_png(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
     """Encode a picture as a PNG file; see `write_png`.
 
     If it is not a color but data, values are stored as they are.
@@ -62,7 +62,7 @@ def png_task(rgba: np.ndarray, *, is_color: bool = True) -> Task[bytes]:
     compressor = zlib.compressobj(ZLIB_LEVEL)
     compressed = []
     for start in range(0, height, BLOCK_ROWS):
-        yield Progress(start / height, "writing the picture")
+        report(start / height, "writing the picture")
         block = rgba[::-1][start : start + BLOCK_ROWS]
         block = to_srgb_uint8(block) if is_color else _to_uint8(block)
         # Each row starts with its filter type. It is 0, none, as filters do not help with noise.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from .directional_spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles, advance
@@ -59,7 +59,7 @@ class _ClosingTrace(NamedTuple):
     passed: np.ndarray
 
 
-def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> Task[Strokes]:
+def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> Strokes:
     """Close the strokes whose ends almost meet.
 
     The angle to the field that closes a loop is found with the secant method. Strokes for which it
@@ -72,15 +72,11 @@ def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing
     strokes : Strokes
     spacing : CornerSpacing
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Strokes
         The open strokes, then the loops. If there are loops, all families are 0: call this before
-        `label_families_task`.
+        `label_families`.
     """
     candidates = _candidates(strokes)
     if not len(candidates):
@@ -96,7 +92,8 @@ def close_loops_task(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing
     angle = np.clip(-offset / strokes.length[candidates], -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE)
     for iteration in range(MAX_ITERATIONS):
         start, stop = iteration / MAX_ITERATIONS, (iteration + 1) / MAX_ITERATIONS
-        trace = yield from subtask(_trace_loops_task(mesh, strokes, candidates, angle), start, stop)
+        with progress(start, stop):
+            trace = _trace_loops(mesh, strokes, candidates, angle)
         offset_change, angle_change = trace.left_offset - offset, angle - previous_angle
         if (np.abs(trace.left_offset) <= tolerance).all():
             break
@@ -156,9 +153,9 @@ def _candidates(strokes: Strokes) -> np.ndarray:
     )
 
 
-def _trace_loops_task(
+def _trace_loops(
     mesh: TangentMesh, strokes: Strokes, candidates: np.ndarray, angle: np.ndarray
-) -> Task[_ClosingTrace]:
+) -> _ClosingTrace:
     """Trace candidates from their first points until they pass these points again or miss them.
 
     `angle` is the (n,) angle in radians to the left of the field.
@@ -173,7 +170,7 @@ def _trace_loops_task(
     segments: list[tuple[np.ndarray, ...]] = []
     while len(active):
         if len(segments) % STEPS_PER_YIELD == 0:
-            yield Progress(1 - len(active) / len(candidates), "closing loops")
+            report(1 - len(active) / len(candidates), "closing loops")
         current = particles.take(active)
         to_origin = origin[active] - mesh.points_at(current.triangle, current.weights)
         forward = dot(to_origin, tangent[active])

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..field.frames import normalize
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .stroke_set import POINT_COLUMNS, Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.
@@ -46,11 +46,6 @@ class Crossings(NamedTuple):
 
 
 def find_crossings(strokes: Strokes) -> Crossings:
-    """Run `crossings_task` to its end."""
-    return run_to_completion(crossings_task(strokes))
-
-
-def crossings_task(strokes: Strokes) -> Task[Crossings]:
     """Find where strokes cross.
 
     Only segments in the same triangle are compared.
@@ -65,7 +60,7 @@ def crossings_task(strokes: Strokes) -> Task[Crossings]:
     segment_end = segment_end[np.argsort(strokes.triangle[segment_end], kind="stable")]
     batches = []
     for first, second in _close_pairs(strokes, segment_end):
-        yield Progress(min(0.1 * len(batches), 0.9), "finding crossings")
+        report(min(0.1 * len(batches), 0.9), "finding crossings")
         first, second = segment_end[first], segment_end[second]
         batches.append(_intersect_segments(strokes.points, stroke, first, second))
     if not batches:
@@ -214,11 +209,6 @@ def _intersect_segments(
 
 
 def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Strokes:
-    """Run `crossing_gaps_task` to its end."""
-    return run_to_completion(crossing_gaps_task(strokes, gap, weave))
-
-
-def crossing_gaps_task(strokes: Strokes, gap: float, weave: bool = False) -> Task[Strokes]:
     """Cut a gap into one of the two strokes at each crossing.
 
     Parameters
@@ -231,8 +221,9 @@ def crossing_gaps_task(strokes: Strokes, gap: float, weave: bool = False) -> Tas
         If true, strokes pass over and under in turn. Otherwise the stroke of the family with the
         lower number passes over.
     """
-    crossings = yield from subtask(crossings_task(strokes), 0.0, 0.6)
-    yield Progress(0.6, "cutting gaps")
+    with progress(0.0, 0.6):
+        crossings = find_crossings(strokes)
+    report(0.6, "cutting gaps")
     if not len(crossings.stroke):
         return strokes
     if weave:
@@ -246,7 +237,7 @@ def crossing_gaps_task(strokes: Strokes, gap: float, weave: bool = False) -> Tas
     stroke, arc = crossings.stroke[row, under], crossings.arc[row, under]
     # The gaps of a stroke are measured in the spacing at its start.
     spacing = strokes.spacing[strokes.start[:-1]][stroke]
-    yield Progress(0.7, "cutting gaps")
+    report(0.7, "cutting gaps")
     return cut_intervals(strokes, stroke, arc - gap / 2 * spacing, arc + gap / 2 * spacing)
 
 

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..field.surface import connected_components_task
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..field.surface import connected_components
+from ..progress import progress, report
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, nearest_member
 
@@ -22,9 +22,7 @@ from .tangent_mesh import TangentMesh, nearest_member
 GUIDE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
-def label_families_task(
-    strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None = None
-) -> Task[Strokes]:
+def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None = None) -> Strokes:
     """Assign strokes to families by the line that they follow at their middle point.
 
     Parameters
@@ -36,27 +34,23 @@ def label_families_task(
         Guide direction in world space, for example the x axis of a camera. It is used only if no
         consistent labels exist.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Strokes
         With `mesh.family_count` families. Family 1 is the one nearest to the guide direction; the
         others follow counter-clockwise.
     """
-    yield Progress(0.0, "matching families")
+    report(0.0, "matching families")
     family_count = mesh.family_count
     names = tuple(f"family {index + 1}" for index in range(family_count))
     if family_count == 1 or not len(strokes):
         return replace(strokes, names=names)
-    labels = yield from global_labels_task(mesh)
+    labels = global_labels(mesh)
     reference = reference_members(mesh)
     if labels is None:
         reference = _members_near_guide(mesh, reference, right)
         labels = np.broadcast_to(np.arange(family_count), (len(reference), family_count))
-    yield Progress(0.9, "matching families")
+    report(0.9, "matching families")
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
     triangle = strokes.triangle[middle]
     member = dot(strokes.member[middle], mesh.x[triangle]) + 1j * dot(
@@ -89,18 +83,13 @@ def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.
 
 
 def global_labels(mesh: TangentMesh) -> np.ndarray | None:
-    """Run `global_labels_task` to its end."""
-    return run_to_completion(global_labels_task(mesh))
-
-
-def global_labels_task(mesh: TangentMesh) -> Task[np.ndarray | None]:
     """Return (T, M) int: the family of each line in each triangle, if consistent labels exist.
 
     Lines are counted counter-clockwise from `reference_members`. Returns None if different lines of
     a triangle are connected by a path over the surface.
     """
     label = "matching families"
-    yield Progress(0.0, label)
+    report(0.0, label)
     family_count, count = mesh.family_count, len(mesh.z)
     if mesh.family_z is not None and (mesh.family_z != 0).any():
         return np.broadcast_to(np.arange(family_count), (count, family_count))
@@ -109,7 +98,7 @@ def global_labels_task(mesh: TangentMesh) -> Task[np.ndarray | None]:
     other = mesh.neighbor[triangle, edge]
     is_first = triangle < other
     triangle, edge, other = triangle[is_first], edge[is_first], other[is_first]
-    yield Progress(0.2, label)
+    report(0.2, label)
     transported = reference[triangle] * mesh.edge_transport[triangle, edge]
     shift = member_offset(
         nearest_member(transported, mesh.z[other].sum(axis=1), mesh.degree),
@@ -120,10 +109,9 @@ def global_labels_task(mesh: TangentMesh) -> Task[np.ndarray | None]:
     node = triangle[:, None] * family_count + slots
     other_node = other[:, None] * family_count + (slots + shift[:, None]) % family_count
     pairs = np.stack([node.ravel(), other_node.ravel()], axis=1)
-    yield Progress(0.4, label)
-    component = yield from subtask(
-        connected_components_task(count * family_count, pairs), 0.4, 0.8, label
-    )
+    report(0.4, label)
+    with progress(0.4, 0.8, label):
+        component = connected_components(count * family_count, pairs)
     component = component.reshape(count, family_count)
     for a in range(family_count):
         for b in range(a):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..progress import Progress, Task
+from ..progress import report
 from .point_grid import PointGrid
 from .stroke_set import Strokes
 
@@ -25,16 +25,12 @@ MAX_DIRECTION_COSINE, MIN_NORMAL_COSINE = -0.8, 0.5
 BLOCK_ENDS = 1 << 12
 
 
-def head_on_ends_task(strokes: Strokes) -> Task[np.ndarray]:
+def head_on_ends(strokes: Strokes) -> np.ndarray:
     """Return which ends of strokes meet the end of another stroke head on.
 
     Parameters
     ----------
     strokes : Strokes
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -52,7 +48,7 @@ def head_on_ends_task(strokes: Strokes) -> Task[np.ndarray]:
     grid.add(position, MAX_FORWARD * spacing)
     radius = float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing
     for start in range(0, len(ends), BLOCK_ENDS):
-        yield Progress(start / len(ends), "shaping ends")
+        report(start / len(ends), "shaping ends")
         block = slice(start, start + BLOCK_ENDS)
         query, other = grid.pairs_within(position[block], radius[block])
         query = query + start

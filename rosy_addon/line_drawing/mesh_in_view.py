@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.frames import normalize
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.camera import Camera
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, take_triangles, with_corners
@@ -60,7 +60,7 @@ class MeshInView:
         )
 
 
-def mesh_in_view_task(mesh: TangentMesh, camera: Camera) -> Task[MeshInView]:
+def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
     """Cut off what is beyond the frame, by more than a margin, or in front of the near plane.
 
     Parameters
@@ -68,17 +68,13 @@ def mesh_in_view_task(mesh: TangentMesh, camera: Camera) -> Task[MeshInView]:
     mesh : TangentMesh
     camera : Camera
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     MeshInView
         Has no neighbors across the cut. It may have no triangles.
     """
     label = "finding the part in view"
-    yield Progress(0.0, label)
+    report(0.0, label)
     x, y, z, w = _clip_coordinates(mesh.points, camera)
     right, top = (
         w * (1 + 2 * min(MARGIN_PIXELS / side, MARGIN_RATIO))
@@ -89,15 +85,15 @@ def mesh_in_view_task(mesh: TangentMesh, camera: Camera) -> Task[MeshInView]:
         whole.triangle, whole.weights, mesh.neighbor, mesh.neighbor_edge, mesh.edge_transport
     )
     for index, distance in enumerate((z + w, right - x, right + x, top - y, top + y)):
-        yield Progress(0.1 * index, label)
+        report(0.1 * index, label)
         pieces = pieces.cut(distance, keeps_both=False)
     if camera.is_perspective:
         for depth in _depths_of_cuts(pieces.corner_values(w)):
-            yield Progress(0.5, label)
+            report(0.5, label)
             pieces = pieces.cut(w - depth, keeps_both=True)
     if pieces.neighbor is mesh.neighbor:
         return whole
-    yield Progress(0.9, label)
+    report(0.9, label)
     return pieces.apply(mesh)
 
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.creases import creases_task
+from ..field.creases import compute_creases
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
@@ -58,13 +58,6 @@ class _Corners(NamedTuple):
 def outline(
     instance: MeshInstance, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
 ) -> Strokes:
-    """Run `outline_task` to its end."""
-    return run_to_completion(outline_task(instance, camera, crease_angle=crease_angle))
-
-
-def outline_task(
-    instance: MeshInstance, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
-) -> Task[Strokes]:
     """Extract the silhouettes, creases and borders of a mesh instance.
 
     Silhouettes are the curves on which the interpolated normal is perpendicular to the direction to
@@ -79,11 +72,7 @@ def outline_task(
         pixels. Without a camera there are no silhouettes.
     crease_angle : float
         Smallest angle in radians between the normals of the two faces at a crease; see
-        `field.creases.creases_task`.
-
-    Yields
-    ------
-    Progress
+        `field.creases.compute_creases`.
 
     Returns
     -------
@@ -91,7 +80,7 @@ def outline_task(
         World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
     label = "finding outlines"
-    yield Progress(0.0, label)
+    report(0.0, label)
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     points = instance.world_points()[surface.triangle_vertex]
@@ -101,13 +90,13 @@ def outline_task(
     vertex = surface.triangle_vertex.ravel()
     edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    yield Progress(0.3, label)
-    task = creases_task(surface, crease_angle)
-    is_crease = _are_pairs(vertex, a, (yield from subtask(task, 0.3, 0.7, label)).ends)
+    report(0.3, label)
+    with progress(0.3, 0.7, label):
+        is_crease = _are_pairs(vertex, a, compute_creases(surface, crease_angle).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])
-    yield Progress(0.8, label)
+    report(0.8, label)
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
     if camera is None:
@@ -122,7 +111,7 @@ def outline_task(
         angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
         salience = _pixel_salience(creases, angle, camera)
         families = [_chains(silhouettes), _chains(creases, salience, MIN_CREASE_PX)]
-    yield Progress(0.9, label)
+    report(0.9, label)
     families.append(_chains(_edge_segments(corners, borders)))
     return _to_strokes(families, surface)
 

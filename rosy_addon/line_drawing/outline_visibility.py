@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
@@ -18,7 +17,7 @@ from .visibility import (
     pixel_size,
     planes_around,
     project_to_pixels,
-    visible_runs_task,
+    visible_runs,
 )
 
 #: A silhouette is visible if it would be after a move outward by one of these distances, in pixels: it
@@ -33,13 +32,13 @@ MAX_RING_DEPTH = 1.0
 MAX_GAP_PX, MIN_MARK_PX = 4.0, 6.0
 
 
-def clip_outline_task(
+def clip_outline(
     lines: Strokes,
     index: int,
     instances: Sequence[MeshInstance],
     camera: Camera,
     depth_buffer: DepthBuffer | None,
-) -> Task[Strokes]:
+) -> Strokes:
     """Return the parts of outlines that are in the frame and not hidden.
 
     The depth test of strokes fails for silhouettes, which lie on triangles that may face away from the
@@ -52,14 +51,10 @@ def clip_outline_task(
     index : int
         The number of this instance.
     instances : sequence of MeshInstance
-        As for `clip_task`.
+        As for `clip_to_visible`.
     camera : Camera
     depth_buffer : DepthBuffer or None
         Of the instances. If None, lines are only clipped to the frame.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -74,7 +69,7 @@ def clip_outline_task(
             visible[visible] = _is_visible(block.points, block, visible, own, depth_buffer, camera)
         return visible
 
-    return (yield from visible_runs_task(lines, camera, find_visible, MAX_GAP_PX, MIN_MARK_PX))
+    return visible_runs(lines, camera, find_visible, MAX_GAP_PX, MIN_MARK_PX)
 
 
 class _OwnSurface:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import normalize
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .stroke_set import POINT_COLUMNS, Strokes, arc_lengths
@@ -21,10 +21,10 @@ from .visibility import (
     MAX_BIAS_STEEPNESS,
     SAMPLE_STEP_PX,
     DepthBuffer,
-    depth_task,
     pixel_counts,
     pixel_size,
     project_to_pixels,
+    rasterize_depth,
 )
 
 #: Shortest extension of an end, as a fraction of the longest.
@@ -65,16 +65,6 @@ def extend_free_ends(
     max_pixels: float,
     instances: Sequence[MeshInstance] | None = None,
 ) -> Strokes:
-    """Run `extension_task` to its end."""
-    return run_to_completion(extension_task(strokes, camera, max_pixels, instances))
-
-
-def extension_task(
-    strokes: Strokes,
-    camera: Camera,
-    max_pixels: float,
-    instances: Sequence[MeshInstance] | None = None,
-) -> Task[Strokes]:
     """Extend free ends in a straight line, by pseudorandom lengths.
 
     Lines that follow no member of the field, such as outlines, are not extended.
@@ -91,10 +81,6 @@ def extension_task(
         the visible surface of these instances where it is nearer or continues at about that depth.
         If not given, extensions are straight in world space.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Strokes
@@ -107,17 +93,17 @@ def extension_task(
     Strokes.runs_where : Marks the ends at removed points.
     """
     label = "extending strokes"
-    yield Progress(0.0, label)
+    report(0.0, label)
     if instances is None:
         strokes = strokes.subdivided(pixel_counts(strokes, camera))
-        yield Progress(0.2, label)
+        report(0.2, label)
     screen = np.nan_to_num(project_to_pixels(strokes.points, camera)[0])
     arc = arc_lengths(np.column_stack([screen, np.zeros(len(screen))]), strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
-    yield Progress(0.3, label)
+    report(0.3, label)
     extend = _extension_in_space if instances is None else _extension_in_picture
     start_point, origin, step = extend(
         strokes, arc, end, np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total), camera
@@ -130,11 +116,12 @@ def extension_task(
     extensions = _Extensions(
         *(column[is_valid] for column in (start_point, side, origin, step, length))
     )
-    yield Progress(0.5, label)
+    report(0.5, label)
     extended, distance = _append_extensions(strokes, extensions)
     if instances is None:
         return extended
-    depth_buffer = yield from subtask(depth_task(instances, camera), 0.6, 0.9)
+    with progress(0.6, 0.9):
+        depth_buffer = rasterize_depth(instances, camera)
     return _drop_onto_surfaces(extended, distance, depth_buffer, camera)
 
 

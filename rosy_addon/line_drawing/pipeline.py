@@ -8,33 +8,33 @@ from functools import reduce
 
 import numpy as np
 
-from ..annotation.singularity_marks import SingularityMarks, singularity_marks_task
+from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..errors import RosyError
 from ..field.directional_field import field_symmetry
 from ..field.frames import dot
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads
 from .attachment import SurfacePoints, surface_points
-from .crossings import crossing_gaps_task
+from .crossings import with_crossing_gaps
 from .directional_spacing import CornerSpacing, spacing_in_picture
-from .families import label_families_task
-from .head_on_ends import head_on_ends_task
-from .mesh_in_view import mesh_in_view_task, whole_mesh
-from .outline import OUTLINE_KINDS, outline_task
-from .outline_visibility import clip_outline_task
-from .overshoot import extension_task, mark_free_boundary_ends
-from .seen_triangles import seen_triangles_task, triangles_near
-from .smoothing import smooth_task
+from .families import label_families
+from .head_on_ends import head_on_ends
+from .mesh_in_view import mesh_in_view, whole_mesh
+from .outline import OUTLINE_KINDS, outline
+from .outline_visibility import clip_outline
+from .overshoot import extend_free_ends, mark_free_boundary_ends
+from .seen_triangles import seen_triangles, triangles_near
+from .smoothing import smooth
 from .spacing import (
     MAX_SPACING_RATIO,
     LightSource,
     fan_vertices,
     lit_tone,
-    spacing_by_curvature_task,
+    spacing_by_curvature,
     spacing_by_tone,
     values_at_points,
     weight_by_tone,
@@ -43,10 +43,17 @@ from .spacing import (
 from .stroke_memory import check_stroke_memory
 from .stroke_set import POINT_COLUMNS, Strokes
 from .style import StrokeStyle
-from .svg import Pen, simplify_mask_task
-from .tangent_mesh import TangentMesh, tangent_mesh_task
-from .trace import trace_on_mesh_task
-from .visibility import DepthBuffer, clip_task, depth_task, in_frame, pixel_size, project_to_pixels
+from .svg import Pen, simplify_mask
+from .tangent_mesh import TangentMesh, build_tangent_mesh
+from .trace import trace_on_mesh
+from .visibility import (
+    DepthBuffer,
+    clip_to_visible,
+    in_frame,
+    pixel_size,
+    project_to_pixels,
+    rasterize_depth,
+)
 
 #: Width of a tapered stroke at its end, as a fraction of the full width.
 TIP_WIDTH = 0.15
@@ -91,19 +98,6 @@ class StrokeDrawing:
 
 
 def draw_instances(
-    instances: Sequence[MeshInstance], camera: Camera, style: StrokeStyle | None = None, **options
-) -> StrokeDrawing:
-    """Run `draw_instances_task` to its end.
-
-    Examples
-    --------
-    >>> drawing = draw_instances([instance], camera, StrokeStyle(spacing=6.0))  # doctest: +SKIP
-    >>> write_svg("strokes.svg", drawing.strokes, camera)  # doctest: +SKIP
-    """
-    return run_to_completion(draw_instances_task(instances, camera, style, **options))
-
-
-def draw_instances_task(
     instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle | None = None,
@@ -111,7 +105,7 @@ def draw_instances_task(
     lights: Sequence[LightSource] = (),
     clip_to_frame: bool = True,
     cache: Cache | None = None,
-) -> Task[StrokeDrawing]:
+) -> StrokeDrawing:
     """Cover mesh instances with strokes and remove what the camera does not see.
 
     Parameters
@@ -128,10 +122,6 @@ def draw_instances_task(
         they are always clipped.
     cache : Cache, optional
         Cache for corner fields.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -154,15 +144,16 @@ def draw_instances_task(
     depth_buffer = None
     if drawn and not style.hidden:
         label = "finding visible strokes"
-        depth_buffer = yield from subtask(depth_task(instances, camera), 0.01, 0.05, label)
+        with progress(0.01, 0.05, label):
+            depth_buffer = rasterize_depth(instances, camera)
     traced = {}
     for rank, index in enumerate(drawn):
         start, stop = (0.05 + 0.83 * done / len(drawn) for done in (rank, rank + 1))
         seen = None
         if depth_buffer is not None:
-            seen = yield from seen_triangles_task(instances, index, camera, depth_buffer)
-        task = _trace_instance(instances[index], camera, style, lights, clips, seen, cache)
-        strokes = yield from subtask(task, start, stop)
+            seen = seen_triangles(instances, index, camera, depth_buffer)
+        with progress(start, stop):
+            strokes = _trace_instance(instances[index], camera, style, lights, clips, seen, cache)
         if strokes is not None:
             traced[index] = strokes
     if not traced:
@@ -173,18 +164,19 @@ def draw_instances_task(
     if not len(strokes) and not style.outline:
         raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clips:
-        task = clip_task(
-            strokes,
-            instances,
-            camera,
-            remove_hidden=not style.hidden,
-            depth_buffer=depth_buffer,
-        )
-        strokes = yield from subtask(task, 0.88, 0.92)
-        strokes = yield from subtask(smooth_task(strokes, camera), 0.92, 0.93)
+        with progress(0.88, 0.92):
+            strokes = clip_to_visible(
+                strokes,
+                instances,
+                camera,
+                remove_hidden=not style.hidden,
+                depth_buffer=depth_buffer,
+            )
+        with progress(0.92, 0.93):
+            strokes = smooth(strokes, camera)
     if style.outline:
-        task = _outlines_task(instances, drawn, camera, depth_buffer, clips)
-        outlines = yield from subtask(task, 0.93, 0.95)
+        with progress(0.93, 0.95):
+            outlines = _outlines(instances, drawn, camera, depth_buffer, clips)
         strokes = reduce(Strokes.concatenate, outlines, strokes)
         family_counts += [len(lines.names) for lines in outlines]
         drawn = drawn + drawn
@@ -192,15 +184,16 @@ def draw_instances_task(
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
     heads = _arrowheads(strokes, instances, instance_of_family, style) if style.arrows else None
     if style.overshoot:
-        task = _overshoot_task(strokes, instances, camera, style, clip_to_frame)
-        strokes = yield from subtask(task, 0.95, 1.0)
+        with progress(0.95, 1.0):
+            strokes = _overshoot(strokes, instances, camera, style, clip_to_frame)
     if not len(strokes):
         raise _no_visible_stroke(camera)
     if heads is not None:
         strokes = Strokes.join([strokes, heads])
     marks = None
     if shows_singularities(style):
-        marks = yield from subtask(singularity_marks_task(instances, camera, style), 1.0, 1.0)
+        with progress(1.0):
+            marks = singularity_marks(instances, camera, style)
     return StrokeDrawing(
         _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden, marks
     )
@@ -214,13 +207,13 @@ def _trace_instance(
     clipped: bool,
     seen: np.ndarray | None,
     cache: Cache,
-) -> Task[Strokes | None]:
+) -> Strokes | None:
     """Return the strokes of a mesh instance, before they are clipped; None if none can be in view.
 
     If `seen`, (T,) bool, is given, strokes are traced only on these triangles and near them.
     """
     label = "computing the spacing"
-    yield Progress(0.0, label)
+    report(0.0, label)
     # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
     by_fan = with_vertices_of_fans(instance)
     factor = np.ones(len(by_fan.surface.vertices))
@@ -230,16 +223,16 @@ def _trace_instance(
     if tone is not None:
         factor = spacing_by_tone(factor, tone, max_ratio)
     if style.curvature:
-        task = spacing_by_curvature_task(instance.surface, 1.0, style.curvature)
-        vertex_factor = yield from subtask(task, 0.01, 0.02)
+        with progress(0.01, 0.02):
+            vertex_factor = spacing_by_curvature(instance.surface, 1.0, style.curvature)
         factor = factor * vertex_factor[fan_vertices(instance.surface)]
-    mesh = yield from subtask(
-        tangent_mesh_task(instance, cross_creases=style.cross_creases, cache=cache), 0.02, 0.08
-    )
+    with progress(0.02, 0.08):
+        mesh = build_tangent_mesh(instance, cross_creases=style.cross_creases, cache=cache)
     part = whole_mesh(mesh)
     if clipped:
-        part = yield from subtask(mesh_in_view_task(mesh, camera), 0.08, 0.09)
-    yield Progress(0.09, label)
+        with progress(0.08, 0.09):
+            part = mesh_in_view(mesh, camera)
+    report(0.09, label)
     if not part.mesh.z.any():
         return None
     if clipped and style.unit == "world":
@@ -253,23 +246,27 @@ def _trace_instance(
             return None
         part, spacing = part.take(kept), spacing.take(kept)
     check_stroke_memory(part.mesh, spacing.values, camera, clipped, instance.surface.name)
-    task = trace_on_mesh_task(part.mesh, spacing, surface_name=instance.surface.name)
-    strokes = part.on_whole_mesh((yield from subtask(task, 0.1, 0.9)))
+    with progress(0.1, 0.9):
+        strokes = part.on_whole_mesh(
+            trace_on_mesh(part.mesh, spacing, surface_name=instance.surface.name)
+        )
     strokes = mark_free_boundary_ends(strokes, mesh)
     if style.cross_creases:
         # Strokes may cross creases, families do not.
-        mesh = yield from subtask(tangent_mesh_task(instance, cache=cache), 0.9, 0.92)
-    task = label_families_task(strokes, mesh, camera.view[0, :3])
-    strokes = yield from subtask(task, 0.92, 0.95)
+        with progress(0.9, 0.92):
+            mesh = build_tangent_mesh(instance, cache=cache)
+    with progress(0.92, 0.95):
+        strokes = label_families(strokes, mesh, camera.view[0, :3])
     if tone is not None:
         point_tone = values_at_points(strokes, by_fan.surface, tone)
         strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
     if style.gaps:
-        task = crossing_gaps_task(strokes, style.gaps, weave=True)
-        strokes = yield from subtask(task, 0.95, 0.98)
+        with progress(0.95, 0.98):
+            strokes = with_crossing_gaps(strokes, style.gaps, weave=True)
     if style.taper:
-        ends = ~(yield from subtask(head_on_ends_task(strokes), 0.98, 0.99))
-        yield Progress(0.99, "shaping ends")
+        with progress(0.98, 0.99):
+            ends = ~head_on_ends(strokes)
+        report(0.99, "shaping ends")
         # Strokes reach creases and borders at full width, as they reach silhouettes. Those that will be
         # extended are tapered after the extension.
         ends &= ~strokes.free_end_mask
@@ -297,39 +294,40 @@ def _arrowheads(
     return arrowheads(strokes, style.arrows, has_direction)
 
 
-def _outlines_task(
+def _outlines(
     instances: Sequence[MeshInstance],
     drawn: Sequence[int],
     camera: Camera,
     depth_buffer: DepthBuffer | None,
     clips: bool,
-) -> Task[list[Strokes]]:
+) -> list[Strokes]:
     """Return the outline of each drawn instance, clipped like strokes."""
     outlines = []
     for rank, index in enumerate(drawn):
         start, middle, clipped, stop = ((rank + done) / len(drawn) for done in (0.0, 0.5, 0.9, 1.0))
-        task = outline_task(instances[index], camera)
-        lines = yield from subtask(task, start, middle)
+        with progress(start, middle):
+            lines = outline(instances[index], camera)
         if clips:
-            task = clip_outline_task(lines, index, instances, camera, depth_buffer)
-            lines = yield from subtask(task, middle, clipped)
-            lines = yield from subtask(smooth_task(lines, camera), clipped, stop)
+            with progress(middle, clipped):
+                lines = clip_outline(lines, index, instances, camera, depth_buffer)
+            with progress(clipped, stop):
+                lines = smooth(lines, camera)
         outlines.append(lines)
     return outlines
 
 
-def _overshoot_task(
+def _overshoot(
     strokes: Strokes,
     instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle,
     clip_to_frame: bool,
-) -> Task[Strokes]:
+) -> Strokes:
     """Extend free ends, clip the extensions to the frame, and taper these ends."""
     occluders = None if style.hidden else instances
-    task = extension_task(strokes, camera, style.overshoot, occluders)
-    strokes = yield from subtask(task, 0.0, 0.8)
-    yield Progress(0.8, "extending strokes")
+    with progress(0.0, 0.8):
+        strokes = extend_free_ends(strokes, camera, style.overshoot, occluders)
+    report(0.8, "extending strokes")
     if clip_to_frame or not style.hidden:
         inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
         strokes = strokes.runs_where(inside, free_at_removed=False)
@@ -434,14 +432,9 @@ class StrokeGeometry:
     places: SurfacePoints | None = None
 
 
-def stroke_geometry(drawing: StrokeDrawing, camera: Camera, pen: Pen) -> StrokeGeometry:
-    """Run `geometry_task` to its end."""
-    return run_to_completion(geometry_task(drawing, camera, pen))
-
-
-def geometry_task(
+def stroke_geometry(
     drawing: StrokeDrawing, camera: Camera, pen: Pen, follows: MeshInstance | None = None
-) -> Task[StrokeGeometry]:
+) -> StrokeGeometry:
     """Return the curves of a drawing.
 
     Parameters
@@ -454,8 +447,9 @@ def geometry_task(
         The instance that all strokes are on, if they are to follow its surface.
     """
     label = "simplifying strokes"
-    strokes = yield from subtask(simplify_task(drawing.strokes, camera), 0.0, 0.8, label)
-    yield Progress(0.8, label)
+    with progress(0.0, 0.8, label):
+        strokes = simplify_strokes(drawing.strokes, camera)
+    report(0.8, label)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
     # surface.
     places = None
@@ -472,11 +466,6 @@ def geometry_task(
 
 
 def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
-    """Run `simplify_task` to its end."""
-    return run_to_completion(simplify_task(strokes, camera))
-
-
-def simplify_task(strokes: Strokes, camera: Camera) -> Task[Strokes]:
     """Remove points without which strokes change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
 
     Parameters
@@ -491,7 +480,7 @@ def simplify_task(strokes: Strokes, camera: Camera) -> Task[Strokes]:
     features = np.column_stack(
         [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
     )
-    kept = yield from simplify_mask_task(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
+    kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
     return replace(
         strokes,
         start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),

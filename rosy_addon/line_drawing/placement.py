@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.frames import dot
-from ..progress import Progress, Task
+from ..progress import report
 from .directional_spacing import CornerSpacing
 from .growing_strokes import GrowingStrokes, StrokeSegments, Tips
 from .lateral_neighbors import find_lateral_neighbors
@@ -81,7 +81,7 @@ class StreamlinePlacer:
 
     See Also
     --------
-    rosy_addon.line_drawing.trace.place_streamlines_task : Runs the steps in their order.
+    rosy_addon.line_drawing.trace.place_streamlines : Runs the steps in their order.
     """
 
     def __init__(self, mesh: TangentMesh, spacing: CornerSpacing, rules: SeparationRules) -> None:
@@ -195,7 +195,7 @@ class StreamlinePlacer:
     def _drop_strokes(self, dropped: np.ndarray) -> None:
         """Remove strokes.
 
-        The sides that they covered stay covered until `rescan_task`. Otherwise the same strokes would be
+        The sides that they covered stay covered until `rescan`. Otherwise the same strokes would be
         seeded again.
         """
         if not len(dropped):
@@ -223,19 +223,19 @@ class StreamlinePlacer:
         self.tips = Tips.concatenate(self.tips, new_tips)
 
     def suspend(self) -> None:
-        """End all tips as if they had yielded. No stroke is seeded beside them before `rescan_task`."""
+        """End all tips as if they had yielded. No stroke is seeded beside them before `rescan`."""
         tips, self.tips = self.tips, Tips.empty()
         self.strokes.end_yielded[tips.stroke, tips.end] = True
         self._finish_tips(tips)
         self.samples.close_open_sides()
 
-    def rescan_task(self, rules: SeparationRules) -> Task[None]:
+    def rescan(self, rules: SeparationRules) -> None:
         """Change the rules, and open sides again where strokes were dropped or seeds did not fit."""
         self.rules = rules
         samples = self.samples
         sample = samples.reset_coverage()
         for start in range(0, len(sample), RESCAN_BATCH_SIZE):
-            yield Progress(samples.coverage, "looking for gaps")
+            report(samples.coverage, "looking for gaps")
             batch = sample[start : start + RESCAN_BATCH_SIZE]
             samples.mark_covered(find_lateral_neighbors(samples, batch, 0.0, np.inf).covering)
         samples.add_open_sides(sample)

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
-from .pipeline import simplify_task
+from .pipeline import simplify_strokes
 from .stroke_set import Strokes
 from .svg import Pen
 from .visibility import pixel_size
@@ -34,12 +34,12 @@ _PLY_EDGE = np.dtype([("vertex1", "<i4"), ("vertex2", "<i4")])
 _PLY_TYPE_NAMES = {"f8": "double", "f4": "float", "i4": "int"}
 
 
-def polyline_file_task(
+def polyline_file(
     suffix: str, strokes: Strokes, camera: Camera, pen: Pen, matrix: np.ndarray | None = None
-) -> Task[bytes]:
+) -> bytes:
     """Return strokes as the contents of a file.
 
-    Points on straight lines are left out; see `simplify_task`.
+    Points on straight lines are left out; see `simplify_strokes`.
 
     Parameters
     ----------
@@ -54,15 +54,12 @@ def polyline_file_task(
     matrix : (4, 4) ndarray, optional
         Rotation and translation from world space to the space of the file.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     bytes
     """
-    strokes = yield from subtask(simplify_task(strokes, camera), 0.0, 0.4, "writing strokes")
+    with progress(0.0, 0.4, "writing strokes"):
+        strokes = simplify_strokes(strokes, camera)
     order = np.argsort(strokes.family, kind="stable")
     strokes = strokes.select(order)
     width = pen.width * pixel_size(strokes.points, camera) * strokes.width
@@ -71,14 +68,14 @@ def polyline_file_task(
     normals = strokes.normal @ matrix[:3, :3].T
     columns = (points, normals, width)
     if suffix == ".ply":
-        yield Progress(0.5, "writing strokes")
+        report(0.5, "writing strokes")
         return _ply(strokes, *columns)
     blocks = (_csv_blocks if suffix == ".csv" else _obj_blocks)(strokes, *columns)
     contents = []
     step_count = 2 + len(points) / POINTS_PER_STEP
     for block in blocks:
         contents.append(block.encode())
-        yield Progress(0.4 + 0.6 * min(len(contents) / step_count, 1.0), "writing strokes")
+        report(0.4 + 0.6 * min(len(contents) / step_count, 1.0), "writing strokes")
     return b"".join(contents)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..field.frames import dot
-from ..progress import Progress, Task
+from ..progress import report
 from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
 from .point_grid import LEVEL_RATIO, grid_levels
 from .samples import SAMPLE_STEP, StrokeSamples
@@ -71,16 +71,16 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
     return seeds.take(np.flatnonzero(seeds.member != 0))
 
 
-def uncovered_seeds_task(samples: StrokeSamples, seeds: SurfaceParticles) -> Task[SurfaceParticles]:
+def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
     """Return the seeds that are not near a stroke of their family."""
     is_uncovered = np.zeros(len(seeds), dtype=bool)
     for start in range(0, len(seeds), SEED_BATCH_SIZE):
-        yield Progress(samples.coverage, "looking for gaps")
+        report(samples.coverage, "looking for gaps")
         batch = np.arange(start, min(start + SEED_BATCH_SIZE, len(seeds)))
         with samples.probes(seeds.take(batch)) as probes:
             neighbors = find_lateral_neighbors(samples, probes, MAX_COVERED_GAP, np.inf)
         is_uncovered[batch] = ~neighbors.rejected
-    yield Progress(samples.coverage, "looking for gaps")
+    report(samples.coverage, "looking for gaps")
     return seeds.take(np.flatnonzero(is_uncovered))
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..field.frames import dot
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .tangent_mesh import TangentMesh
@@ -29,9 +29,9 @@ from .visibility import (
 HIDDEN_MARGIN = 6.0
 
 
-def seen_triangles_task(
+def seen_triangles(
     instances: Sequence[MeshInstance], index: int, camera: Camera, depth_buffer: DepthBuffer
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Find the triangles of an instance that the camera sees.
 
     Parameters
@@ -42,10 +42,6 @@ def seen_triangles_task(
         The number of the instance.
     camera : Camera
     depth_buffer : DepthBuffer
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -64,7 +60,7 @@ def seen_triangles_task(
     hidden = np.zeros(len(points), dtype=bool)
     pending = np.unique(triangle_vertex[~seen])
     for start in range(0, len(pending), BLOCK_POINTS):
-        yield Progress(start / len(pending), label)
+        report(start / len(pending), label)
         block = pending[start : start + BLOCK_POINTS]
         hidden[block] = _is_hidden(points[block], camera, depth_buffer)
     return seen | ~hidden[triangle_vertex].all(axis=1)

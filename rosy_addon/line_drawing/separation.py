@@ -18,7 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .point_grid import PointGrid
 from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .stroke_set import Strokes
@@ -48,11 +48,6 @@ CHECK_RADIUS = 1.0
 
 
 def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Strokes:
-    """Run `separation_task` to its end."""
-    return run_to_completion(separation_task(mesh, strokes, min_length))
-
-
-def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> Task[Strokes]:
     """Remove the parts of strokes that are nearer than `MIN_SEPARATION` to another of their family.
 
     Two strokes are of the same family at a point if the angle between their directions is less than
@@ -63,13 +58,9 @@ def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> T
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families_task`: their families are not used.
+        Strokes before `label_families`: their families are not used.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -77,8 +68,9 @@ def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> T
         Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
     """
     label = "separating strokes"
-    yield Progress(0.0, label)
-    suspect = yield from subtask(_suspect_points_task(mesh, strokes), 0.0, 0.3, label)
+    report(0.0, label)
+    with progress(0.0, 0.3, label):
+        suspect = _suspect_points(mesh, strokes)
     if not suspect.any():
         return strokes
     near_suspect = _points_near(strokes, suspect)
@@ -86,18 +78,18 @@ def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> T
     point = np.concatenate(
         [np.arange(strokes.start[stroke], strokes.start[stroke + 1]) for stroke in candidates]
     )
-    yield Progress(0.3, label)
+    report(0.3, label)
     refined, source = _refine(strokes.select(candidates), np.isin(point, near_suspect))
-    yield Progress(0.4, label)
-    task = _too_close_task(mesh, refined, suspect[point][source], strokes.length[candidates])
-    too_close = yield from subtask(task, 0.4, 0.8, label)
+    report(0.4, label)
+    with progress(0.4, 0.8, label):
+        too_close = _too_close(mesh, refined, suspect[point][source], strokes.length[candidates])
     if not too_close.any():
         return strokes
     # Loops that are cut are also cut at their first point, where they were closed.
     opened = np.flatnonzero(refined.closed & (np.bincount(refined.stroke, too_close) > 0))
     too_close[refined.start[:-1][opened]] = too_close[refined.start[1:][opened] - 1] = True
     too_close = _dilate(refined, too_close)
-    yield Progress(0.8, label)
+    report(0.8, label)
     cut = np.unique(refined.stroke[too_close])
     remaining = refined.runs_where(~too_close, free_at_removed=False)
     is_cut = np.zeros(len(candidates), dtype=bool)
@@ -107,21 +99,21 @@ def separation_task(mesh: TangentMesh, strokes: Strokes, min_length: float) -> T
     remaining = remaining.select(
         remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
     )
-    yield Progress(0.9, label)
+    report(0.9, label)
     untouched = np.ones(len(strokes), dtype=bool)
     untouched[candidates[cut]] = False
     kept = strokes.select(untouched)
-    yield Progress(0.95, label)
+    report(0.95, label)
     result = Strokes.concatenate(kept, remaining)
     return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
 
 
-def _suspect_points_task(mesh: TangentMesh, strokes: Strokes) -> Task[np.ndarray]:
+def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
     surface_turn = np.empty(len(strokes.points))
     suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
     for start in range(0, len(suspect), BLOCK_POINTS):
-        yield Progress(start / len(suspect), "separating strokes")
+        report(start / len(suspect), "separating strokes")
         block = slice(start, start + BLOCK_POINTS)
         surface_turn[block] = _surface_turn_per_spacing(mesh, strokes, block)
         suspect[block] |= _field_turn_per_spacing(mesh, strokes, block) > MAX_TURN
@@ -214,9 +206,9 @@ def _refine(strokes: Strokes, near_suspect: np.ndarray) -> tuple[Strokes, np.nda
     return strokes.subdivided(counts), np.repeat(np.arange(len(counts)), counts)
 
 
-def _too_close_task(
+def _too_close(
     mesh: TangentMesh, refined: Strokes, suspect: np.ndarray, length: np.ndarray
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Return (m,) bool: the points of refined strokes to remove.
 
     Parameters
@@ -236,7 +228,7 @@ def _too_close_task(
     queries = np.flatnonzero(suspect)
     rejected = np.zeros(len(stroke), dtype=bool)
     for start in range(0, len(queries), BLOCK_POINTS):
-        yield Progress(start / len(queries), "separating strokes")
+        report(start / len(queries), "separating strokes")
         query = queries[start : start + BLOCK_POINTS]
         point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
         point = query[point]

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..field.frames import dot
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.camera import Camera
 from .stroke_set import Strokes
 from .visibility import SAMPLE_STEP_PX, pixel_size, project_to_pixels
@@ -30,18 +30,14 @@ ROUNDS = round(2 * (FILTER_PX / SAMPLE_STEP_PX) ** 2)
 BLOCK_POINTS = 1 << 15
 
 
-def smooth_task(strokes: Strokes, camera: Camera) -> Task[Strokes]:
+def smooth(strokes: Strokes, camera: Camera) -> Strokes:
     """Filter the points of lines, so that they do not have corners where the mesh has edges.
 
     Parameters
     ----------
     strokes : Strokes
-        As `clip_task` returns them, with points at most `SAMPLE_STEP_PX` pixels apart.
+        As `clip_to_visible` returns them, with points at most `SAMPLE_STEP_PX` pixels apart.
     camera : Camera
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -52,7 +48,7 @@ def smooth_task(strokes: Strokes, camera: Camera) -> Task[Strokes]:
     block_index = strokes.start[1:] // BLOCK_POINTS
     cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
     for first, stop in pairwise(cuts):
-        yield Progress(first / max(len(strokes), 1), "smoothing strokes")
+        report(first / max(len(strokes), 1), "smoothing strokes")
         block = slice(strokes.start[first], strokes.start[stop])
         points[block] = _smoothed_points(strokes.select(np.arange(first, stop)), camera)
     return replace(strokes, points=points)

@@ -10,10 +10,9 @@ import numpy as np
 
 from ..color import REC709_LUMINANCE
 from ..errors import RosyError
-from ..field.curvature import magnitude_task
+from ..field.curvature import compute_magnitude
 from ..field.frames import dot, normalize
 from ..field.surface import Surface, sum_per_fan
-from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
@@ -110,9 +109,9 @@ def spacing_by_tone(
     return np.asarray(spacing) / ink
 
 
-def spacing_by_curvature_task(
+def spacing_by_curvature(
     surface: Surface, spacing: np.ndarray | float, exponent: float = 0.5
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Divide the spacing by a power of the curvature, relative to its median.
 
     Parameters
@@ -123,15 +122,11 @@ def spacing_by_curvature_task(
         The power. 0 changes nothing; with 1 the spacing is proportional to the radius of curvature.
         The factor is limited to `MIN_SPACING_RATIO` and `MAX_SPACING_RATIO`.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (V,) float64 ndarray
     """
-    curvature = yield from magnitude_task(surface, "curvature")
+    curvature = compute_magnitude(surface, "curvature")
     corner = surface.corner_vertex
     count = np.bincount(corner, minlength=len(surface.vertices))
     vertex_curvature = np.bincount(corner, curvature[surface.corner_face], len(surface.vertices))

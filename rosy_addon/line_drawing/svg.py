@@ -20,7 +20,7 @@ from ..annotation.singularity_marks import (
 )
 from ..errors import RosyError
 from ..file_io import write_bytes
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
 from .outline import OUTLINE_KINDS
 from .stroke_set import Strokes
@@ -133,21 +133,8 @@ def write_svg(
 
 
 def svg_text(
-    strokes: Strokes,
-    camera: Camera,
-    pen: Pen | None = None,
-    marks: SingularityMarks | None = None,
+    strokes: Strokes, camera: Camera, pen: Pen | None = None, marks: SingularityMarks | None = None
 ) -> str:
-    """Run `svg_task` to its end."""
-    return run_to_completion(svg_task(strokes, camera, pen, marks))
-
-
-def svg_task(
-    strokes: Strokes,
-    camera: Camera,
-    pen: Pen | None = None,
-    marks: SingularityMarks | None = None,
-) -> Task[str]:
     """Return strokes as an SVG document, projected by a camera.
 
     Hidden parts are not removed here; see `clip_to_visible`.
@@ -161,10 +148,6 @@ def svg_task(
     marks : SingularityMarks, optional
         Singularities in this camera.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     str
@@ -172,7 +155,7 @@ def svg_task(
         singularities. A stroke is one path, or several if its opacity changes.
     """
     pen = pen or Pen()
-    yield Progress(0.0, "writing strokes")
+    report(0.0, "writing strokes")
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     size = f'width="{camera.width}" height="{camera.height}"'
@@ -197,7 +180,7 @@ def svg_task(
     for family, (name, color) in enumerate(
         zip(strokes.names, pen.family_colors(strokes.names), strict=True)
     ):
-        yield Progress(family / len(strokes.names), "writing strokes")
+        report(family / len(strokes.names), "writing strokes")
         family_strokes = strokes.select(strokes.family == family)
         if not len(family_strokes):
             continue
@@ -207,13 +190,13 @@ def svg_task(
             f'fill="none" stroke={quoteattr(color)} stroke-width="{pen.width:.3g}" '
             'stroke-linecap="round" stroke-linejoin="round">'
         )
-        task = (
-            _plotter_paths_task(family_pixels, family_strokes)
-            if pen.plotter
-            else _stroke_paths_task(family_pixels, family_strokes, pen.width, color)
-        )
         start, stop = (done / len(strokes.names) for done in (family, family + 1))
-        lines += yield from subtask(task, start, stop)
+        with progress(start, stop):
+            lines += (
+                _plotter_paths(family_pixels, family_strokes)
+                if pen.plotter
+                else _stroke_paths(family_pixels, family_strokes, pen.width, color)
+            )
         lines.append("</g>")
     if marks is not None and len(marks):
         lines += _singularity_layer(marks, camera.height)
@@ -256,17 +239,17 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
     return [*lines, "</g>"]
 
 
-def _plotter_paths_task(pixels: np.ndarray, strokes: Strokes) -> Task[list[str]]:
-    """Return one path per stroke, in the order of `plotter_order_task`."""
+def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
+    """Return one path per stroke, in the order of `plotter_order`."""
     first, last = pixels[strokes.start[:-1]], pixels[strokes.start[1:] - 1]
-    order, is_reversed = yield from subtask(plotter_order_task(first, last), 0.0, 0.5)
-    kept = yield from subtask(
-        simplify_mask_task(pixels, strokes.start, SIMPLIFY_TOLERANCE_PX), 0.5, 0.6
-    )
+    with progress(0.0, 0.5):
+        order, is_reversed = plotter_order(first, last)
+    with progress(0.5, 0.6):
+        kept = simplify_mask(pixels, strokes.start, SIMPLIFY_TOLERANCE_PX)
     paths = []
     for stroke, backward in zip(order.tolist(), is_reversed.tolist(), strict=True):
         if len(paths) % PATHS_PER_STEP == 0:
-            yield Progress(0.6 + 0.4 * len(paths) / len(order), "writing strokes")
+            report(0.6 + 0.4 * len(paths) / len(order), "writing strokes")
         span = slice(strokes.start[stroke], strokes.start[stroke + 1])
         points = pixels[span][kept[span]]
         points = points[::-1] if backward else points
@@ -274,9 +257,7 @@ def _plotter_paths_task(pixels: np.ndarray, strokes: Strokes) -> Task[list[str]]
     return paths
 
 
-def _stroke_paths_task(
-    pixels: np.ndarray, strokes: Strokes, width: float, color: str
-) -> Task[list[str]]:
+def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str) -> list[str]:
     """Return the paths of strokes: a line if the width is constant, otherwise a filled outline.
 
     A stroke is split where its opacity changes. The parts have square ends, so that they do not
@@ -286,7 +267,8 @@ def _stroke_paths_task(
     point, start, first = _split_by_opacity(opacity_level, strokes)
     radius = np.clip(strokes.width[point], 0, 1) * width / 2
     features = np.column_stack([pixels[point], radius])
-    kept = yield from subtask(simplify_mask_task(features, start, SIMPLIFY_TOLERANCE_PX), 0.1, 0.5)
+    with progress(0.1, 0.5):
+        kept = simplify_mask(features, start, SIMPLIFY_TOLERANCE_PX)
     start = np.concatenate([[0], np.cumsum(kept)])[start]
     points, radius = pixels[point][kept], radius[kept]
     min_radius, max_radius = (
@@ -298,7 +280,7 @@ def _stroke_paths_task(
     paths = []
     for piece, level in enumerate(opacity_level[first].tolist()):
         if piece % PATHS_PER_STEP == 0:
-            yield Progress(0.5 + 0.5 * piece / len(first), "writing strokes")
+            report(0.5 + 0.5 * piece / len(first), "writing strokes")
         span = slice(start[piece], start[piece + 1])
         if not level or not max_radius[piece]:
             continue
@@ -401,11 +383,6 @@ def _format_points(points: np.ndarray) -> str:
 
 
 def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
-    """Run `simplify_mask_task` to its end."""
-    return run_to_completion(simplify_mask_task(points, start, tolerance))
-
-
-def simplify_mask_task(points: np.ndarray, start: np.ndarray, tolerance: float) -> Task[np.ndarray]:
     """Choose the points of simplified polylines.
 
     The method is that of Ramer, Douglas and Peucker, for all polylines at once.
@@ -428,7 +405,7 @@ def simplify_mask_task(points: np.ndarray, start: np.ndarray, tolerance: float) 
     kept[first], kept[last] = True, True
     first, last = first[last - first > 1], last[last - first > 1]
     while len(first):
-        yield Progress(1 - float((last - first).sum()) / len(points), "simplifying strokes")
+        report(1 - float((last - first).sum()) / len(points), "simplifying strokes")
         count = last - first - 1
         begin = np.concatenate([[0], np.cumsum(count)[:-1]])
         segment = np.repeat(np.arange(len(first)), count)
@@ -456,11 +433,6 @@ def simplify_mask_task(points: np.ndarray, start: np.ndarray, tolerance: float) 
 
 
 def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Run `plotter_order_task` to its end."""
-    return run_to_completion(plotter_order_task(first, last))
-
-
-def plotter_order_task(first: np.ndarray, last: np.ndarray) -> Task[tuple[np.ndarray, np.ndarray]]:
     """Order and reverse strokes so that the pen travels little between them.
 
     The next stroke is always the one with the nearest end (greedy). A grid speeds up the search.
@@ -492,7 +464,7 @@ def plotter_order_task(first: np.ndarray, last: np.ndarray) -> Task[tuple[np.nda
     current_cell = (0, 0)
     for _ in range(count):
         if len(order) % PATHS_PER_STEP == 0:
-            yield Progress(len(order) / count, "ordering strokes")
+            report(len(order) / count, "ordering strokes")
         nearest = _nearest_end(
             grid, positions, current, current_cell, cell_count, extent.max() / cell_count
         )

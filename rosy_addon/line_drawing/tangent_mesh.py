@@ -19,8 +19,8 @@ from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot, normalize, transport
 from ..field.representation import power, signed_power
 from ..field.surface import Surface, build_edges
-from ..progress import Progress, Task, run_to_completion, subtask
-from ..projection.corner_field import cached_corner_field_task
+from ..progress import progress, report
+from ..projection.corner_field import cached_corner_field
 from ..projection.field_channel import rotation_order
 from ..projection.gbuffer import MeshInstance
 
@@ -241,19 +241,14 @@ def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndar
     return np.where(z != 0, reference * np.exp(1j * angle), 0)
 
 
-def build_tangent_mesh(instance: MeshInstance, **options) -> TangentMesh:
-    """Run `tangent_mesh_task` to its end."""
-    return run_to_completion(tangent_mesh_task(instance, **options))
-
-
-def tangent_mesh_task(
+def build_tangent_mesh(
     instance: MeshInstance,
     *,
     display: str = "smooth",
     cross_creases: bool = False,
     crease_angle: float = CREASE_ANGLE,
     cache: Cache | None = None,
-) -> Task[TangentMesh]:
+) -> TangentMesh:
     """Build the tangent mesh of a mesh instance.
 
     Parameters
@@ -268,10 +263,6 @@ def tangent_mesh_task(
         Smallest angle between the normals of the triangles at a crease, in radians.
     cache : Cache, optional
         Cache for corner fields.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -291,21 +282,20 @@ def tangent_mesh_task(
             f"{surface.name}: the field has {counted(len(field.vectors), 'vector')}, but the mesh has "
             f"{counted(surface.face_count, 'face')}"
         )
-    corner_field = yield from subtask(
-        cached_corner_field_task(surface, instance.matrix, field, display, cache), 0.0, 0.3
-    )
+    with progress(0.0, 0.3):
+        corner_field = cached_corner_field(surface, instance.matrix, field, display, cache)
     label = "preparing the surface"
-    yield Progress(0.3, label)
+    report(0.3, label)
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     vertices = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     points = vertices[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
-    yield Progress(0.4, label)
+    report(0.4, label)
     corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
     rotations = _rotations_to_planes(
         corner_field.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
     )
-    yield Progress(0.5, label)
+    report(0.5, label)
     z = corner_field.representation.T.astype(np.complex128) * power(rotations, field.degree)
     z *= (area > 0)[:, None]
     if not z.any():
@@ -317,9 +307,9 @@ def tangent_mesh_task(
             harmonics.append((channel[1], values))
         else:
             family_z = values.sum(axis=1)
-    yield Progress(0.6, label)
-    neighbor, neighbor_edge, edge_transport = yield from subtask(
-        _adjacency_task(
+    report(0.6, label)
+    with progress(0.6, 1.0):
+        neighbor, neighbor_edge, edge_transport = _adjacency(
             surface,
             points,
             x,
@@ -327,10 +317,7 @@ def tangent_mesh_task(
             normal,
             (z != 0).any(axis=1),
             None if cross_creases else crease_angle,
-        ),
-        0.6,
-        1.0,
-    )
+        )
     return TangentMesh(
         degree=field.degree,
         family_count=field_symmetry(field).line_count,
@@ -482,7 +469,7 @@ def _rotations_to_planes(
     return rotations
 
 
-def _adjacency_task(
+def _adjacency(
     surface: Surface,
     points: np.ndarray,
     x: np.ndarray,
@@ -490,7 +477,7 @@ def _adjacency_task(
     normal: np.ndarray,
     defined: np.ndarray,
     crease_angle: float | None,
-) -> Task[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
 
     Strokes stop at triangles that are not `defined` (T,) and, unless `crease_angle` is None, at
@@ -500,7 +487,7 @@ def _adjacency_task(
     edges = build_edges(
         surface.triangle_vertex.ravel(), np.arange(0, 3 * count + 1, 3, dtype=np.int32)
     )
-    yield Progress(0.5, label)
+    report(0.5, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     triangle_a, triangle_b = a // 3, b // 3
     passable = defined[triangle_a] & defined[triangle_b]
@@ -510,7 +497,7 @@ def _adjacency_task(
             & (dot(normal[triangle_a], normal[triangle_b]) < np.cos(crease_angle))
         )
     a, b, triangle_a, triangle_b = (values[passable] for values in (a, b, triangle_a, triangle_b))
-    yield Progress(0.7, label)
+    report(0.7, label)
     neighbor = np.full((count, 3), -1, dtype=np.int32)
     neighbor_edge = np.zeros((count, 3), dtype=np.int8)
     edge_transport = np.ones((count, 3), dtype=np.complex128)

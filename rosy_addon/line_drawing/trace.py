@@ -8,20 +8,20 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
-from .closed_strokes import close_loops_task
+from .closed_strokes import close_loops
 from .directional_spacing import CornerSpacing
-from .families import label_families_task
+from .families import label_families
 from .growing_strokes import StrokeSegments
 from .placement import StreamlinePlacer
-from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds_task
-from .separation import separation_task
+from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds
+from .separation import enforce_separation
 from .separation_rules import SeparationRules
 from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles
-from .tangent_mesh import TangentMesh, corner_values, tangent_mesh_task
+from .tangent_mesh import TangentMesh, build_tangent_mesh, corner_values
 
 #: Samples by which tips grow between two attempts to seed beside strokes.
 SAMPLES_PER_SEEDING = 8
@@ -42,12 +42,7 @@ FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.
 FIRST_WARMUP, SECOND_WARMUP, WARMUP_SEPARATION = (3, 3), (2, 2, 2, 2, 2), 0.6
 
 
-def trace_strokes(instance: MeshInstance, spacing: np.ndarray | float, **options) -> Strokes:
-    """Run `trace_strokes_task` to its end."""
-    return run_to_completion(trace_strokes_task(instance, spacing, **options))
-
-
-def trace_strokes_task(
+def trace_strokes(
     instance: MeshInstance,
     spacing: np.ndarray | float,
     *,
@@ -55,7 +50,7 @@ def trace_strokes_task(
     display: str = "smooth",
     cross_creases: bool = False,
     cache: Cache | None = None,
-) -> Task[Strokes]:
+) -> Strokes:
     """Cover a mesh instance with evenly spaced strokes along its field.
 
     Parameters
@@ -73,10 +68,6 @@ def trace_strokes_task(
     cache : Cache, optional
         Cache for corner fields.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Strokes
@@ -88,38 +79,41 @@ def trace_strokes_task(
         If there is no field, the spacing is not above 0, or it is so small that there would be too
         many strokes.
     """
-    mesh = yield from subtask(
-        tangent_mesh_task(instance, display=display, cross_creases=cross_creases, cache=cache),
-        0.0,
-        0.1,
-    )
-    strokes = yield from subtask(
-        trace_on_mesh_task(mesh, spacing, rules, instance.surface.name), 0.1, 0.95
-    )
-    return (yield from subtask(label_families_task(strokes, mesh), 0.95, 1.0))
+    with progress(0.0, 0.1):
+        mesh = build_tangent_mesh(
+            instance, display=display, cross_creases=cross_creases, cache=cache
+        )
+    with progress(0.1, 0.95):
+        strokes = trace_on_mesh(mesh, spacing, rules, instance.surface.name)
+    with progress(0.95, 1.0):
+        return label_families(strokes, mesh)
 
 
-def trace_on_mesh_task(
+def trace_on_mesh(
     mesh: TangentMesh,
     spacing: CornerSpacing | np.ndarray | float,
     rules: SeparationRules | None = None,
     surface_name: str = "mesh",
-) -> Task[Strokes]:
-    """Do the same as `trace_strokes_task` on a tangent mesh, but do not assign families."""
+) -> Strokes:
+    """Do the same as `trace_strokes` on a tangent mesh, but do not assign families."""
     if not isinstance(spacing, CornerSpacing):
         spacing = CornerSpacing(corner_values(mesh, spacing, surface_name))
     if not (np.isfinite(spacing.values).all() and (spacing.values > 0).all()):
         raise RosyError(f"{surface_name}: the spacing of strokes must be above 0")
     placer = StreamlinePlacer(mesh, spacing, rules or SeparationRules())
     rules = placer.rules
-    yield from subtask(place_streamlines_task(placer), 0.0, 0.9)
-    strokes = yield from subtask(collect_task(placer), 0.9, 0.92)
+    with progress(0.0, 0.9):
+        place_streamlines(placer)
+    with progress(0.9, 0.92):
+        strokes = collect(placer)
     del placer  # its samples take more memory than the strokes
-    strokes = yield from subtask(close_loops_task(mesh, strokes, spacing), 0.92, 0.95)
-    return (yield from subtask(separation_task(mesh, strokes, rules.min_length), 0.95, 1.0))
+    with progress(0.92, 0.95):
+        strokes = close_loops(mesh, strokes, spacing)
+    with progress(0.95, 1.0):
+        return enforce_separation(mesh, strokes, rules.min_length)
 
 
-def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
+def place_streamlines(placer: StreamlinePlacer) -> None:
     """Seed strokes and let them grow until there is no room left.
 
     1. Start strokes around singularities.
@@ -135,7 +129,7 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     )
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
     for index, sample_count in enumerate(FIRST_WARMUP + SECOND_WARMUP):
-        yield Progress(0.0, label)
+        report(0.0, label)
         if index == len(FIRST_WARMUP):
             placer.rules = replace(rules, max_gap=np.inf)
         if len(placer.tips):
@@ -144,36 +138,34 @@ def place_streamlines_task(placer: StreamlinePlacer) -> Task[None]:
     placer.rules = replace(rules, min_length=FIRST_LENGTH_FACTOR * rules.min_length)
     candidates = candidate_seeds(placer.mesh, placer.spacing.values)
     for seed_spacing in SEED_SPACINGS:
-        yield from _add_uncovered_seeds_task(placer, candidates, seed_spacing)
-        yield from _grow_until(placer, label, STRAGGLER_RATIO)
-    yield from placer.rescan_task(
-        replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length)
-    )
-    yield from _add_uncovered_seeds_task(placer, candidates, SEED_SPACINGS[-1])
-    yield from _grow_until(placer, label, STRAGGLER_RATIO)
+        _add_uncovered_seeds(placer, candidates, seed_spacing)
+        _grow_until(placer, label, STRAGGLER_RATIO)
+    placer.rescan(replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
+    _add_uncovered_seeds(placer, candidates, SEED_SPACINGS[-1])
+    _grow_until(placer, label, STRAGGLER_RATIO)
     fill_rules = replace(
         rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
     )
     placer.resume_yielded(replace(fill_rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
-    yield from _grow_until(placer, label, STRAGGLER_RATIO)
-    yield from placer.rescan_task(fill_rules)
-    yield from _grow_until(placer, label)
+    _grow_until(placer, label, STRAGGLER_RATIO)
+    placer.rescan(fill_rules)
+    _grow_until(placer, label)
     # There may be gaps that are not beside a stroke, where all were too short for the phases before.
-    yield from _add_uncovered_seeds_task(placer, candidates)
-    yield from _grow_until(placer, label)
+    _add_uncovered_seeds(placer, candidates)
+    _grow_until(placer, label)
 
 
-def _add_uncovered_seeds_task(
+def _add_uncovered_seeds(
     placer: StreamlinePlacer, candidates: SurfaceParticles, seed_spacing: float = 0.0
-) -> Task[None]:
+) -> None:
     """Start strokes at those candidates that are not near a stroke of their family.
 
     The points of the seeds are about `seed_spacing` apart, in spacings; all are tried if it is 0.
     """
     label = "looking for gaps"
-    yield Progress(placer.samples.coverage, label)
-    seeds = yield from uncovered_seeds_task(placer.samples, candidates)
-    yield Progress(placer.samples.coverage, label)
+    report(placer.samples.coverage, label)
+    seeds = uncovered_seeds(placer.samples, candidates)
+    report(placer.samples.coverage, label)
     if seed_spacing and len(seeds):
         median = float(np.median(placer.spacing.values))
         ratio = placer.samples.spacing_at(seeds) / median
@@ -181,7 +173,7 @@ def _add_uncovered_seeds_task(
     placer.add_seeds(seeds)
 
 
-def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0.0) -> Task[None]:
+def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0.0) -> None:
     """Alternate between steps and seeding beside strokes.
 
     It ends when fewer tips are left than `straggler_ratio` times their largest number, or when
@@ -189,7 +181,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     """
     max_tips = 0
     while True:
-        yield Progress(placer.samples.coverage, label)
+        report(placer.samples.coverage, label)
         seeded = placer.seed_neighbors()
         if not seeded and not len(placer.tips):
             if not placer.samples.has_open_sides:
@@ -197,7 +189,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
             # Each call closes the sides that it tried. Try others twice more.
             if not placer.seed_neighbors() and not placer.seed_neighbors():
                 return
-        yield Progress(placer.samples.coverage, label)
+        report(placer.samples.coverage, label)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:
@@ -206,13 +198,13 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
             placer.grow(SAMPLES_PER_SEEDING)
 
 
-def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:
-    """Return the strokes of a placer. They are all in one family; see `label_families_task`."""
+def collect(placer: StreamlinePlacer) -> Strokes:
+    """Return the strokes of a placer. They are all in one family; see `label_families`."""
     label = "collecting strokes"
     mesh, samples = placer.mesh, placer.samples
     columns = []
     for column in zip(*placer.segments, strict=True):
-        yield Progress(0.05 * len(columns), label)
+        report(0.05 * len(columns), label)
         columns.append(np.concatenate(column))
     segments = StrokeSegments(*columns)
     placer.segments.clear()
@@ -221,7 +213,7 @@ def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:
     stroke, sign, triangle, begin_weights, weights, direction = (
         column[keep] for column in segments
     )
-    yield Progress(0.4, label)
+    report(0.4, label)
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.
     backward = np.flatnonzero(sign < 0)
@@ -243,17 +235,17 @@ def collect_task(placer: StreamlinePlacer) -> Task[Strokes]:
             np.concatenate([stroke, stroke_ids]),
         )
     )
-    yield Progress(0.6, label)
+    report(0.6, label)
     stroke = np.concatenate([stroke, stroke_ids])[order]
     triangle = np.concatenate([triangle, first_triangle])[order]
     weights = np.concatenate([weights, first_weights])[order]
     direction = np.concatenate([direction * sign, first_direction])[order]
-    yield Progress(0.8, label)
+    report(0.8, label)
     row = np.searchsorted(stroke_ids, stroke)
     points = mesh.points_at(triangle, weights)
     start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(stroke_ids)))])
     spacing = placer.spacing.at(triangle, weights, direction)
-    yield Progress(0.9, label)
+    report(0.9, label)
     return Strokes(
         points=points,
         start=start,

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import dot, normalize
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.rasterizer import rasterize_task
+from ..projection.rasterizer import rasterize
 from .stroke_set import Strokes, arc_lengths
 
 #: Largest distance between the points of strokes at which visibility is tested, in pixels.
@@ -82,19 +82,8 @@ def clip_to_visible(
     camera: Camera,
     *,
     remove_hidden: bool = True,
-) -> Strokes:
-    """Run `clip_task` to its end."""
-    return run_to_completion(clip_task(strokes, instances, camera, remove_hidden=remove_hidden))
-
-
-def clip_task(
-    strokes: Strokes,
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    *,
-    remove_hidden: bool = True,
     depth_buffer: DepthBuffer | None = None,
-) -> Task[Strokes]:
+) -> Strokes:
     """Return the parts of strokes that are in the frame and not hidden.
 
     Parameters
@@ -106,11 +95,7 @@ def clip_task(
     remove_hidden : bool
         If false, strokes are only clipped to the frame.
     depth_buffer : DepthBuffer, optional
-        The result of `depth_task` for these instances, if it is known.
-
-    Yields
-    ------
-    Progress
+        The result of `rasterize_depth` for these instances, if it is known.
 
     Returns
     -------
@@ -128,7 +113,8 @@ def clip_task(
     """
     label = "finding visible strokes"
     if remove_hidden and depth_buffer is None:
-        depth_buffer = yield from subtask(depth_task(instances, camera), 0.0, 0.3, label)
+        with progress(0.0, 0.3, label):
+            depth_buffer = rasterize_depth(instances, camera)
 
     def find_visible(block: Strokes, pixels: np.ndarray, inside: np.ndarray) -> np.ndarray:
         visible = inside.copy()
@@ -137,17 +123,17 @@ def clip_task(
         return visible
 
     min_run = MIN_RUN_PX if remove_hidden else 0.0
-    task = visible_runs_task(strokes, camera, find_visible, min_run, min_run)
-    return (yield from subtask(task, 0.3, 0.9, label))
+    with progress(0.3, 0.9, label):
+        return visible_runs(strokes, camera, find_visible, min_run, min_run)
 
 
-def visible_runs_task(
+def visible_runs(
     strokes: Strokes,
     camera: Camera,
     find_visible: Callable[[Strokes, np.ndarray, np.ndarray], np.ndarray],
     max_gap: float,
     min_run: float,
-) -> Task[Strokes]:
+) -> Strokes:
     """Cut strokes into their visible runs.
 
     Runs of closed strokes continue over their first point.
@@ -163,7 +149,7 @@ def visible_runs_task(
         Lengths in pixels below which hidden runs are filled and visible runs are removed.
     """
     label = "finding visible strokes"
-    yield Progress(0.0, label)
+    report(0.0, label)
     if not len(strokes):
         return strokes
     clipped = []
@@ -172,7 +158,7 @@ def visible_runs_task(
     block_index = np.cumsum(counts)[strokes.start[1:] - 1] // BLOCK_POINTS
     cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
     for first, stop in pairwise(cuts):
-        yield Progress(first / len(strokes), label)
+        report(first / len(strokes), label)
         block = strokes.subdivided(counts, first, stop)
         pixels, _ = project_to_pixels(block.points, camera)
         inside = in_frame(pixels, camera)
@@ -186,7 +172,7 @@ def visible_runs_task(
         )
         visible = clean_runs(visible, pixels, block.start, max_gap, min_run)
         clipped.append(block.runs_where(visible, free_at_removed=inside))
-    yield Progress(1.0, label)
+    report(1.0, label)
     return Strokes.join(clipped)
 
 
@@ -247,30 +233,25 @@ class DepthBuffer:
 
 
 def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthBuffer:
-    """Run `depth_task` to its end."""
-    return run_to_completion(depth_task(instances, camera))
-
-
-def depth_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[DepthBuffer]:
     """Rasterize mesh instances to a depth buffer."""
     label = "finding the nearest surface"
-    yield Progress(0.0, label)
+    report(0.0, label)
     corners = np.concatenate([_camera_triangles(instance, camera) for instance in instances])
     flat_corners = corners.reshape(-1, 3)
     clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
     indices = np.arange(len(flat_corners), dtype=np.int32).reshape(-1, 3)
-    yield Progress(0.2, label)
-    task = rasterize_task(clip, indices, camera.width, camera.height)
-    fragments = yield from subtask(task, 0.2, 0.8, label)
+    report(0.2, label)
+    with progress(0.2, 0.8, label):
+        fragments = rasterize(clip, indices, camera.width, camera.height)
     triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)
     triangle.flat[fragments.pixel] = fragments.triangle
     depth = np.full(triangle.shape, np.inf)
     for start in range(0, len(fragments.pixel), BLOCK_PIXELS):
-        yield Progress(0.8, label)
+        report(0.8, label)
         block = slice(start, start + BLOCK_PIXELS)
         corner_depth = corners[fragments.triangle[block], :, 2]
         depth.flat[fragments.pixel[block]] = -dot(fragments.barycentric[block], corner_depth)
-    yield Progress(0.9, label)
+    report(0.9, label)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     return DepthBuffer(triangle, depth, normal, dot(normal, corners[:, 0]))
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import RosyError
 from ..field.frames import dot, normalize
 from ..field.surface import Surface, sum_per_fan
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from .gbuffer import MeshInstance
 from .shadow_maps import (
     NORMAL_BIAS_PIXELS,
@@ -29,12 +29,12 @@ DIRECTION_COUNT, DEPTH_MAP_SIZE = 256, 512
 SAMPLE_INSET_PIXELS, MAX_INSET_FRACTION = 2 * NORMAL_BIAS_PIXELS, 0.3
 
 
-def occlusion_task(
+def ambient_occlusion(
     instances: Sequence[MeshInstance],
     instance_id: int,
     direction_count: int = DIRECTION_COUNT,
     resolution: int = DEPTH_MAP_SIZE,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Compute the ambient occlusion at the corners of one mesh instance.
 
     Parameters
@@ -47,10 +47,6 @@ def occlusion_task(
         Number of light directions, spread evenly over the sphere.
     resolution : int
         Width and height of each shadow map in pixels.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -72,7 +68,7 @@ def occlusion_task(
     points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
     visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
     for index, direction in enumerate(fibonacci_sphere(direction_count)):
-        yield Progress(index / direction_count, "sampling directions of light")
+        report(index / direction_count, "sampling directions of light")
         cosine = normals @ direction
         facing_light = np.flatnonzero(cosine > 0)
         camera = sun_camera(direction, caster_points, receiver_points, resolution)
@@ -85,16 +81,6 @@ def occlusion_task(
         visible_weight, total_weight, out=np.ones_like(visible_weight), where=total_weight > 0
     )
     return visible_fraction[instance.surface.corner_fan].astype(np.float32)
-
-
-def ambient_occlusion(
-    instances: Sequence[MeshInstance],
-    instance_id: int,
-    direction_count: int = DIRECTION_COUNT,
-    resolution: int = DEPTH_MAP_SIZE,
-) -> np.ndarray:
-    """Compute the ambient occlusion at the corners of one mesh instance; see `occlusion_task`."""
-    return run_to_completion(occlusion_task(instances, instance_id, direction_count, resolution))
 
 
 def fibonacci_sphere(count: int) -> np.ndarray:

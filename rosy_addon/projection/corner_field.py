@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from ..field.frames import dot_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import Progress, Task
+from ..progress import report
 from .face_values import FaceValues, face_values
 from .fan_values import FanValues, fan_values, transport_phase
 from .field_channel import FieldChannel, rotation_order
@@ -94,9 +95,9 @@ class CornerField:
         )
 
 
-def corner_field_task(
+def compute_corner_field(
     surface: Surface, matrix: np.ndarray, field: RosyField, display: str
-) -> Task[CornerField]:
+) -> CornerField:
     """Transport a field from the rest shape to the triangle corners of the deformed surface.
 
     Parameters
@@ -108,10 +109,6 @@ def corner_field_task(
     display : {"smooth", "flat"}
         Average values and normals over smooth fans, or keep those of each face.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     CornerField
@@ -119,11 +116,11 @@ def corner_field_task(
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     deformed = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
-    yield Progress(0.0, "averaging the field at corners")
+    report(0.0, "averaging the field at corners")
     faces = face_values(surface, linear, deformed, field, with_angles=display == "smooth")
-    yield Progress(0.4, "averaging the field at corners")
+    report(0.4, "averaging the field at corners")
     fans = fan_values(surface, linear, faces, field.degree) if display == "smooth" else None
-    yield Progress(0.7, "averaging the field at corners")
+    report(0.7, "averaging the field at corners")
     count = len(surface.triangles)
     corner_field = CornerField(
         corner_normals=np.empty((3, 3, count), dtype=np.float32),
@@ -145,25 +142,19 @@ def corner_field_task(
     return corner_field
 
 
-def cached_corner_field_task(
-    surface: Surface,
-    matrix: np.ndarray,
-    field: RosyField,
-    display: str,
-    cache: Cache | None = None,
-) -> Task[CornerField]:
-    """Do the same as `corner_field_task`, with results stored in a cache if one is given.
+def cached_corner_field(
+    surface: Surface, matrix: np.ndarray, field: RosyField, display: str, cache: Cache | None = None
+) -> CornerField:
+    """Do the same as `compute_corner_field`, with results stored in a cache if one is given.
 
     All cameras, and instances that differ only in their location, share one corner field.
     """
     if cache is None:
-        return (yield from corner_field_task(surface, matrix, field, display))
+        return compute_corner_field(surface, matrix, field, display)
     linear = np.ascontiguousarray(np.asarray(matrix, dtype=np.float64)[:3, :3])
-    return (
-        yield from cache.get_or_create_task(
-            ("corner field", surface, field, linear.tobytes(), display),
-            lambda: corner_field_task(surface, matrix, field, display),
-        )
+    return cache.get_or_create(
+        ("corner field", surface, field, linear.tobytes(), display),
+        partial(compute_corner_field, surface, matrix, field, display),
     )
 
 

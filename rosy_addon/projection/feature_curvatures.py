@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..cache import Cache
-from ..field.feature_curvature import feature_curvature_task
+from ..field.feature_curvature import feature_curvature
 from ..field.surface import Surface
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from .gbuffer import GBuffer
 from .pixel_blocks import pixel_blocks
 
@@ -15,16 +17,16 @@ from .pixel_blocks import pixel_blocks
 STEP_LABEL = "measuring features"
 
 
-def cached_feature_curvature_task(surface: Surface, cache: Cache) -> Task[np.ndarray]:
-    """Compute `feature_curvature_task` of a surface, or find it in the cache.
+def cached_feature_curvature(surface: Surface, cache: Cache) -> np.ndarray:
+    """Compute `feature_curvature` of a surface, or find it in the cache.
 
     A deformed mesh finds it again.
     """
     key = "feature curvature", surface.rest_shape_key
-    return (yield from cache.get_or_create_task(key, lambda: feature_curvature_task(surface)))
+    return cache.get_or_create(key, partial(feature_curvature, surface))
 
 
-def feature_curvatures_task(gbuffer: GBuffer, cache: Cache) -> Task[np.ndarray]:
+def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
     """Interpolate the curvature of features at the pixels of a G-buffer.
 
     Parameters
@@ -43,11 +45,11 @@ def feature_curvatures_task(gbuffer: GBuffer, cache: Cache) -> Task[np.ndarray]:
     present = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
     for number, index in enumerate(present):
         start, stop = number / len(present), (number + 1) / len(present)
-        task = cached_feature_curvature_task(gbuffer.instances[index].surface, cache)
-        corners = yield from subtask(task, start, stop)
+        with progress(start, stop):
+            corners = cached_feature_curvature(gbuffer.instances[index].surface, cache)
         pixels = np.flatnonzero(gbuffer.instance_id == index)
         for block in pixel_blocks(len(pixels)):
-            yield Progress(stop, STEP_LABEL)
+            report(stop, STEP_LABEL)
             part = pixels[block]
             values = corners.take(gbuffer.triangle[part], axis=0)
             curvature[part] = np.einsum("ij,ij->i", values, gbuffer.barycentric[part])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ..cache import Cache, content_hash
-from ..field.creases import creases_task
-from ..field.surface import Surface, connected_components_task
-from ..progress import Progress, Task, subtask
+from ..field.creases import compute_creases
+from ..field.surface import Surface, connected_components
+from ..progress import progress, report
 from .face_values import SIMILARITY_EPS
 
 
@@ -40,9 +41,7 @@ class OutlineMesh(NamedTuple):
         return surface.vertices[self.crease_ends] @ linear.T
 
 
-def outline_mesh_task(
-    surface: Surface, matrix: np.ndarray, crease_angle: float | None
-) -> Task[OutlineMesh]:
+def outline_mesh(surface: Surface, matrix: np.ndarray, crease_angle: float | None) -> OutlineMesh:
     """Find the creases and the parts of a mesh, in its rest shape.
 
     Creases neither appear nor vanish while a mesh is deformed, so outlines do not flicker.
@@ -53,40 +52,39 @@ def outline_mesh_task(
     matrix : (3, 3) or (4, 4) ndarray
         Object to world space. The translation has no effect.
     crease_angle : float or None
-        See `creases_task`. None: no creases.
+        See `compute_creases`. None: no creases.
     """
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
         shape, linear = surface.in_rest_shape(), np.asarray(matrix, dtype=np.float64)[:3, :3]
         if not _is_similarity(linear):
             shape = shape.with_vertices(shape.vertices @ linear.T)
-        ends = (yield from subtask(creases_task(shape, crease_angle), 0.0, 0.6)).ends
-    yield Progress(0.6, "finding connected parts")
+        with progress(0.0, 0.6):
+            ends = compute_creases(shape, crease_angle).ends
+    report(0.6, "finding connected parts")
     pairs = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
-    task = connected_components_task(len(surface.vertices), pairs)
-    part = yield from subtask(task, 0.6, 1.0)
+    with progress(0.6, 1.0):
+        part = connected_components(len(surface.vertices), pairs)
     part = part[surface.triangle_vertex[:, 0]]
     return OutlineMesh(ends, None if (part == part[0]).all() else part)
 
 
-def cached_outline_mesh_task(
+def cached_outline_mesh(
     surface: Surface, matrix: np.ndarray, crease_angle: float | None, cache: Cache | None
-) -> Task[OutlineMesh]:
-    """Do the same as `outline_mesh_task`, with results stored in a cache if one is given.
+) -> OutlineMesh:
+    """Do the same as `outline_mesh`, with results stored in a cache if one is given.
 
     All deformations of a mesh share a result.
     """
     if cache is None:
-        return (yield from outline_mesh_task(surface, matrix, crease_angle))
+        return outline_mesh(surface, matrix, crease_angle)
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     if _is_similarity(linear):
         linear = np.eye(3)
     shape_key = surface.rest_shape_key, content_hash(surface.corner_fan)
-    return (
-        yield from cache.get_or_create_task(
-            ("outline mesh", *shape_key, linear.tobytes(), crease_angle),
-            lambda: outline_mesh_task(surface, linear, crease_angle),
-        )
+    return cache.get_or_create(
+        ("outline mesh", *shape_key, linear.tobytes(), crease_angle),
+        partial(outline_mesh, surface, linear, crease_angle),
     )
 
 

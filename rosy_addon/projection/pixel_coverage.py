@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import Progress, Task
+from ..progress import report
 from .camera import Camera, pixel_rays, z_at_depth
 from .gbuffer import GBuffer, PixelCoverage, PixelSamples
 from .pixel_blocks import pixel_blocks
@@ -78,14 +78,14 @@ class _Entries(NamedTuple):
         return is_near & (np.abs(cosine) >= MIN_NORMAL_COSINE)
 
 
-def other_samples_task(
+def other_samples(
     sampled: SampledTriangles,
     camera: Camera,
     samples: int,
     instance_id: np.ndarray,
     triangle: np.ndarray,
     normal: np.ndarray,
-) -> Task[OtherSamples]:
+) -> OtherSamples:
     """Return the samples that show another triangle than the center of their pixel.
 
     Parameters
@@ -102,7 +102,7 @@ def other_samples_task(
     count = len(sampled.other_entry)
     x, y, depth = np.empty((3, count), dtype=np.float32)
     for block in pixel_blocks(count):
-        yield Progress(block.start / count, STEP_LABEL)
+        report(block.start / count, STEP_LABEL)
         index = sampled.other_sample[block]
         x[block], y[block] = _centers(index, frame.width, samples)
         z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
@@ -110,9 +110,9 @@ def other_samples_task(
     return OtherSamples(sampled.other_entry, x, y, depth, instance_id, triangle, normal)
 
 
-def pixel_coverage_task(
+def pixel_coverage(
     gbuffer: GBuffer, sampled: SampledTriangles, others: OtherSamples, samples: int
-) -> Task[tuple[PixelCoverage, PixelSamples]]:
+) -> tuple[PixelCoverage, PixelSamples]:
     """Find the entry of the G-buffer whose surface each sample shows.
 
     Parameters
@@ -131,7 +131,7 @@ def pixel_coverage_task(
     cell = np.empty(count, dtype=np.int32)
     columns = np.empty((6, count), dtype=np.float32)
     for block in pixel_blocks(count):
-        yield Progress(0.2 * block.start / count, STEP_LABEL)
+        report(0.2 * block.start / count, STEP_LABEL)
         row, column = np.divmod(gbuffer.pixel[block], np.int32(camera.width))
         cell[block] = (row + 1) * stride + column + 1
         entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
@@ -141,12 +141,12 @@ def pixel_coverage_task(
     entry = others.entry.copy()
     elsewhere = []
     for block in pixel_blocks(len(entry)):
-        yield Progress(0.2 + 0.5 * block.start / len(entry), STEP_LABEL)
+        report(0.2 + 0.5 * block.start / len(entry), STEP_LABEL)
         shown = entries.shows(entry[block], others.part(block))
         elsewhere.append(block.start + np.flatnonzero(~shown))
     elsewhere = np.concatenate([np.empty(0, dtype=np.intp), *elsewhere])
     for block in pixel_blocks(len(elsewhere)):
-        yield Progress(0.7 + 0.3 * block.start / len(elsewhere), STEP_LABEL)
+        report(0.7 + 0.3 * block.start / len(elsewhere), STEP_LABEL)
         part = elsewhere[block]
         sample, home = others.part(part), cell.take(entry[part])
         nearest = np.full(len(part), np.inf, dtype=np.float32)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.frames import dot_components, transport_components, view_frame
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from .gbuffer import GBuffer
 from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
 
@@ -59,13 +59,6 @@ def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
 
 
 def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarray:
-    """Return the neighbor masks, without progress reports; see `neighbor_masks_task`."""
-    return run_to_completion(neighbor_masks_task(gbuffer, crease_angle, cross_creases))
-
-
-def neighbor_masks_task(
-    gbuffer: GBuffer, crease_angle: float, cross_creases: bool
-) -> Task[np.ndarray]:
     """Find, for each pixel, the neighbors to which a streamline may step.
 
     Parameters
@@ -103,7 +96,7 @@ def neighbor_masks_task(
     row, column = np.empty((2, count), dtype=np.int32)
     left_column, right_column = gbuffer.camera.width, 0
     for block in pixel_blocks(count):
-        yield Progress(0.1 * block.start / count, label)
+        report(0.1 * block.start / count, label)
         row[block], column[block] = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
         left_column = min(left_column, int(column[block].min()))
         right_column = max(right_column, int(column[block].max()))
@@ -113,7 +106,7 @@ def neighbor_masks_task(
     band_rows = max(BLOCK_PIXELS // width, 1)
     first_row, row_count = int(row[0]), int(row[-1] - row[0]) + 1
     for row_start in range(first_row, first_row + row_count, band_rows):
-        yield Progress(0.1 + 0.9 * (row_start - first_row) / row_count, label)
+        report(0.1 + 0.9 * (row_start - first_row) / row_count, label)
         # The grid has one more row: the first row of the next band, or an empty row.
         first, stop = np.searchsorted(
             row, np.array([row_start, row_start + band_rows + 1], row.dtype)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,19 +19,19 @@ from ..errors import NothingInViewError, RosyError, counted
 from ..field.frames import dot_components, transform_components, transport_components
 from ..field.representation import signed_power
 from ..memory import raise_mmap_threshold
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .camera import Camera, pixel_rays, z_at_depth
-from .corner_field import CornerField, cached_corner_field_task
+from .corner_field import CornerField, cached_corner_field
 from .field_channel import rotation_order
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
-from .pixel_coverage import other_samples_task, pixel_coverage_task
+from .pixel_coverage import other_samples, pixel_coverage
 from .rasterizer import (
     Fragments,
     SampledTriangles,
-    barycentrics_task,
-    rasterize_samples_task,
-    rasterize_task,
+    barycentrics,
+    rasterize,
+    rasterize_samples,
 )
 from .surface_points import SurfacePoints
 
@@ -47,27 +48,8 @@ def project(
     display: str = "smooth",
     cache: Cache | None = None,
     samples: int = 1,
-) -> GBuffer:
-    """Return the G-buffer of mesh instances as seen by a camera; see `project_task`.
-
-    Examples
-    --------
-    ::
-
-        camera = orbit_camera(surface, 30, 20, 640, 480)
-        gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    """
-    return run_to_completion(project_task(instances, camera, display, cache, samples))
-
-
-def project_task(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    display: str = "smooth",
-    cache: Cache | None = None,
-    samples: int = 1,
     rows: tuple[int, int] | None = None,
-) -> Task[GBuffer]:
+) -> GBuffer:
     """Compute the G-buffer: the visible pixels of all surfaces with a field, and the field there.
 
     Parameters
@@ -86,10 +68,6 @@ def project_task(
     rows : (int, int), optional
         The first row of the frame, and the row after the last one, if not all are needed.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     GBuffer
@@ -105,46 +83,47 @@ def project_task(
     """
     check_instances(instances, camera, display)
     raise_mmap_threshold()
-    yield Progress(0.0, "finding visible pixels")
+    report(0.0, "finding visible pixels")
     sampled = None
     if samples > 1:
-        task = _visible_samples_task(instances, camera, samples, rows)
-        visible, sampled, other_instance, other_triangle = yield from subtask(task, 0.0, 0.3)
+        with progress(0.0, 0.3):
+            visible, sampled, other_instance, other_triangle = _visible_samples(
+                instances, camera, samples, rows
+            )
     else:
-        visible = yield from subtask(_visible_pixels_task(instances, camera, rows), 0.0, 0.3)
-    gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.4)
-    geometric_normals = yield from subtask(
-        _fill_instances_task(gbuffer, visible, display, cache), 0.4, 1.0
-    )
+        with progress(0.0, 0.3):
+            visible = _visible_pixels(instances, camera, rows)
+    with progress(0.3, 0.4):
+        gbuffer = _new_gbuffer(instances, camera, visible)
+    with progress(0.4, 1.0):
+        geometric_normals = _fill_instances(gbuffer, visible, display, cache)
     if sampled is None:
         return gbuffer
     other_normal = np.zeros((3, len(other_triangle)), dtype=np.float32)
     for instance_id, normal in geometric_normals.items():
         of_instance = np.flatnonzero(other_instance == instance_id)
         other_normal[:, of_instance] = normal.take(other_triangle[of_instance], axis=1)
-    task = other_samples_task(
-        sampled, camera, samples, other_instance, other_triangle, other_normal
-    )
-    others = yield from subtask(task, 1.0, 1.0)
-    coverage, pixel_samples = yield from subtask(
-        pixel_coverage_task(gbuffer, sampled, others, samples), 1.0, 1.0
-    )
+    with progress(1.0):
+        others = other_samples(
+            sampled, camera, samples, other_instance, other_triangle, other_normal
+        )
+        coverage, pixel_samples = pixel_coverage(gbuffer, sampled, others, samples)
     return replace(gbuffer, coverage=coverage, samples=pixel_samples)
 
 
-def project_samples_task(
+def project_samples(
     gbuffer: GBuffer, entries: np.ndarray, display: str, cache: Cache | None = None
-) -> Task[tuple[GBuffer, np.ndarray, np.ndarray]]:
+) -> tuple[GBuffer, np.ndarray, np.ndarray]:
     """Compute the G-buffer of all samples of some pixels.
 
     Parameters
     ----------
     gbuffer : GBuffer
-        Of `project_task` with several samples, and with its instances.
+        Of `project` with several samples, and with its instances.
     entries : (n,) intp ndarray
         The pixels, as indices into the G-buffer.
     display, cache
-        As for `project_task`.
+        As for `project`.
 
     Returns
     -------
@@ -153,7 +132,7 @@ def project_samples_task(
     home, shown : (Q,) int32 ndarray
         Entries of `gbuffer` for each sample: that of its pixel, and that whose surface it shows.
     """
-    yield Progress(0.0, "finding visible pixels")
+    report(0.0, "finding visible pixels")
     pixel_samples, instances = gbuffer.samples, gbuffer.instances
     side = pixel_samples.side
     camera = gbuffer.camera.scaled(side)
@@ -185,50 +164,47 @@ def project_samples_task(
     sample, home, shown, instance_id, triangle = (values[order] for values in columns)
     clip, triangles, first_triangle = all_triangles(instances, camera)
     global_triangle = triangle + first_triangle[instance_id]
-    weights, front_facing = yield from subtask(
-        barycentrics_task(clip, triangles, sample, global_triangle, camera.width, camera.height),
-        0.1,
-        0.3,
-    )
+    with progress(0.1, 0.3):
+        weights, front_facing = barycentrics(
+            clip, triangles, sample, global_triangle, camera.width, camera.height
+        )
     corner_clip = clip[triangles[global_triangle], 2:]
     z, w = np.einsum("nc,nck->kn", weights, corner_clip)
     fragments = Fragments(sample, global_triangle, weights, front_facing, z / w)
     visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
     visible = _VisiblePixels(fragments, instance_id, triangle, visible_ids)
-    samples = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.3, 0.5)
-    yield from subtask(_fill_instances_task(samples, visible, display, cache), 0.5, 1.0)
+    with progress(0.3, 0.5):
+        samples = _new_gbuffer(instances, camera, visible)
+    with progress(0.5, 1.0):
+        _fill_instances(samples, visible, display, cache)
     return samples, home, shown
 
 
-def surface_points_task(
+def surface_points(
     instances: Sequence[MeshInstance],
     camera: Camera,
     display: str,
     points: SurfacePoints,
     position: np.ndarray,
     cache: Cache | None = None,
-) -> Task[GBuffer]:
+) -> GBuffer:
     """Compute the G-buffer at points of surfaces, visible or not.
 
     Parameters
     ----------
     instances, camera, display, cache
-        As for `project_task`.
+        As for `project`.
     points : SurfacePoints
         P points of instances with a field, in front of the camera.
     position : (P, 2) float64 ndarray
         Where they are in the frame, pixels from the lower left.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
     GBuffer
         With an entry for each point, in their order. Several may have the same pixel.
     """
-    yield Progress(0.0, "finding directions")
+    report(0.0, "finding directions")
     clip, triangles, first_triangle = all_triangles(instances, camera)
     global_triangle = points.triangle + first_triangle[points.instance_id]
     corners = clip[triangles[global_triangle]]
@@ -246,38 +222,33 @@ def surface_points_task(
     )
     visible_ids = np.flatnonzero(np.bincount(points.instance_id)).tolist()
     visible = _VisiblePixels(fragments, points.instance_id, points.triangle, visible_ids)
-    gbuffer = yield from subtask(_new_gbuffer_task(instances, camera, visible), 0.0, 0.1)
+    with progress(0.0, 0.1):
+        gbuffer = _new_gbuffer(instances, camera, visible)
     for instance_id in visible_ids:
         chosen = np.flatnonzero(points.instance_id == instance_id)
         instance = instances[instance_id]
-        task = cached_corner_field_task(
-            instance.surface, instance.matrix, instance.field, display, cache
-        )
-        corner_field = yield from subtask(task, 0.1, 1.0)
+        with progress(0.1, 1.0):
+            corner_field = cached_corner_field(
+                instance.surface, instance.matrix, instance.field, display, cache
+            )
         corner_field = corner_field.part(points.triangle[chosen]).rotated(camera.view[:3, :3])
         _allocate_channels(gbuffer, corner_field)
         _fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field, instance.field.degree)
     return gbuffer
 
 
-def cached_project_task(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    display: str,
-    cache: Cache,
-    samples: int = 1,
-) -> Task[GBuffer]:
-    """Do the same as `project_task`, with the G-buffer stored in a cache.
+def cached_project(
+    instances: Sequence[MeshInstance], camera: Camera, display: str, cache: Cache, samples: int = 1
+) -> GBuffer:
+    """Do the same as `project`, with the G-buffer stored in a cache.
 
     The key consists of the instances (by identity), the camera (by value), the display and the
     number of samples.
     """
     camera_key = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
-    return (
-        yield from cache.get_or_create_task(
-            ("G-buffer", tuple(instances), camera_key, camera.name, display, samples),
-            lambda: project_task(instances, camera, display, cache, samples),
-        )
+    return cache.get_or_create(
+        ("G-buffer", tuple(instances), camera_key, camera.name, display, samples),
+        partial(project, instances, camera, display, cache, samples),
     )
 
 
@@ -341,9 +312,9 @@ class _VisiblePixels:
         return len(self.visible_ids) == 1
 
 
-def _visible_pixels_task(
+def _visible_pixels(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None
-) -> Task[_VisiblePixels]:
+) -> _VisiblePixels:
     """Find the pixels of some rows where the nearest surface has a field.
 
     Raises
@@ -351,7 +322,7 @@ def _visible_pixels_task(
     NothingInViewError
         If there is none.
     """
-    fragments, first_triangle = yield from rasterize_instances_task(instances, camera, rows)
+    fragments, first_triangle = rasterize_instances(instances, camera, rows)
     if len(instances) == 1:
         if not len(fragments.pixel):
             raise_nothing_in_view(instances, camera)
@@ -359,8 +330,8 @@ def _visible_pixels_task(
             fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0]
         )
     instance_has_field = np.array([instance.field is not None for instance in instances])
-    task = _split_triangles_task(first_triangle, fragments.triangle)
-    instance_id, triangle = yield from subtask(task, 1.0, 1.0)
+    with progress(1.0):
+        instance_id, triangle = _split_triangles(first_triangle, fragments.triangle)
     has_field = instance_has_field[instance_id]
     if not has_field.any():
         raise_nothing_in_view(instances, camera)
@@ -369,19 +340,16 @@ def _visible_pixels_task(
         instance_id, triangle = instance_id[field_pixels], triangle[field_pixels]
         collected = []
         for values in fragments:
-            yield Progress(1.0, "finding visible pixels")
+            report(1.0, "finding visible pixels")
             collected.append(values[field_pixels])
         fragments = Fragments(*collected)
     visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
     return _VisiblePixels(fragments, instance_id, triangle, visible_ids)
 
 
-def _visible_samples_task(
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    samples: int,
-    rows: tuple[int, int] | None,
-) -> Task[tuple[_VisiblePixels, SampledTriangles, np.ndarray, np.ndarray]]:
+def _visible_samples(
+    instances: Sequence[MeshInstance], camera: Camera, samples: int, rows: tuple[int, int] | None
+) -> tuple[_VisiblePixels, SampledTriangles, np.ndarray, np.ndarray]:
     """Find the visible triangles at all samples, and what is visible at the center of each pixel.
 
     Returns
@@ -396,28 +364,27 @@ def _visible_samples_task(
     has_field = np.concatenate(
         [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
     )
-    task = rasterize_samples_task(
-        clip, triangles, has_field, camera.width, camera.height, samples, rows
-    )
-    sampled = yield from subtask(task, 0.0, 0.8)
+    with progress(0.0, 0.8):
+        sampled = rasterize_samples(
+            clip, triangles, has_field, camera.width, camera.height, samples, rows
+        )
     if not len(sampled.pixel):
         raise_nothing_in_view(instances, camera)
     pixel = sampled.pixel
-    weights, front_facing = yield from subtask(
-        barycentrics_task(clip, triangles, pixel, sampled.triangle, camera.width, camera.height),
-        0.8,
-        1.0,
-    )
+    with progress(0.8, 1.0):
+        weights, front_facing = barycentrics(
+            clip, triangles, pixel, sampled.triangle, camera.width, camera.height
+        )
     fragments = Fragments(pixel, sampled.triangle, weights, front_facing, sampled.depth)
-    instance_id, triangle = yield from _split_triangles_task(first_triangle, sampled.triangle)
+    instance_id, triangle = _split_triangles(first_triangle, sampled.triangle)
     visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
-    other = yield from _split_triangles_task(first_triangle, sampled.other_triangle)
+    other = _split_triangles(first_triangle, sampled.other_triangle)
     return _VisiblePixels(fragments, instance_id, triangle, visible_ids), sampled, *other
 
 
-def _split_triangles_task(
+def _split_triangles(
     first_triangle: np.ndarray, triangle: np.ndarray
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the instances of (n,) triangles, and the triangles counted within them, as int32.
 
     `first_triangle` is that of `all_triangles`.
@@ -426,21 +393,14 @@ def _split_triangles_task(
         return np.zeros(len(triangle), dtype=np.int32), triangle
     instance_id = np.empty(len(triangle), dtype=np.int32)
     for block in pixel_blocks(len(triangle)):
-        yield Progress(1.0, "finding visible pixels")
+        report(1.0, "finding visible pixels")
         instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1
     return instance_id, triangle - first_triangle[instance_id]
 
 
 def rasterize_instances(
-    instances: Sequence[MeshInstance], camera: Camera
-) -> tuple[Fragments, np.ndarray]:
-    """Rasterize mesh instances, without progress reports; see `rasterize_instances_task`."""
-    return run_to_completion(rasterize_instances_task(instances, camera))
-
-
-def rasterize_instances_task(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None = None
-) -> Task[tuple[Fragments, np.ndarray]]:
+) -> tuple[Fragments, np.ndarray]:
     """Rasterize all mesh instances together, in all rows of the frame or some.
 
     Returns
@@ -451,7 +411,7 @@ def rasterize_instances_task(
         Index of the first triangle of each of the B instances in this count.
     """
     clip, triangles, first_triangle = all_triangles(instances, camera)
-    fragments = yield from rasterize_task(clip, triangles, camera.width, camera.height, rows)
+    fragments = rasterize(clip, triangles, camera.width, camera.height, rows)
     return fragments, first_triangle
 
 
@@ -514,9 +474,9 @@ def _has_vertex_in_frame(instance: MeshInstance, camera: Camera) -> bool:
     return bool((np.maximum(np.abs(x), np.maximum(np.abs(y), np.abs(z))) <= w).any())
 
 
-def _new_gbuffer_task(
+def _new_gbuffer(
     instances: Sequence[MeshInstance], camera: Camera, visible: _VisiblePixels
-) -> Task[GBuffer]:
+) -> GBuffer:
     """Return a G-buffer whose normals and representation are not yet initialized."""
     count = len(visible.instance_id)
     fragments = visible.fragments
@@ -524,7 +484,7 @@ def _new_gbuffer_task(
     face_of_triangle = np.concatenate([instance.surface.triangle_face for instance in instances])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
     for block in pixel_blocks(count):
-        yield Progress(block.start / count, "finding visible pixels")
+        report(block.start / count, "finding visible pixels")
         face[block] = face_of_triangle.take(fragments.triangle[block])
         x, y = pixel_rays(camera, fragments.pixel[block])
         position[block, 2] = z_at_depth(camera, x, y, fragments.depth[block])
@@ -569,9 +529,9 @@ def _empty_vectors(count: int) -> np.ndarray:
 # --- pixels --------------------------------------------------------------------------------------
 
 
-def _fill_instances_task(
+def _fill_instances(
     gbuffer: GBuffer, visible: _VisiblePixels, display: str, cache: Cache | None
-) -> Task[dict[int, np.ndarray]]:
+) -> dict[int, np.ndarray]:
     """Write the normals, the representation and the channels of a new G-buffer.
 
     Returns
@@ -598,18 +558,15 @@ def _fill_instances_task(
                 pixels_done + len(triangle),
             )
         )
-        corner_field = yield from subtask(
-            cached_corner_field_task(
+        with progress(start, midpoint):
+            corner_field = cached_corner_field(
                 instance.surface, instance.matrix, instance.field, display, cache
-            ),
-            start,
-            midpoint,
-        )
+            )
         corner_field = corner_field.rotated(camera.view[:3, :3])
         geometric_normals[instance_id] = corner_field.geometric_normal
         _allocate_channels(gbuffer, corner_field)
         for block in pixel_blocks(len(triangle)):
-            yield Progress(
+            report(
                 midpoint + (stop - midpoint) * block.start / len(triangle),
                 "rotating the field into the view plane",
             )

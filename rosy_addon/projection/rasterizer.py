@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 
 #: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
 BLOCK_SIZE = 1 << 14
@@ -152,19 +152,12 @@ class _Spans(NamedTuple):
 
 
 def rasterize(
-    clip_vertices: np.ndarray, triangles: np.ndarray, width: int, height: int
-) -> Fragments:
-    """Return the fragments of triangles, without progress reports; see `rasterize_task`."""
-    return run_to_completion(rasterize_task(clip_vertices, triangles, width, height))
-
-
-def rasterize_task(
     clip_vertices: np.ndarray,
     triangles: np.ndarray,
     width: int,
     height: int,
     rows: tuple[int, int] | None = None,
-) -> Task[Fragments]:
+) -> Fragments:
     """Find the nearest triangle at the center of every pixel.
 
     Both sides of a triangle are drawn. Of triangles at exactly the same depth, the one with the
@@ -195,19 +188,19 @@ def rasterize_task(
     band_rows = max(1, MAX_BAND_PIXELS // width)
     for row_start in range(first_row, stop_row, band_rows):
         row_stop = min(row_start + band_rows, stop_row)
-        rasterize_rows = _rasterize_rows_task(screen, clipped, width, row_start, row_stop)
-        triangle, depth = yield from subtask(
-            rasterize_rows, 0.7 * row_start / height, 0.7 * row_stop / height
-        )
+        with progress(0.7 * row_start / height, 0.7 * row_stop / height):
+            triangle, depth = _rasterize_rows(screen, clipped, width, row_start, row_stop)
         pixel = np.flatnonzero(triangle >= 0)
         bands.append(((pixel + row_start * width).astype(np.int32), triangle[pixel], depth[pixel]))
     pixel, triangle, depth = (np.concatenate(values) for values in zip(*bands, strict=True))
-    task = barycentrics_task(clip_vertices, triangles, pixel, triangle, width, height)
-    weights, front_facing = yield from subtask(task, 0.7, 1.0)
+    with progress(0.7, 1.0):
+        weights, front_facing = barycentrics(
+            clip_vertices, triangles, pixel, triangle, width, height
+        )
     return Fragments(pixel, triangle, weights, front_facing, depth)
 
 
-def rasterize_samples_task(
+def rasterize_samples(
     clip_vertices: np.ndarray,
     triangles: np.ndarray,
     is_drawn: np.ndarray,
@@ -215,13 +208,13 @@ def rasterize_samples_task(
     height: int,
     samples: int,
     rows: tuple[int, int] | None = None,
-) -> Task[SampledTriangles]:
+) -> SampledTriangles:
     """Find the nearest triangle at several samples of each pixel, on a square grid.
 
     Parameters
     ----------
     clip_vertices, triangles, width, height, rows
-        As of `rasterize_task`.
+        As of `rasterize`.
     is_drawn : (T,) bool ndarray
         Triangles that are not drawn only hide others.
     samples : int
@@ -240,29 +233,30 @@ def rasterize_samples_task(
         row_stop = min(row_start + band_rows, stop_row)
         buffers = []
         for scale, screen in screens:
-            task = _rasterize_rows_task(
-                screen, clipped, width * scale, row_start * scale, row_stop * scale
-            )
-            triangle, depth = yield from subtask(task, row_start / height, row_stop / height)
+            with progress(row_start / height, row_stop / height):
+                triangle, depth = _rasterize_rows(
+                    screen, clipped, width * scale, row_start * scale, row_stop * scale
+                )
             if not is_drawn.all():
                 triangle[~is_drawn.take(triangle, mode="clip")] = -1
             buffers += (
                 triangle.reshape(-1, scale, width, scale),
                 depth.reshape(-1, scale, width, scale),
             )
-        band = yield from subtask(_group_samples_task(*buffers, row_start), 1.0, 1.0)
+        with progress(1.0):
+            band = _group_samples(*buffers, row_start)
         bands.append(band._replace(other_entry=band.other_entry + np.int32(entry_count)))
         entry_count += len(band.pixel)
     return SampledTriangles(*(np.concatenate(values) for values in zip(*bands, strict=True)))
 
 
-def _group_samples_task(
+def _group_samples(
     center_triangle: np.ndarray,
     center_depth: np.ndarray,
     triangle: np.ndarray,
     depth: np.ndarray,
     first_row: int,
-) -> Task[SampledTriangles]:
+) -> SampledTriangles:
     """Group the samples of some rows by pixels.
 
     Parameters
@@ -282,7 +276,7 @@ def _group_samples_task(
     sample_places = [divmod(sample, samples) for sample in order]
     own_triangle, own_depth = center_triangle[:, 0, :, 0].copy(), center_depth[:, 0, :, 0].copy()
     for row, column in sample_places:
-        yield Progress(1.0, STEP_LABEL)
+        report(1.0, STEP_LABEL)
         empty = np.nonzero(own_triangle < 0)
         own_triangle[empty] = triangle[:, row, :, column][empty]
         own_depth[empty] = depth[:, row, :, column][empty]
@@ -293,7 +287,7 @@ def _group_samples_task(
     pixel_row, pixel_column = np.divmod(pixel.astype(np.int32), np.int32(width))
     pixel_row += np.int32(first_row)
     for row, column in sample_places:
-        yield Progress(1.0, STEP_LABEL)
+        report(1.0, STEP_LABEL)
         sample_triangle = triangle[:, row, :, column].ravel()[pixel]
         is_own = sample_triangle == own_triangle
         own_samples |= is_own.astype(np.uint16) << np.uint16(row * samples + column)
@@ -419,9 +413,9 @@ def _to_screen(vertices: np.ndarray, width: int, height: int) -> _ScreenVertices
     return _ScreenVertices(x, y, z * inverse_w, row << 16 | column)
 
 
-def _rasterize_rows_task(
+def _rasterize_rows(
     screen: _ScreenVertices, clipped: _ClippedTriangles, width: int, row_start: int, row_stop: int
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Rasterize the rows from `row_start` up to, but not including, `row_stop`.
 
     Returns
@@ -441,7 +435,7 @@ def _rasterize_rows_task(
         for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
             spans.start[:] -= row_start * width
             for span_block in blocks_by_count(spans.count, BLOCK_SIZE):
-                yield Progress(start / len(clipped.triangle), STEP_LABEL)
+                report(start / len(clipped.triangle), STEP_LABEL)
                 _depth_test(
                     _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
                 )
@@ -651,14 +645,14 @@ def _depth_plane(a: _ScreenCorner, b: _ScreenCorner, c: _ScreenCorner) -> tuple[
     return slope_x, slope_y, a.depth - slope_x * a.x - slope_y * a.y, min_depth, max_depth
 
 
-def barycentrics_task(
+def barycentrics(
     vertices: np.ndarray,
     triangles: np.ndarray,
     pixel: np.ndarray,
     triangle: np.ndarray,
     width: int,
     height: int,
-) -> Task[tuple[np.ndarray, np.ndarray]]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Compute perspective-correct barycentric coordinates at pixel centers, in unclipped triangles.
 
     Uses homogeneous edge functions (Olano and Greer, "Triangle Scan Conversion using 2D Homogeneous
@@ -679,7 +673,7 @@ def barycentrics_task(
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
     for start in range(0, len(pixel), BLOCK_SIZE):
-        yield Progress(start / len(pixel), STEP_LABEL)
+        report(start / len(pixel), STEP_LABEL)
         block = slice(start, start + BLOCK_SIZE)
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..field.frames import transform_components
 from ..field.surface import Surface, box_corners
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report
 from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
@@ -79,11 +79,6 @@ class RestCoordinates:
 
 
 def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
-    """Compute rest coordinates, without progress reports; see `rest_coordinates_task`."""
-    return run_to_completion(rest_coordinates_task(gbuffer))
-
-
-def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
     """Compute the positions of the pixels of a G-buffer on the rest shapes.
 
     Parameters
@@ -95,7 +90,7 @@ def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
     -------
     RestCoordinates
     """
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     count = len(gbuffer.pixel)
     coordinates = RestCoordinates(
         *(np.empty((3, count), dtype=np.float32) for _ in range(3)),
@@ -113,7 +108,7 @@ def rest_coordinates_task(gbuffer: GBuffer) -> Task[RestCoordinates]:
             pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
         instance_count = count if pixels is None else len(pixels)
         for block in pixel_blocks(instance_count):
-            yield Progress((done + block.start) / count, STEP_LABEL)
+            report((done + block.start) / count, STEP_LABEL)
             part = block if pixels is None else pixels[block]
             _fill_pixels(coordinates, gbuffer, instance, rest, screen, part)
         done += instance_count

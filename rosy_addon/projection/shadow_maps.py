@@ -14,11 +14,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..field.frames import normalize
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .camera import Camera, look_at, orthographic_camera, perspective_camera
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
-from .project import rasterize_instances_task
+from .project import rasterize_instances
 
 #: Default width and height of a shadow map, in pixels.
 SHADOW_MAP_SIZE = 2048
@@ -148,13 +148,8 @@ def _point_cameras(
 
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
-    """Return a depth map, without progress reports; see `depth_map_task`."""
-    return run_to_completion(depth_map_task(instances, camera))
-
-
-def depth_map_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[np.ndarray]:
     """(H, W) float32 depth of the nearest surface along the camera axis; inf if there is none."""
-    fragments, _ = yield from rasterize_instances_task(instances, camera)
+    fragments, _ = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
     m_z, m_w = camera.projection[2, 2:]
     if camera.is_perspective:
@@ -165,11 +160,6 @@ def depth_map_task(instances: Sequence[MeshInstance], camera: Camera) -> Task[np
 
 
 def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray:
-    """Return the visibility of a light, without progress reports; see `shadow_visibility_task`."""
-    return run_to_completion(shadow_visibility_task(gbuffer, cameras))
-
-
-def shadow_visibility_task(gbuffer: GBuffer, cameras: Sequence[Camera]) -> Task[np.ndarray]:
     """Compute the visibility of a light at the pixels of a G-buffer.
 
     Parameters
@@ -188,12 +178,11 @@ def shadow_visibility_task(gbuffer: GBuffer, cameras: Sequence[Camera]) -> Task[
     result = np.ones(len(gbuffer.pixel), dtype=np.float32)
     for index, camera in enumerate(cameras):
         rendered, done = (index + 0.5) / len(cameras), (index + 1) / len(cameras)
-        depth_map = yield from subtask(
-            depth_map_task(gbuffer.instances, camera), index / len(cameras), rendered, STEP_LABEL
-        )
+        with progress(index / len(cameras), rendered, STEP_LABEL):
+            depth_map = render_depth_map(gbuffer.instances, camera)
         for block in pixel_blocks(len(result)):
             fraction = rendered + (done - rendered) * block.start / len(result)
-            yield Progress(fraction, STEP_LABEL)
+            report(fraction, STEP_LABEL)
             points = (gbuffer.position[block] - translation) @ rotation
             result[block] *= visibility_from(
                 camera, depth_map, points, gbuffer.normal[block] @ rotation

@@ -7,20 +7,21 @@ stretch with the surface. It is evaluated at the visible pixels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..cache import Cache, content_hash
-from ..field.bisection import BisectionTree, bisection_task
+from ..field.bisection import BisectionTree, bisect
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
-from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern_task
-from ..field.surface import Surface, surface_task
+from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern
+from ..field.surface import Surface, build_surface
 from ..memory import check_memory
-from ..progress import Progress, Task, subtask
-from .corner_field import CornerField, corner_field_task
+from ..progress import progress, report
+from .corner_field import CornerField, compute_corner_field
 from .face_values import SIMILARITY_EPS
 from .fan_values import transport_phase
 from .field_channel import rotation_order
@@ -73,7 +74,7 @@ def rest_matrix(matrix: np.ndarray) -> np.ndarray:
     return (axes * np.sqrt(np.maximum(values, 0))) @ axes.T
 
 
-def cached_surface_lines_task(
+def cached_surface_lines(
     surface: Surface,
     matrix: np.ndarray,
     field: RosyField,
@@ -81,8 +82,8 @@ def cached_surface_lines_task(
     spacing: float,
     cache: Cache | None = None,
     max_triangles: int = MAX_TRIANGLES,
-) -> Task[SurfaceLines]:
-    """Do the same as `surface_lines_task`, with results stored in a cache if one is given.
+) -> SurfaceLines:
+    """Do the same as `surface_lines`, with results stored in a cache if one is given.
 
     Lines are shared by all cameras, and by instances of equal size.
     """
@@ -93,13 +94,11 @@ def cached_surface_lines_task(
     stretch = np.round(stretch / scale, 5)
     args = surface, stretch, field, display, spacing, max_triangles
     if cache is None:
-        return (yield from surface_lines_task(*args))
+        return surface_lines(*args)
     content = _content(surface, field), stretch.tobytes()
-    return (
-        yield from cache.get_or_create_task(
-            ("surface lines", *content, display, spacing, max_triangles),
-            lambda: surface_lines_task(*args),
-        )
+    return cache.get_or_create(
+        ("surface lines", *content, display, spacing, max_triangles),
+        partial(surface_lines, *args),
     )
 
 
@@ -120,14 +119,14 @@ def _content(surface: Surface, field: RosyField) -> bytes:
     )
 
 
-def surface_lines_task(
+def surface_lines(
     surface: Surface,
     stretch: np.ndarray,
     field: RosyField,
     display: str,
     spacing: float,
     max_triangles: int = MAX_TRIANGLES,
-) -> Task[SurfaceLines]:
+) -> SurfaceLines:
     """Compute evenly spaced lines along all directions of a field.
 
     Parameters
@@ -137,15 +136,11 @@ def surface_lines_task(
         A map of the rest shape to the shape on which distances are measured.
     field : RosyField
     display : {"smooth", "flat"}
-        As for `corner_field_task`.
+        As for `compute_corner_field`.
     spacing : float
         Distance between neighboring lines after `stretch`.
     max_triangles : int
         Largest number of triangles on which the phase is computed, unless the mesh has more.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -157,11 +152,11 @@ def surface_lines_task(
         If that needs more memory than there is.
     """
     label = "spacing lines"
-    yield Progress(0.0, label)
+    report(0.0, label)
     rest = surface
     if surface.rest_vertices is not None:
-        rest = yield from subtask(
-            surface_task(
+        with progress(0.0, 0.05, label):
+            rest = build_surface(
                 surface.rest_vertices,
                 surface.corner_vertex,
                 surface.face_start,
@@ -169,30 +164,25 @@ def surface_lines_task(
                 corner_fan=surface.corner_fan,
                 triangles=surface.triangles,
                 triangle_face=surface.triangle_face,
-            ),
-            0.0,
-            0.05,
-            label,
-        )
+            )
     matrix = np.eye(4)
     matrix[:3, :3] = stretch
-    corner_field = yield from subtask(
-        corner_field_task(rest, matrix, field, display), 0.05, 0.1, label
-    )
+    with progress(0.05, 0.1, label):
+        corner_field = compute_corner_field(rest, matrix, field, display)
     points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
     max_triangles = max(max_triangles, len(rest.triangles))
-    task = bisection_task(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
-    tree = yield from subtask(task, 0.1, 0.2, label)
+    with progress(0.1, 0.2, label):
+        tree = bisect(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
     count = len(tree.leaf_root)
     check_memory(
         count * (TRIANGLE_BYTES + FAMILY_BYTES * field_symmetry(field).line_count),
         f"{surface.name}: the spacing of lines on {count} triangles",
         "choose wider lines or streaks instead of even lines",
     )
-    yield Progress(0.2, label)
+    report(0.2, label)
     directions, heading = _leaf_directions(tree, points, rest, corner_field, field)
-    task = stripe_pattern_task(tree.leaf_vertex, directions, spacing)
-    pattern = yield from subtask(task, 0.25, 1.0, label)
+    with progress(0.25, 1.0, label):
+        pattern = stripe_pattern(tree.leaf_vertex, directions, spacing)
     return SurfaceLines(tree, pattern, heading)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import Progress, Task
+from ..progress import report
 from .camera import Camera
 from .clip_planes import is_cut_away
 from .gbuffer import MeshInstance
@@ -61,12 +61,12 @@ class ProjectedPoints:
         )
 
 
-def project_vertices_task(
+def project_vertices(
     instances: Sequence[MeshInstance],
     camera: Camera,
     vertices: Sequence[np.ndarray],
     clip_planes: np.ndarray | None = None,
-) -> Task[ProjectedPoints]:
+) -> ProjectedPoints:
     """Project vertices, and find those that no triangle hides.
 
     Parameters
@@ -79,16 +79,12 @@ def project_vertices_task(
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     ProjectedPoints
         Of the vertices of all instances, in their order.
     """
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
     first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances[:-1])])
     vertex = np.concatenate(
@@ -98,11 +94,10 @@ def project_vertices_task(
     def touches(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
         return (scene.triangles[triangle] == vertex[point][:, None]).any(axis=1)
 
-    task = _project_task(scene, scene.clip[vertex], scene.world[vertex], touches, STEP_LABEL)
-    return (yield from task)
+    return _project(scene, scene.clip[vertex], scene.world[vertex], touches, STEP_LABEL)
 
 
-def project_points_task(
+def project_points(
     instances: Sequence[MeshInstance],
     camera: Camera,
     triangle: np.ndarray,
@@ -110,7 +105,7 @@ def project_points_task(
     clip_planes: np.ndarray | None = None,
     *,
     finds_hidden: bool = True,
-) -> Task[ProjectedPoints]:
+) -> ProjectedPoints:
     """Project points in triangles, and find those that no other triangle hides.
 
     Parameters
@@ -126,15 +121,11 @@ def project_points_task(
     finds_hidden : bool
         Whether hidden points are told from visible ones; if not, all in the frame count as visible.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     ProjectedPoints
     """
-    yield Progress(0.0, POINTS_LABEL)
+    report(0.0, POINTS_LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
     corners = scene.triangles[triangle]
     point_clip, point_world = (
@@ -147,7 +138,7 @@ def project_points_task(
 
     if not finds_hidden:
         scene = replace(scene, triangles=scene.triangles[:0])
-    return (yield from _project_task(scene, point_clip, point_world, touches, POINTS_LABEL))
+    return _project(scene, point_clip, point_world, touches, POINTS_LABEL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,13 +175,13 @@ class _Scene:
         return -(world @ self.camera.view[2, :3] + self.camera.view[2, 3])
 
 
-def _project_task(
+def _project(
     scene: _Scene,
     clip: np.ndarray,
     world: np.ndarray,
     touches: Callable[[np.ndarray, np.ndarray], np.ndarray],
     label: str,
-) -> Task[ProjectedPoints]:
+) -> ProjectedPoints:
     """Project K points, given in clip space and in world space, and find the visible ones.
 
     `touches` tells whether the (n,) triangles of the scene contain (n,) points, by their numbers: they do not
@@ -219,7 +210,7 @@ def _project_task(
         tolerance,
     )
     for start in range(0, len(number), TRIANGLES_PER_STEP):
-        yield Progress(start / len(number), label)
+        report(start / len(number), label)
         left = np.flatnonzero(is_visible)
         for triangle, chosen in occluders.pairs(start, start + TRIANGLES_PER_STEP, ndc[left]):
             point = left[chosen]

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..annotation.arrow_marks import ArrowMarks, arrow_marks_task
-from ..annotation.draw_arrows import draw_arrows_task
+from ..annotation.arrow_marks import ArrowMarks, arrow_marks
+from ..annotation.draw_arrows import draw_arrows
 from ..cache import Cache
 from ..compositor.look_units import look_in_pixels
 from ..compositor.picture import Picture
-from ..progress import Task, subtask
+from ..progress import progress
 from .view_input import ViewInput
 
 #: Least length of an arrowhead, pixels.
 MIN_SIZE = 3.0
 
 
-def with_arrowheads_task(
-    picture: Picture, view: ViewInput, cache: Cache | None = None
-) -> Task[Picture]:
+def with_arrowheads(picture: Picture, view: ViewInput, cache: Cache | None = None) -> Picture:
     """Draw arrowheads over the picture of a view, if the look has them.
 
     Parameters
@@ -29,10 +27,6 @@ def with_arrowheads_task(
     cache : Cache, optional
         Stores corner fields.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Picture
@@ -40,19 +34,21 @@ def with_arrowheads_task(
     """
     if not view.look.arrows or view.draws_thresholds:
         return picture
-    marks = yield from subtask(view_arrows_task(view, cache), 0.0, 0.8)
+    with progress(0.0, 0.8):
+        marks = view_arrows(view, cache)
     if not len(marks):
         return picture
-    rgba = yield from subtask(draw_arrows_task(picture.rgba, marks), 0.8, 1.0)
+    with progress(0.8, 1.0):
+        rgba = draw_arrows(picture.rgba, marks)
     return replace(picture, rgba=rgba)
 
 
-def view_arrows_task(
+def view_arrows(
     view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
-) -> Task[ArrowMarks]:
-    """Find the arrowheads of a view whose look has them; see `arrow_marks_task`."""
+) -> ArrowMarks:
+    """Find the arrowheads of a view whose look has them; see `arrow_marks`."""
     look = look_in_pixels(view.look, view.sample_camera, view.instances)
-    return arrow_marks_task(
+    return arrow_marks(
         view.instances,
         view.camera,
         look.arrows,

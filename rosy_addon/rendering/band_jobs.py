@@ -12,10 +12,10 @@ import numpy as np
 
 from ..cache import Cache
 from ..compositor.band import Band
-from ..compositor.compose import compose_task
+from ..compositor.compose import compose
 from ..errors import NothingInViewError
-from ..progress import Progress, Task
-from ..projection.project import project_task
+from ..progress import report
+from ..projection.project import project
 from .view_input import ViewInput
 
 #: Seconds between two looks for a file.
@@ -60,7 +60,7 @@ class FileExchange:
         """Store an array for the band above."""
         write_array(self._path(self._job.index + 1, key), values)
 
-    def get_task(self, key: Hashable) -> Task[np.ndarray | None]:
+    def get(self, key: Hashable) -> np.ndarray | None:
         """Wait for an array of the band below, and return it; None if that band ends without it."""
         path, end = self._path(self._job.index, key), self._end_path(self._job.index)
         while True:
@@ -69,7 +69,7 @@ class FileExchange:
                 return np.load(path)
             if has_ended:
                 return None
-            yield Progress(1.0, "tracing streamlines")
+            report(1.0, "tracing streamlines")
             time.sleep(POLL_SECONDS)
 
     def end(self) -> None:
@@ -84,9 +84,9 @@ class FileExchange:
         return self._folder / f"{self._job.picture}-{receiver}-end"
 
 
-def draw_band_task(
+def draw_band(
     view: ViewInput, job: BandJob, exchange: FileExchange, cache: Cache | None = None
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Draw a band of a picture.
 
     Parameters
@@ -104,16 +104,19 @@ def draw_band_task(
     """
     camera, look = view.shaded_camera, view.look
     band = Band(*job.rows, job.context, exchange)
-    project = project_task(
-        view.instances, camera, look.display, cache, view.samples_per_side, band.rows(camera.height)
-    )
     try:
-        gbuffer = yield from project
+        gbuffer = project(
+            view.instances,
+            camera,
+            look.display,
+            cache,
+            view.samples_per_side,
+            band.rows(camera.height),
+        )
     except NothingInViewError:
         exchange.end()
         return np.zeros((0, camera.width, 4), dtype=np.float32)
-    compose = compose_task(gbuffer, look, view.lights, view.reference, mesh_cache=cache, band=band)
-    picture = yield from compose
+    picture = compose(gbuffer, look, view.lights, view.reference, mesh_cache=cache, band=band)
     exchange.end()
     return picture.rgba
 

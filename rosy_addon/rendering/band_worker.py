@@ -12,10 +12,11 @@ import signal
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from ..cache import Cache
-from .band_jobs import FileExchange, draw_band_task, result_path, write_array
+from .band_jobs import FileExchange, draw_band, result_path, write_array
 
 #: Seconds between two signs of life. Writing one fails once the other process has ended.
 BEAT_SECONDS = 2.0
@@ -56,7 +57,7 @@ def _draw_bands(folder: Path) -> None:
             instances = pickle.loads((folder / scene_name).read_bytes())
         view, job = pickle.loads((folder / job_name).read_bytes())
         view = replace(view, instances=instances)
-        task = draw_band_task(view, job, FileExchange(folder, job), cache)
+        task = partial(draw_band, view, job, FileExchange(folder, job), cache)
         last_beat = time.monotonic()
         while True:
             try:

@@ -27,10 +27,10 @@ import numpy as np
 
 from ..cache import Cache
 from ..compositor.band_division import context_rows, divide_rows
-from ..progress import Progress, Task
+from ..progress import Progress, Task, as_task, report, run_with_report
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import raise_nothing_in_view
-from .band_jobs import POLL_SECONDS, BandJob, FileExchange, draw_band_task, result_path
+from .band_jobs import POLL_SECONDS, BandJob, FileExchange, draw_band, result_path
 from .view_input import ViewInput
 
 #: The program of a worker. It imports `rendering.band_worker`, but no module of the packages above it.
@@ -122,9 +122,9 @@ class BandWorkers:
         bands_of_each = -(-camera.width * camera.height // (MAX_PIXELS_AT_A_TIME * self.count))
         return divide_rows(view.look, camera, view.instances, self.count * bands_of_each)
 
-    def draw_task(
+    def draw(
         self, view: ViewInput, rows: Sequence[tuple[int, int]], cache: Cache | None = None
-    ) -> Task[np.ndarray | None]:
+    ) -> np.ndarray | None:
         """Draw a picture in bands. If the task is closed, the processes end.
 
         Parameters
@@ -146,7 +146,7 @@ class BandWorkers:
             As of `Renderer.render_task`.
         """
         try:
-            return (yield from self._draw_task(view, rows, cache))
+            return run_with_report(self._draw_task(view, rows, cache), report)
         except OSError:
             self.close()
             return None
@@ -179,7 +179,7 @@ class BandWorkers:
                     given[process] = waiting.popleft()
                     self._send(process, view, given[process])
             for job in begun:
-                own[job] = draw_band_task(view, job, FileExchange(self._folder, job), cache)
+                own[job] = as_task(draw_band, view, job, FileExchange(self._folder, job), cache)
             progress = Progress(0.0, WAITING_LABEL)
             if own:
                 job = min(own)

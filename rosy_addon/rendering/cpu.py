@@ -6,18 +6,18 @@ from contextlib import suppress
 
 from ..cache import Cache
 from ..compositor.color_values import check_color_values
-from ..compositor.compose import compose_task
+from ..compositor.compose import compose
 from ..compositor.picture import Picture
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
 from ..errors import RosyError
-from ..progress import Task, subtask
+from ..progress import Task, as_task, progress, subtask
 from ..projection.gbuffer import GBuffer
-from ..projection.project import cached_project_task, check_instances, project_task
-from .arrowheads import with_arrowheads_task
+from ..projection.project import cached_project, check_instances, project
+from .arrowheads import with_arrowheads
 from .band_workers import BandWorkers
 from .picture_memory import check_picture_memory
-from .singularities import with_singularities_task
+from .singularities import with_singularities
 from .view_input import ViewInput
 
 #: Share of the progress bar that projecting takes.
@@ -55,31 +55,36 @@ class CpuRenderer:
 
     def render_task(self, view: ViewInput) -> Task[Picture]:
         """As `Renderer.render_task`."""
-        picture = yield from subtask(self._picture_task(view), 0.0, 0.97)
-        picture = yield from subtask(with_arrowheads_task(picture, view, self._cache), 0.97, 0.99)
-        return (yield from subtask(with_singularities_task(picture, view, self._cache), 0.99, 1.0))
+        picture = yield from subtask(as_task(self._picture, view), 0.0, 0.97)
+        picture = yield from subtask(
+            as_task(with_arrowheads, picture, view, self._cache), 0.97, 0.99
+        )
+        return (
+            yield from subtask(as_task(with_singularities, picture, view, self._cache), 0.99, 1.0)
+        )
 
-    def _picture_task(self, view: ViewInput) -> Task[Picture]:
+    def _picture(self, view: ViewInput) -> Picture:
         """Draw the picture without arrowheads and singularities."""
         check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
         if not view.draws_thresholds:
             check_color_values(view.look, view.instances)
         rows = self._checked_bands(view)
         if len(rows) > 1:
-            rgba = yield from self._workers.draw_task(view, rows, self._cache)
+            rgba = self._workers.draw(view, rows, self._cache)
             if rgba is not None:
                 return Picture(rgba, (), color_range=fixed_color_range(view.look, view.instances))
-        gbuffer = yield from subtask(self._gbuffer_task(view), 0.0, PROJECTION_SHARE)
-        compose = compose_task(
-            gbuffer,
-            view.look,
-            view.lights,
-            view.reference,
-            self._gbuffer_cache,
-            self._cache,
-            draws_thresholds=view.draws_thresholds,
-        )
-        return (yield from subtask(compose, PROJECTION_SHARE, 1.0))
+        with progress(0.0, PROJECTION_SHARE):
+            gbuffer = self._gbuffer(view)
+        with progress(PROJECTION_SHARE, 1.0):
+            return compose(
+                gbuffer,
+                view.look,
+                view.lights,
+                view.reference,
+                self._gbuffer_cache,
+                self._cache,
+                draws_thresholds=view.draws_thresholds,
+            )
 
     def _checked_bands(self, view: ViewInput) -> list[tuple[int, int]]:
         """Return the rows of the bands that the workers draw, for which there is enough memory.
@@ -101,10 +106,10 @@ class CpuRenderer:
             check_picture_memory(view)
         return []
 
-    def _gbuffer_task(self, view: ViewInput) -> Task[GBuffer]:
+    def _gbuffer(self, view: ViewInput) -> GBuffer:
         """Return the G-buffer from the cache, or project the meshes."""
         instances, camera, display = view.instances, view.shaded_camera, view.look.display
         samples = view.samples_per_side
         if self._gbuffer_cache is None:
-            return project_task(instances, camera, display, self._cache, samples)
-        return cached_project_task(instances, camera, display, self._gbuffer_cache, samples)
+            return project(instances, camera, display, self._cache, samples)
+        return cached_project(instances, camera, display, self._gbuffer_cache, samples)

@@ -7,22 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..annotation.draw_marks import draw_marks_task
+from ..annotation.draw_marks import draw_marks
 from ..annotation.key_contents import PictureKey, sorted_indices
-from ..annotation.singularity_marks import cached_singularities_task, singularity_marks_task
+from ..annotation.singularity_marks import cached_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..compositor.look import Look
 from ..compositor.picture import Picture
 from ..compositor.picture_key import color_scale_of, fixed_color_range
-from ..progress import Task, subtask
+from ..progress import progress
 from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
 
-def with_singularities_task(
-    picture: Picture, view: ViewInput, cache: Cache | None = None
-) -> Task[Picture]:
+def with_singularities(picture: Picture, view: ViewInput, cache: Cache | None = None) -> Picture:
     """Draw the singularities of a view over its picture, if the look shows them.
 
     Parameters
@@ -33,10 +31,6 @@ def with_singularities_task(
     cache : Cache, optional
         Stores the singularities of fields.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Picture
@@ -44,15 +38,16 @@ def with_singularities_task(
     """
     if not shows_singularities(view.look) or view.draws_thresholds:
         return picture
-    task = singularity_marks_task(view.instances, view.camera, view.look, view.clip_planes, cache)
-    marks = yield from subtask(task, 0.0, 0.8)
-    rgba = yield from subtask(draw_marks_task(picture.rgba, marks), 0.8, 1.0)
+    with progress(0.0, 0.8):
+        marks = singularity_marks(view.instances, view.camera, view.look, view.clip_planes, cache)
+    with progress(0.8, 1.0):
+        rgba = draw_marks(picture.rgba, marks)
     return replace(picture, rgba=rgba, marks=marks)
 
 
-def sequence_key_task(
+def sequence_key(
     instances: Sequence[MeshInstance], look: Look, cache: Cache | None = None
-) -> Task[PictureKey]:
+) -> PictureKey:
     """Find what the key of an animation says.
 
     It is true of all frames: the range of the colors is known only if the look sets it, and the
@@ -66,10 +61,6 @@ def sequence_key_task(
     cache : Cache, optional
         Stores the singularities of fields.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     PictureKey
@@ -79,9 +70,9 @@ def sequence_key_task(
         cache = Cache() if cache is None else cache
         for number, instance in enumerate(instances):
             if instance.field is not None:
-                task = cached_singularities_task(instance, cache)
                 start, stop = number / len(instances), (number + 1) / len(instances)
-                _, index = yield from subtask(task, start, stop)
+                with progress(start, stop):
+                    _, index = cached_singularities(instance, cache)
                 kinds.append(np.stack([index, np.full(len(index), instance.field.degree)], axis=1))
     return PictureKey(
         color_scale_of(look, fixed_color_range(look)),

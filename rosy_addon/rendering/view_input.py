@@ -49,7 +49,7 @@ class ViewInput:
     clip_planes : (6, 4) float64 ndarray or None
         World space. The negative side of each plane is cut away.
     draws_thresholds : bool
-        Whether the picture has the thresholds of its ink; see `compose_task`. Only `CpuRenderer` draws
+        Whether the picture has the thresholds of its ink; see `compose`. Only `CpuRenderer` draws
         them.
     """
 

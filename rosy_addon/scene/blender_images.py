@@ -14,8 +14,8 @@ from ..color import to_linear
 from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_writable, make_folder, replacing, write_bytes
-from ..image_io.png import png_task
-from ..progress import Progress, Task, subtask
+from ..image_io.png import compute_png
+from ..progress import progress, report
 
 #: Pixels by which colors are extended past the border of the covered area. A render whose
 #: silhouette differs slightly (other subdivision, filtering) then still samples the picture.
@@ -46,7 +46,7 @@ class ImageData(NamedTuple):
     png: bytes | None = None
 
 
-def image_data_task(picture: Picture, *, as_float: bool) -> Task[ImageData]:
+def compute_image_data(picture: Picture, *, as_float: bool) -> ImageData:
     """Convert a picture for a Blender image.
 
     Parameters
@@ -59,11 +59,13 @@ def image_data_task(picture: Picture, *, as_float: bool) -> Task[ImageData]:
     -------
     ImageData
     """
-    pixels = yield from subtask(_bleed_task(picture.rgba), 0.0, 0.5)
+    with progress(0.0, 0.5):
+        pixels = _bleed(picture.rgba)
     if picture.spread is not None:
         spread = picture.rgba.copy()
         spread[..., 0] = picture.spread
-        spread = yield from subtask(_bleed_task(spread), 0.5, 0.5)
+        with progress(0.5):
+            spread = _bleed(spread)
         # Where nothing was drawn, the ink is a mean tone.
         is_blank = spread[..., 3] == 0
         is_blank &= (pixels[..., :3] == NEUTRAL_GRAY).all(axis=2)
@@ -71,16 +73,16 @@ def image_data_task(picture: Picture, *, as_float: bool) -> Task[ImageData]:
         pixels[is_blank] = (0.5, 0.5, 0.5, 1 / 3)
     if as_float:
         return ImageData(pixels)
-    png = png_task(pixels, is_color=picture.spread is None)
-    return ImageData(pixels, (yield from subtask(png, 0.5, 1.0, STEP_LABEL)))
+    with progress(0.5, 1.0, STEP_LABEL):
+        return ImageData(pixels, compute_png(pixels, is_color=picture.spread is None))
 
 
-def _bleed_task(rgba: np.ndarray) -> Task[np.ndarray]:
+def _bleed(rgba: np.ndarray) -> np.ndarray:
     """Return `with_bleed` of a picture, a few rows at a time."""
     height = len(rgba)
     pixels = np.empty(rgba.shape, dtype=np.float32)
     for start in range(0, height, BLOCK_ROWS):
-        yield Progress(start / height, STEP_LABEL)
+        report(start / height, STEP_LABEL)
         first = max(start - BLEED_PIXELS, 0)
         block = with_bleed(rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
         pixels[start : start + BLOCK_ROWS] = block[start - first :][:BLOCK_ROWS]
@@ -102,7 +104,7 @@ def new_image(
     name : str
         Name of the datablock.
     image_data : ImageData
-        From `image_data_task`, with the same parameters.
+        From `compute_image_data`, with the same parameters.
     as_float : bool
         Whether linear values are stored in single precision.
     is_color : bool

@@ -18,7 +18,7 @@ from ..field.validate import (
     project_to_tangent,
     tangent_normals,
 )
-from ..progress import Progress, Task, run_to_completion
+from ..progress import report, run_to_completion
 from .field_attributes import VECTOR_TYPE, field_values, surface_key
 from .meshes import read_attribute
 from .rest_shape import follow_mesh, read_rest_shape
@@ -99,7 +99,7 @@ def evaluated_field_reader(
     nonfinite: str,
     label: str,
     cache: Cache | None = None,
-) -> Callable[[Surface], Task[RosyField]]:
+) -> Callable[[Surface], RosyField]:
     """Read the field of an evaluated mesh, whose faces a modifier may have created.
 
     The arrays are read at once. The function that is returned makes a task that builds the field
@@ -141,13 +141,11 @@ def evaluated_field_reader(
         read_attribute(mesh, name, np.float32, 2) for name in layout.attribute_names[1:]
     ]
 
-    def build_task(surface: Surface) -> Task[RosyField]:
+    def build(surface: Surface) -> RosyField:
         values = follow_mesh(rest_shape, stored_values, surface)
 
-        def field_task() -> Task[RosyField]:
-            vectors = yield from _transport_task(
-                values, original_normals, surface, source, nonfinite
-            )
+        def field() -> RosyField:
+            vectors = _transport(values, original_normals, surface, source, nonfinite)
             deviations = [pair.astype(np.float64) @ (1, 1j) for pair in deviation_pairs]
             return RosyField(
                 layout.degree,
@@ -156,44 +154,44 @@ def evaluated_field_reader(
                 layout.family_count,
             )
 
-        def with_surface_task() -> Task[tuple[Surface, RosyField]]:
-            return surface, (yield from field_task())
+        def with_surface() -> tuple[Surface, RosyField]:
+            return surface, field()
 
         if cache is None:
-            return (yield from field_task())
+            return field()
         key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
         if surface.rest_vertices is None:
             key = surface_key(surface, "evaluated", *key_parts)
-            return (yield from cache.get_or_create_task(key, with_surface_task))[1]
+            return cache.get_or_create(key, with_surface)[1]
         # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
         shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
         key = "evaluated field", content_hash(*shape, *key_parts)
-        return (yield from cache.get_or_create_task(key, field_task))
+        return cache.get_or_create(key, field)
 
-    return build_task
+    return build
 
 
-def _transport_task(
+def _transport(
     values: np.ndarray,
     original_normals: np.ndarray | None,
     surface: Surface,
     source: str,
     nonfinite: str,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Return the vectors, (F, 3) float64, transported from the original to the evaluated faces."""
     label = "reading the field"
     vectors = as_float64(values)
     apply_nonfinite_policy(vectors, source, "face", nonfinite)
-    yield Progress(0.0, label)
+    report(0.0, label)
     normals = tangent_normals(surface, "face")
-    yield Progress(0.3, label)
+    report(0.3, label)
     if original_normals is not None:
         original_normals = normalize(original_normals.astype(np.float64))
         # A mirrored face has the opposite normal. Only its plane matters.
         original_normals *= np.where(dot(original_normals, normals) < 0, -1.0, 1.0)[:, None]
-        yield Progress(0.4, label)
+        report(0.4, label)
         vectors = project_to_tangent(vectors, original_normals, 180.0, source, "face")
-        yield Progress(0.6, label)
+        report(0.6, label)
         vectors = transport(vectors, original_normals, normals)
-        yield Progress(0.7, label)
+        report(0.7, label)
     return project_to_tangent(vectors, normals, 180.0, source, "face")

@@ -23,7 +23,6 @@ from ..cache import Cache, content_hash
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import Task, run_to_completion
 from .compat import has_rosy_properties
 
 DEFAULT_FIELD_NAME = "rosy"
@@ -146,28 +145,28 @@ def cached_field(
 ) -> RosyField:
     """Return the cached field for a surface and other inputs, or build it."""
 
-    def build_task() -> Task[RosyField]:
-        yield from ()
+    def build() -> RosyField:
+        ()()
         return build_field()
 
-    return run_to_completion(cached_field_task(cache, surface, build_task, *key_parts))
+    return compute_cached_field(cache, surface, build, *key_parts)
 
 
-def cached_field_task(
+def compute_cached_field(
     cache: Cache | None,
     surface: Surface,
-    build_task: Callable[[], Task[RosyField]],
+    build_task: Callable[[], RosyField],
     *key_parts: object,
-) -> Task[RosyField]:
+) -> RosyField:
     """Return the cached field for a surface and other inputs, or build it in steps."""
     if cache is None:
-        return (yield from build_task())
+        return build_task()
     key = surface_key(surface, *key_parts)
 
-    def create_task() -> Task[tuple[Surface, RosyField]]:
-        return surface, (yield from build_task())
+    def create() -> tuple[Surface, RosyField]:
+        return surface, build_task()
 
-    return (yield from cache.get_or_create_task(key, create_task))[1]
+    return cache.get_or_create(key, create)[1]
 
 
 def surface_key(surface: Surface, *key_parts: object) -> Hashable:

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import RosyError
 from ..field.analysis import ErrorStatistics, angle_errors, error_statistics
-from ..field.singularities import singularities_task
-from ..field.singularity_matching import match_on_surface_task
-from ..progress import Progress, Task, subtask
+from ..field.singularities import find_singularities
+from ..field.singularity_matching import match_on_surface
+from ..progress import progress, report
 from .combed_guides import GUIDE_ATTRIBUTE
 from .field_attributes import (
     VECTOR_TYPE,
@@ -20,8 +20,8 @@ from .field_attributes import (
     check_attribute_type,
     get_or_create_attribute,
 )
-from .meshes import mesh_label, mesh_surface_task
-from .read_field import read_mesh_field_task
+from .meshes import mesh_label, mesh_surface
+from .read_field import read_mesh_field
 from .tangents import DEFAULT_TANGENT_NAME
 from .write_field import check_writable
 
@@ -69,9 +69,9 @@ def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
     ]
 
 
-def store_difference_task(
+def store_difference(
     mesh: bpy.types.Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
-) -> Task[FieldDifference]:
+) -> FieldDifference:
     """Compute the angle between the field of a mesh and another one, and store it on the faces.
 
     Parameters
@@ -81,10 +81,6 @@ def store_difference_task(
         Attribute of the other field. Its degree is that of the mesh. If empty, the only one that there is.
     name : str
         Attribute that gets the angles in degrees.
-
-    Yields
-    ------
-    Progress
 
     Raises
     ------
@@ -101,16 +97,20 @@ def store_difference_task(
         hint = f"choose {choice}" if choice else "make one with another name of the attribute"
         raise RosyError(f"{label}: needs another field to compare with: {hint}")
     check_attribute_type(mesh, name, "FLOAT")
-    surface = yield from subtask(mesh_surface_task(mesh, label), 0.0, 0.2)
-    field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.2, 0.4)
-    other_field = yield from subtask(
-        read_mesh_field_task(mesh, other, field.degree, surface), 0.4, 0.6
-    )
-    yield Progress(0.6, "comparing the fields")
+    with progress(0.0, 0.2):
+        surface = mesh_surface(mesh, label)
+    with progress(0.2, 0.4):
+        field = read_mesh_field(mesh, surface=surface)
+    with progress(0.4, 0.6):
+        other_field = read_mesh_field(mesh, other, field.degree, surface)
+    report(0.6, "comparing the fields")
     angles = angle_errors(surface, field, other_field)
-    own = yield from subtask(singularities_task(surface, field), 0.6, 0.75)
-    others = yield from subtask(singularities_task(surface, other_field), 0.75, 0.9)
-    matching = yield from subtask(match_on_surface_task(surface, own, others), 0.9, 1.0)
+    with progress(0.6, 0.75):
+        own = find_singularities(surface, field)
+    with progress(0.75, 0.9):
+        others = find_singularities(surface, other_field)
+    with progress(0.9, 1.0):
+        matching = match_on_surface(surface, own, others)
     attribute = get_or_create_attribute(mesh, name, "FLOAT")
     attribute.data.foreach_set("value", np.degrees(angles).astype(np.float32))
     mesh.update()

@@ -15,9 +15,8 @@ from ..color import LUMINANCE_WEIGHTS, from_hex, to_linear
 from ..compositor.look import is_hatched
 from ..compositor.picture import Picture
 from ..errors import RosyError
-from ..progress import run_to_completion
 from ..projection.camera import Camera
-from .blender_images import image_data_task, new_image
+from .blender_images import compute_image_data, new_image
 from .camera_planes import (
     add_camera_plane,
     frame_corners,
@@ -78,7 +77,7 @@ def _add_key(
         return
     name = f"RoSy Key {camera.name}"
     corners = frame_corners(view, DISTANCE * camera.data.clip_start)
-    image_data = run_to_completion(image_data_task(picture, as_float=False))
+    image_data = compute_image_data(picture, as_float=False)
     with rollback_on_error() as created:
         image = new_image(name, image_data)
         created.append(image)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import bpy
@@ -11,8 +12,8 @@ import numpy as np
 
 from ..cache import Cache, content_hash
 from ..errors import NoFeaturesError, RosyError
-from ..field.surface import Surface, smooth_fans_task, surface_task
-from ..progress import Task, run_to_completion, subtask
+from ..field.surface import Surface, build_surface, smooth_fans
+from ..progress import progress
 
 #: Marks of edges: RNA property, label, and description in the user interface.
 EDGE_MARKS = {
@@ -44,20 +45,6 @@ def mesh_surface(
     occluder_only: bool = False,
     cache: Cache | None = None,
 ) -> Surface:
-    """Run `mesh_surface_task` to its end."""
-    return run_to_completion(
-        mesh_surface_task(mesh, name, read_rest=read_rest, occluder_only=occluder_only, cache=cache)
-    )
-
-
-def mesh_surface_task(
-    mesh: bpy.types.Mesh,
-    name: str | None = None,
-    *,
-    read_rest: bool = False,
-    occluder_only: bool = False,
-    cache: Cache | None = None,
-) -> Task[Surface]:
     """Read the arrays of a mesh at once, and return a task that builds its surface from them.
 
     The task does not use the mesh, which may change or be deleted meanwhile.
@@ -97,33 +84,31 @@ def mesh_surface_task(
         "rest_vertices": read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3) if read_rest else None,
     }
     if cache is None:
-        return surface_task(**arguments, **_triangles(mesh))
+        return build_surface(**arguments, **_triangles(mesh))
     # Triangles are not part of the key: they are slow to read, and follow from the other arrays.
     key = "surface", content_hash(*arguments.values())
     if cache.get(key) is None:
         arguments |= _triangles(mesh)
-    return cache.get_or_create_task(key, lambda: _with_fans_task(arguments, cache))
+    return cache.get_or_create(key, partial(_with_fans, arguments, cache))
 
 
-def mesh_fans_task(mesh: bpy.types.Mesh, cache: Cache) -> Task[np.ndarray]:
+def mesh_fans(mesh: bpy.types.Mesh, cache: Cache) -> np.ndarray:
     """Read the topology of a mesh at once, and return a task that caches its `corner_fan`.
 
     The fans depend on the topology alone, so a deformation does not change them.
     """
-    return _fans_task(_topology(mesh), vertex_positions(mesh), cache)
+    return _fans(_topology(mesh), vertex_positions(mesh), cache)
 
 
-def _fans_task(
-    topology: dict[str, np.ndarray | None], vertices: np.ndarray, cache: Cache
-) -> Task[np.ndarray]:
+def _fans(topology: dict[str, np.ndarray | None], vertices: np.ndarray, cache: Cache) -> np.ndarray:
     """Return the smooth fans of a topology, from the cache if they are known."""
-    return cache.get_or_create_task(
-        ("fans", content_hash(*topology.values())), lambda: smooth_fans_task(vertices, **topology)
+    return cache.get_or_create(
+        ("fans", content_hash(*topology.values())), partial(smooth_fans, vertices, **topology)
     )
 
 
 def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np.ndarray | None]:
-    """Return the arguments of `surface_task` that smooth fans depend on."""
+    """Return the arguments of `build_surface` that smooth fans depend on."""
     corner_vertex, face_start = polygon_arrays(mesh)
     return {
         "corner_vertex": corner_vertex,
@@ -137,12 +122,14 @@ def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np
     }
 
 
-def _with_fans_task(arguments: dict[str, Any], cache: Cache) -> Task[Surface]:
-    """Build a surface from the arguments of `surface_task`, with fans from the cache."""
+def _with_fans(arguments: dict[str, Any], cache: Cache) -> Surface:
+    """Build a surface from the arguments of `build_surface`, with fans from the cache."""
     names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
     topology = {name: arguments[name] for name in names}
-    fans = yield from subtask(_fans_task(topology, arguments["vertices"], cache), 0.0, 0.7)
-    return (yield from subtask(surface_task(**arguments, corner_fan=fans), 0.7, 1.0))
+    with progress(0.0, 0.7):
+        fans = _fans(topology, arguments["vertices"], cache)
+    with progress(0.7, 1.0):
+        return build_surface(**arguments, corner_fan=fans)
 
 
 def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:

@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Task, subtask
-from ..projection.ambient_occlusion import DIRECTION_COUNT, occlusion_task
+from ..progress import progress
+from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
 from ..projection.gbuffer import MeshInstance
 from .compat import is_editable
-from .meshes import mesh_surface_task
-from .scene_reader import SceneData, read_scene_task
+from .meshes import mesh_surface
+from .scene_reader import SceneData, compute_read_scene
 
 #: Default name of the attribute.
 OCCLUSION_ATTRIBUTE = "Occlusion"
@@ -22,12 +22,12 @@ OCCLUSION_ATTRIBUTE = "Occlusion"
 _ATTRIBUTE_TYPE = "CORNER", "FLOAT"
 
 
-def store_occlusion_task(
+def store_occlusion(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object],
     name: str = OCCLUSION_ATTRIBUTE,
     direction_count: int = DIRECTION_COUNT,
-) -> Task[None]:
+) -> None:
     """Compute the ambient occlusion of objects, and store it on their meshes.
 
     Everything that is visible in renders of the view layer occludes. The evaluated mesh is used if
@@ -44,36 +44,32 @@ def store_occlusion_task(
     direction_count : int
         Number of light directions.
 
-    Yields
-    ------
-    Progress
-
     Raises
     ------
     RosyError
-        If the scene cannot be read (see `read_scene_task`), or a mesh is linked, in edit mode, or has an
+        If the scene cannot be read (see `compute_read_scene`), or a mesh is linked, in edit mode, or has an
         attribute of that name with another type or domain. Nothing is changed in this case.
     """
     for obj in objects:
         _check_writable(obj, name)
-    scene_data = yield from subtask(read_scene_task(depsgraph, objects, "zero"), 0.0, 0.1)
+    with progress(0.0, 0.1):
+        scene_data = compute_read_scene(depsgraph, objects, "zero")
     values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
     for index, obj in enumerate(objects):
         start, stop = (0.1 + 0.9 * done / len(objects) for done in (index, index + 1))
-        task = _with_original_faces_task(scene_data, obj)
-        instances, instance_index = yield from subtask(task, start, start)
-        values_by_mesh[obj.data] = yield from subtask(
-            occlusion_task(instances, instance_index, direction_count), start, stop
-        )
+        with progress(start):
+            instances, instance_index = _with_original_faces(scene_data, obj)
+        with progress(start, stop):
+            values_by_mesh[obj.data] = ambient_occlusion(instances, instance_index, direction_count)
     for mesh, values in values_by_mesh.items():
         attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT", "CORNER")
         attribute.data.foreach_set("value", values)
         mesh.update()
 
 
-def _with_original_faces_task(
+def _with_original_faces(
     scene_data: SceneData, obj: bpy.types.Object
-) -> Task[tuple[list[MeshInstance], int]]:
+) -> tuple[list[MeshInstance], int]:
     """Return the mesh instances of a scene, and the index of an object's instance.
 
     The instance gets the object's original surface if its modifiers change the faces.
@@ -81,7 +77,7 @@ def _with_original_faces_task(
     instance_index = scene_data.objects.index(obj)
     instances = list(scene_data.instances)
     evaluated = instances[instance_index].surface
-    original = yield from mesh_surface_task(obj.data, f"object '{obj.name}'")
+    original = mesh_surface(obj.data, f"object '{obj.name}'")
     same_faces = np.array_equal(original.face_start, evaluated.face_start)
     if not (same_faces and np.array_equal(original.corner_vertex, evaluated.corner_vertex)):
         instances[instance_index] = replace(instances[instance_index], surface=original)

@@ -14,22 +14,22 @@ from ..field.surface import Surface, mean_per_face
 from ..field.validate import (
     apply_nonfinite_policy,
     as_float64,
-    project_to_tangent_task,
-    validated_directions_task,
-    validated_field_task,
+    project_to_tangent,
+    validated_directions,
+    validated_field,
 )
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from .field_attributes import (
     ANGLE_TYPE,
     VECTOR_TYPE,
     attribute_name,
-    cached_field_task,
+    compute_cached_field,
     describe_type,
     field_degree,
     field_values,
     is_face_vector_field,
 )
-from .meshes import flush_edit_mode, mesh_label, mesh_surface_task
+from .meshes import flush_edit_mode, mesh_label, mesh_surface
 from .rest_shape import follow_mesh, read_rest_shape
 
 #: Largest angle between a vector on a corner and its face, in degrees. Such vectors may be tangent
@@ -47,24 +47,6 @@ def read_mesh_field(
     label: str | None = None,
     cache: Cache | None = None,
 ) -> RosyField:
-    """Run `read_mesh_field_task` to its end."""
-    return run_to_completion(
-        read_mesh_field_task(
-            mesh, name, degree, surface, nonfinite=nonfinite, label=label, cache=cache
-        )
-    )
-
-
-def read_mesh_field_task(
-    mesh: bpy.types.Mesh,
-    name: str | None = None,
-    degree: int | None = None,
-    surface: Surface | None = None,
-    *,
-    nonfinite: str = "error",
-    label: str | None = None,
-    cache: Cache | None = None,
-) -> Task[RosyField]:
     """Read the field of a mesh.
 
     The mesh must not change until the task is done. Its attributes are read in one step.
@@ -99,12 +81,13 @@ def read_mesh_field_task(
     label = mesh_label(mesh) if label is None else label
     flush_edit_mode(mesh)
     if surface is None:
-        surface = yield from subtask(mesh_surface_task(mesh, label, cache=cache), 0.0, 0.5)
+        with progress(0.0, 0.5):
+            surface = mesh_surface(mesh, label, cache=cache)
     field_name = name or attribute_name(mesh)
     degree = check_degree(field_degree(mesh) if degree is None else degree)
     if field_name not in mesh.attributes and "dir0" in mesh.attributes:
-        task = _field_from_directions_task(mesh, surface, nonfinite, label, cache)
-        return (yield from subtask(task, 0.5, 1.0))
+        with progress(0.5, 1.0):
+            return _field_from_directions(mesh, surface, nonfinite, label, cache)
     attribute = mesh.attributes.get(field_name)
     if attribute is None:
         raise RosyError(
@@ -117,23 +100,23 @@ def read_mesh_field_task(
 
     attribute_type = domain, data_type = attribute.domain, attribute.data_type
 
-    def build_task() -> Task[RosyField]:
+    def build() -> RosyField:
         if data_type == ANGLE_TYPE:
-            return _field_from_angles_task(surface, values, degree, source, nonfinite)
+            return _field_from_angles(surface, values, degree, source, nonfinite)
         if domain == "CORNER":
-            return _field_from_corners_task(surface, values, degree, source, nonfinite)
+            return _field_from_corners(surface, values, degree, source, nonfinite)
         element = {"FACE": "face", "POINT": "vertex"}[domain]
-        return validated_field_task(surface, values, degree, source, nonfinite, element)
+        return validated_field(surface, values, degree, source, nonfinite, element)
 
-    task = cached_field_task(
-        cache, surface, build_task, "attribute", *attribute_type, values, degree, source, nonfinite
-    )
-    return (yield from subtask(task, 0.5, 1.0, "reading the field"))
+    with progress(0.5, 1.0, "reading the field"):
+        return compute_cached_field(
+            cache, surface, build, "attribute", *attribute_type, values, degree, source, nonfinite
+        )
 
 
-def _field_from_directions_task(
+def _field_from_directions(
     mesh: bpy.types.Mesh, surface: Surface, nonfinite: str, label: str, cache: Cache | None
-) -> Task[RosyField]:
+) -> RosyField:
     """Read a field from ``dir0`` ... ``dir{N-1}``. N is the number of these attributes."""
     degree = 0
     while f"dir{degree}" in mesh.attributes:
@@ -163,21 +146,21 @@ def _field_from_directions_task(
     source = f"{label}, attributes dir0 to dir{degree - 1}"
     domain = {"FACE": "face", "POINT": "vertex"}[first_attribute.domain]
 
-    def build_task() -> Task[RosyField]:
-        return validated_directions_task(surface, directions, source, nonfinite, domain)
+    def build() -> RosyField:
+        return validated_directions(surface, directions, source, nonfinite, domain)
 
-    task = cached_field_task(
-        cache, surface, build_task, "directions", directions, source, nonfinite, domain
-    )
-    return (yield from subtask(task, 0.0, 1.0, "reading the field"))
+    with progress(0.0, 1.0, "reading the field"):
+        return compute_cached_field(
+            cache, surface, build, "directions", directions, source, nonfinite, domain
+        )
 
 
-def _field_from_angles_task(
+def _field_from_angles(
     surface: Surface, angles: np.ndarray, degree: int, source: str, nonfinite: str
-) -> Task[RosyField]:
+) -> RosyField:
     """Return a unit field from angles, (F,), to the first edge of each face, in radians."""
     x, y = face_frames(surface)
-    yield Progress(0.5, "reading the field")
+    report(0.5, "reading the field")
     angles = as_float64(angles)
     defined = np.isfinite(angles)
     apply_nonfinite_policy(angles, source, "face", nonfinite)
@@ -185,22 +168,22 @@ def _field_from_angles_task(
     return RosyField(degree, np.where(defined[:, None], vectors, 0.0))
 
 
-def _field_from_corners_task(
+def _field_from_corners(
     surface: Surface, vectors: np.ndarray, degree: int, source: str, nonfinite: str
-) -> Task[RosyField]:
+) -> RosyField:
     """Return a field from vectors on corners: projected to the face, then averaged as RoSys."""
     vectors = as_float64(vectors)
     apply_nonfinite_policy(vectors, source, "corner", nonfinite)
     normal = surface.face_normal
     corner_face_normal = normal[surface.corner_face]
-    yield Progress(0.2, "reading the field")
-    task = project_to_tangent_task(
-        vectors, corner_face_normal, CORNER_TOLERANCE_DEGREES, source, "corner"
-    )
-    vectors = yield from subtask(task, 0.2, 0.7)
+    report(0.2, "reading the field")
+    with progress(0.2, 0.7):
+        vectors = project_to_tangent(
+            vectors, corner_face_normal, CORNER_TOLERANCE_DEGREES, source, "corner"
+        )
     x, y = tangent_frame(normal)
     z = to_representation(vectors, x[surface.corner_face], y[surface.corner_face], degree)
-    yield Progress(0.9, "reading the field")
+    report(0.9, "reading the field")
     mean = from_representation(mean_per_face(z, surface.face_start), x, y, degree)
     return RosyField(degree, np.where(normalize(normal).any(axis=1)[:, None], mean, 0.0))
 

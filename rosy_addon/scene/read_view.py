@@ -12,13 +12,12 @@ from ..cache import Cache
 from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..errors import RosyError
-from ..progress import Task
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
 from .color_inputs import color_attribute_of
 from .lights import read_lights
-from .scene_reader import SceneData, read_scene_task
+from .scene_reader import SceneData, compute_read_scene
 from .tone_inputs import load_reference, make_tone_request
 
 
@@ -38,7 +37,7 @@ class SceneViews:
     scene_data: SceneData
 
 
-def read_views_task(
+def read_views(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     cameras: Sequence[CameraSource],
@@ -48,7 +47,7 @@ def read_views_task(
     size: tuple[int, int] | None = None,
     reference_camera: bpy.types.Object | None = None,
     cache: Cache | None = None,
-) -> Task[SceneViews]:
+) -> SceneViews:
     """Read a scene as the input of a renderer, for one or more cameras. Meshes are read once.
 
     Parameters
@@ -69,10 +68,6 @@ def read_views_task(
     cache : Cache, optional
         Keeps meshes, fields and tones that have not changed since an earlier reading.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     SceneViews
@@ -80,7 +75,7 @@ def read_views_task(
     Raises
     ------
     RosyError
-        If two cameras have the same name; see also `resolve_camera`, `read_scene_task` and
+        If two cameras have the same name; see also `resolve_camera`, `compute_read_scene` and
         `load_reference`.
     """
     resolved_cameras = [resolve_camera(scene, depsgraph, camera, size) for camera in cameras]
@@ -92,7 +87,7 @@ def read_views_task(
             "rename them in their libraries, or draw from one"
         )
     tone_request = make_tone_request(scene, look)
-    scene_data = yield from read_scene_task(
+    scene_data = compute_read_scene(
         depsgraph,
         objects,
         nonfinite_policy(scene),
@@ -112,14 +107,10 @@ def read_views_task(
     return SceneViews(tuple(views), scene_data)
 
 
-def read_turntable_task(
+def read_turntable(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, obj: bpy.types.Object, look: Look
-) -> Task[tuple[MeshInstance, list[Light]]]:
+) -> tuple[MeshInstance, list[Light]]:
     """Read one object and the lights of the scene, for views of the object from all sides.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -130,10 +121,10 @@ def read_turntable_task(
     Raises
     ------
     RosyError
-        See `read_scene_task`.
+        See `compute_read_scene`.
     """
     tone_request = make_tone_request(scene, look)
-    scene_data = yield from read_scene_task(
+    scene_data = compute_read_scene(
         depsgraph,
         [obj],
         nonfinite_policy(scene),

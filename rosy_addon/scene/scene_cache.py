@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import bpy
 import numpy as np
@@ -21,7 +22,7 @@ from ..cache import Cache, content_hash
 from ..errors import REPORTED_ERRORS, RosyError, error_text
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .color_inputs import read_color_values
@@ -30,7 +31,6 @@ from .field_attributes import attribute_name, field_degree, has_field, is_face_v
 from .meshes import (
     evaluated_mesh,
     mesh_surface,
-    mesh_surface_task,
     polygon_arrays,
     read_attribute,
 )
@@ -111,9 +111,9 @@ class SceneCache:
         self._has_read_any = False
         # Names of the objects whose meshes were prepared, and the one that is being prepared.
         self._prepared: set[str] = set()
-        self._preparation: tuple[str, Task[None]] | None = None
+        self._preparation: tuple[str, None] | None = None
         # The object that `resolve_topologies` has begun.
-        self._resolution: tuple[str, Task[None]] | None = None
+        self._resolution: tuple[str, None] | None = None
         # The error message of a mesh that could not be read.
         self._topologies: dict[_TopologyKey, _TopologyEntry | str] = {}
         # By the name of the object, the pointer of its mesh, and `tone_image_key`. None: no faces.
@@ -272,7 +272,10 @@ class SceneCache:
         while self.has_unresolved:
             if self._resolution is None:
                 name = min(name for name, _ in self._unresolved)
-                self._resolution = name, self._resolution_task(depsgraph, name, nonfinite)
+                self._resolution = (
+                    name,
+                    partial(self._compute_resolution, depsgraph, name, nonfinite),
+                )
             try:
                 next(self._resolution[1])
             except StopIteration:
@@ -280,9 +283,9 @@ class SceneCache:
             if time.monotonic() > deadline:
                 return
 
-    def _resolution_task(
+    def _compute_resolution(
         self, depsgraph: bpy.types.Depsgraph, name: str, nonfinite: str
-    ) -> Task[None]:
+    ) -> None:
         """Read the meshes of an object in the first step, and build their fields in the others."""
         unresolved = {key for key in self._unresolved if key[0] == name}
         self._unresolved -= unresolved
@@ -295,7 +298,7 @@ class SceneCache:
         problem = str(lost_field_error(obj, attribute_name(obj.data)))
         try:
             for task in self._read_with_attributes(depsgraph, obj, nonfinite):
-                yield from task
+                task()
         except REPORTED_ERRORS as error:
             problem = error_text(error)
         # Whatever was not read now is not tried again before the object changes.
@@ -343,7 +346,7 @@ class SceneCache:
             return True
         try:
             if self._preparation is None or self._preparation[0] != name:
-                self._preparation = name, self._preparation_task(obj, name, draws_field)
+                self._preparation = name, partial(self._compute_preparation, obj, name, draws_field)
             while True:
                 next(self._preparation[1])
                 if time.monotonic() > self._deadline:
@@ -356,7 +359,7 @@ class SceneCache:
         self._prepared.add(name)
         return time.monotonic() <= self._deadline
 
-    def _preparation_task(self, obj: bpy.types.Object, name: str, draws_field: bool) -> Task[None]:
+    def _compute_preparation(self, obj: bpy.types.Object, name: str, draws_field: bool) -> None:
         """Cache what is built from the meshes of an object: read one, build, then the other.
 
         `obj` is the evaluated object, used in the first step alone.
@@ -365,17 +368,18 @@ class SceneCache:
         with evaluated_mesh(obj) as mesh:
             if mesh is None:
                 return
-            task = mesh_surface_task(mesh, label, occluder_only=not draws_field, cache=self.cache)
-        yield Progress(0.0, label)
-        yield from task
+            task = partial(
+                mesh_surface, mesh, label, occluder_only=not draws_field, cache=self.cache
+            )
+        report(0.0, label)
+        task()
         owner = bpy.data.objects.get(name)
         if not draws_field or owner is None or owner.type != "MESH" or owner.data.is_editmode:
             return
-        yield Progress(0.5, label)
-        task = mesh_surface_task(owner.data, label, cache=self.cache)
-        yield Progress(0.6, label)
-        surface = yield from task
-        yield Progress(0.9, label)
+        report(0.5, label)
+        report(0.6, label)
+        surface = mesh_surface(owner.data, label, cache=self.cache)
+        report(0.9, label)
         _ = surface.face_normal
 
     def _read_occluder(self, obj: bpy.types.Object) -> _MeshState | None:
@@ -451,7 +455,7 @@ class SceneCache:
 
     def _read_with_attributes(
         self, depsgraph: bpy.types.Depsgraph, owner: bpy.types.Object, nonfinite: str
-    ) -> list[Task[None]]:
+    ) -> list[None]:
         """Read all meshes of an object that have its field, and return tasks that add them.
 
         The tasks add entries to `_topologies`. They use neither the object nor its meshes.
@@ -470,23 +474,25 @@ class SceneCache:
                     if key in keys:
                         continue
                     keys.add(key)
-                    surface_task = mesh_surface_task(mesh, label, read_rest=True, cache=self.cache)
+                    surface_task = partial(
+                        mesh_surface, mesh, label, read_rest=True, cache=self.cache
+                    )
                     build_field_task = evaluated_field_reader(
                         mesh, layout, nonfinite, label, self.cache
                     )
-                    tasks.append(self._add_topology_task(key, surface_task, build_field_task))
+                    tasks.append(partial(self._add_topology, key, surface_task, build_field_task))
         return tasks
 
-    def _add_topology_task(
+    def _add_topology(
         self,
         key: _TopologyKey,
-        surface_task: Task[Surface],
-        build_field_task: Callable[[Surface], Task[RosyField]],
-    ) -> Task[None]:
+        surface_task: Surface,
+        build_field_task: Callable[[Surface], RosyField],
+    ) -> None:
         """Build a surface and its field, and add them to `_topologies`."""
-        yield Progress(0.0, "reading the field")
-        surface = yield from surface_task
-        field = yield from build_field_task(surface)
+        report(0.0, "reading the field")
+        surface = surface_task()
+        field = build_field_task(surface)
         self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from functools import partial
 
 import bpy
 import numpy as np
@@ -14,7 +15,7 @@ from ..cache import Cache
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .color_inputs import check_colored, read_color_values
@@ -29,7 +30,7 @@ from .evaluated_field import (
 )
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .libraries import check_object_type, remedy_for_absence
-from .meshes import evaluated_mesh, mesh_fans_task, mesh_surface, mesh_surface_task, read_uvs
+from .meshes import evaluated_mesh, mesh_fans, mesh_surface, read_uvs
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .tone_inputs import ToneRequest, check_tones, read_tone
@@ -106,14 +107,13 @@ def read_scene(
     tone_request: ToneRequest | None = None,
     color_attribute: str | None = None,
 ) -> SceneData:
-    """Run `read_scene_task` to its end."""
-    task = read_scene_task(
+    """Run `compute_read_scene` to its end."""
+    return compute_read_scene(
         depsgraph, objects, nonfinite, cache, tone_request, color_attribute=color_attribute
     )
-    return run_to_completion(task)
 
 
-def read_scene_task(
+def compute_read_scene(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object] | None = None,
     nonfinite: str = "error",
@@ -121,7 +121,7 @@ def read_scene_task(
     tone_request: ToneRequest | None = None,
     uv_maps: Mapping[bpy.types.Object, str] | None = None,
     color_attribute: str | None = None,
-) -> Task[SceneData]:
+) -> SceneData:
     """Read every mesh that is visible in renders, as arrays.
 
     Meshes are evaluated: modifiers (with their viewport settings), shape keys and armatures are
@@ -147,10 +147,6 @@ def read_scene_task(
     color_attribute : str, optional
         Name of the attribute whose numbers are read for the color map.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     SceneData
@@ -171,14 +167,15 @@ def read_scene_task(
     label = "reading the scene"
     for index, obj in enumerate(objects):
         start, stop = (0.5 * done / len(objects) for done in (index, index + 1))
-        yield from subtask(_prepare_surfaces_task(obj, depsgraph, cache), start, stop, label)
-    yield Progress(0.5, label)
+        with progress(start, stop, label):
+            _prepare_surfaces(obj, depsgraph, cache)
+    report(0.5, label)
     with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
-        yield Progress(0.7, label)
+        report(0.7, label)
         for obj, layout in layouts.items():
             # Found in the cache by the last step, unless the object has changed until then.
-            task = _prepare_field_task(obj, layout, depsgraph, nonfinite, cache)
-            yield from subtask(task, 0.7, 0.9, label)
+            with progress(0.7, 0.9, label):
+                _compute_prepare_field(obj, layout, depsgraph, nonfinite, cache)
         # The scene may have changed since the last step. All instances are read in one step, the
         # last, so that the caller can read what belongs to them before it yields.
         depsgraph.update()
@@ -205,9 +202,7 @@ def read_scene_task(
     )
 
 
-def _prepare_surfaces_task(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache
-) -> Task[None]:
+def _prepare_surfaces(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache) -> None:
     """Build what the surfaces of an object take longest to build, and keep it in the cache.
 
     These are the original surface, its face normals, and the smooth fans of the evaluated mesh.
@@ -215,28 +210,30 @@ def _prepare_surfaces_task(
     """
     label = f"object '{obj.name}'"
     try:
-        task = mesh_surface_task(obj.data, label, cache=cache)
-        surface = yield from subtask(task, 0.0, 0.5)
-        yield Progress(0.5, label)
+        task = partial(mesh_surface, obj.data, label, cache=cache)
+        with progress(0.0, 0.5):
+            surface = task()
+        report(0.5, label)
         _ = surface.face_normal
         if user_modifiers(obj):
             depsgraph.update()
             with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
-                task = None if mesh is None else mesh_fans_task(mesh, cache)
-            yield Progress(0.6, label)
+                task = None if mesh is None else partial(mesh_fans, mesh, cache)
+            report(0.6, label)
             if task is not None:
-                yield from subtask(task, 0.6, 1.0)
+                with progress(0.6, 1.0):
+                    task()
     except RosyError:
         pass
 
 
-def _prepare_field_task(
+def _compute_prepare_field(
     obj: bpy.types.Object,
     layout: FieldLayout,
     depsgraph: bpy.types.Depsgraph,
     nonfinite: str,
     cache: Cache,
-) -> Task[None]:
+) -> None:
     """Build the evaluated surface and field of an object, and keep them in the cache.
 
     Errors are left to those who read them.
@@ -247,13 +244,15 @@ def _prepare_field_task(
         with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
             if mesh is None or not layout.is_on(mesh):
                 return
-            task = mesh_surface_task(mesh, label, read_rest=True, cache=cache)
+            task = partial(mesh_surface, mesh, label, read_rest=True, cache=cache)
             build_field_task = evaluated_field_reader(mesh, layout, nonfinite, label, cache)
-        yield Progress(0.0, label)
-        surface = yield from subtask(task, 0.0, 0.5)
-        yield Progress(0.5, label)
-        yield from subtask(build_field_task(surface), 0.5, 1.0)
-        yield Progress(1.0, label)
+        report(0.0, label)
+        with progress(0.0, 0.5):
+            surface = task()
+        report(0.5, label)
+        with progress(0.5, 1.0):
+            build_field_task(surface)
+        report(1.0, label)
     except RosyError:
         pass
 

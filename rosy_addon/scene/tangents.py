@@ -7,22 +7,20 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
-from ..line_drawing.tangent_mesh import tangent_mesh_task
-from ..progress import Task, subtask
+from ..line_drawing.tangent_mesh import build_tangent_mesh
+from ..progress import progress
 from ..projection.gbuffer import MeshInstance
-from ..surface_texture.direction_maps import corner_directions_task
+from ..surface_texture.direction_maps import corner_directions
 from .field_attributes import VECTOR_TYPE, check_attribute_type, get_or_create_attribute
-from .meshes import mesh_surface_task
-from .read_field import read_mesh_field_task
+from .meshes import mesh_surface
+from .read_field import read_mesh_field
 from .write_field import check_writable
 
 #: Name of the attribute.
 DEFAULT_TANGENT_NAME = "rosy_tangent"
 
 
-def mesh_tangents_task(
-    mesh: bpy.types.Mesh, guiding_angle: float, name: str = ""
-) -> Task[np.ndarray]:
+def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") -> np.ndarray:
     """Compute one direction of a mesh's field on each corner.
 
     Parameters
@@ -32,10 +30,6 @@ def mesh_tangents_task(
         Angle from the horizontal direction, in radians, of the line that the direction is near to.
     name : str
         Name of the attribute that is to store them, as for `assign_tangents`.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -48,11 +42,15 @@ def mesh_tangents_task(
         If there is no field, or no attribute of this name can store tangents.
     """
     _check_storable(mesh, name)
-    surface = yield from subtask(mesh_surface_task(mesh), 0.0, 0.1)
-    field = yield from subtask(read_mesh_field_task(mesh, surface=surface), 0.1, 0.2)
+    with progress(0.0, 0.1):
+        surface = mesh_surface(mesh)
+    with progress(0.1, 0.2):
+        field = read_mesh_field(mesh, surface=surface)
     instance = MeshInstance(surface, np.eye(4), field)
-    tangent_mesh = yield from subtask(tangent_mesh_task(instance), 0.2, 0.4)
-    vectors = yield from subtask(corner_directions_task(tangent_mesh, guiding_angle), 0.4, 1.0)
+    with progress(0.2, 0.4):
+        tangent_mesh = build_tangent_mesh(instance)
+    with progress(0.4, 1.0):
+        vectors = corner_directions(tangent_mesh, guiding_angle)
     tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
     tangents[surface.triangles] = vectors
     return tangents

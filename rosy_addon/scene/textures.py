@@ -14,7 +14,6 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..progress import Task
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_record
 from .blender_images import ImageData, new_image, new_tiled_image
@@ -25,7 +24,7 @@ from .picture_nodes import new_group, set_picture_modifier
 from .picture_state import PictureState
 from .pictures import OutputSettings
 from .read_view import nonfinite_policy
-from .scene_reader import read_scene_task
+from .scene_reader import compute_read_scene
 from .texture_nodes import (
     Hatching,
     new_anisotropy_material,
@@ -68,13 +67,13 @@ def uv_map_name(obj: bpy.types.Object) -> str:
     return layer.name
 
 
-def read_texture_input_task(
+def read_texture_input(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     obj: bpy.types.Object,
     cache: Cache | None = None,
     color_attribute: str | None = None,
-) -> Task[TextureInput]:
+) -> TextureInput:
     """Read an object with a field, and the UV map of its texture, as it is evaluated.
 
     If `color_attribute` is given, the numbers of this attribute are read for the color map.
@@ -85,7 +84,7 @@ def read_texture_input_task(
         If there is no field, no UV map or no such attribute, or a modifier loses one of them.
     """
     name = uv_map_name(obj)
-    scene_data = yield from read_scene_task(
+    scene_data = compute_read_scene(
         depsgraph,
         [obj],
         nonfinite_policy(scene),

@@ -8,13 +8,11 @@ import bpy
 
 from ..errors import RosyError
 from ..processes import process_task
-from ..progress import Task
+from ..progress import report, run_with_report
 from . import video_encoding
 
 
-def encode_video_task(
-    folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
-) -> Task[None]:
+def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
     """Encode the images of a folder with Blender's encoder. See `video_encoding.encode_video`.
 
     In a window, another Blender does it, so that it can be stopped: closing the task stops it.
@@ -33,7 +31,7 @@ def encode_video_task(
     command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1"]
     command += ["--python", video_encoding.__file__, "--"]
     command += map(str, (folder, count, *size, repr(fps), path))
-    status, output = yield from process_task(command, "encoding the video")
+    status, output = run_with_report(process_task(command, "encoding the video"), report)
     if status or not path.is_file():
         message = (output.strip().splitlines() or ["it failed"])[-1]
         raise RosyError(f"{path}: this Blender cannot encode a video: {message}")

@@ -17,9 +17,9 @@ import numpy as np
 
 from ..errors import RosyError
 from ..field.frames import dot, transport
-from ..field.surface import Surface, connected_components_task
+from ..field.surface import Surface, connected_components
 from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 
 #: Corners are at the same point of a UV map if their coordinates differ by at most this much.
 SAME_UV = 1e-6
@@ -83,7 +83,7 @@ class UvCharts:
         return linear + conjugate, np.abs(linear - conjugate)
 
 
-def uv_charts_task(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> Task[UvCharts]:
+def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
     """Find the charts of a UV map.
 
     Parameters
@@ -94,10 +94,6 @@ def uv_charts_task(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> Task[
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     UvCharts
@@ -107,18 +103,19 @@ def uv_charts_task(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> Task[
     RosyError
         If a coordinate is not finite or too large, or no triangle has an area in the UV map.
     """
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     corner_uv = _checked(surface, uv)[surface.triangles]
     linear = 0.5 * (corner_uv * mesh.gradient.conj()).sum(axis=1)
     conjugate = 0.5 * (corner_uv * mesh.gradient).sum(axis=1)
     gradient = _gradients(corner_uv)
     if not gradient.any():
         raise RosyError(f"{surface.name}: no face has an area in the UV map: unwrap the mesh")
-    yield Progress(0.2, STEP_LABEL)
+    report(0.2, STEP_LABEL)
     edges = _chart_edges(mesh, corner_uv)
-    task = connected_components_task(len(corner_uv), np.stack(edges[:2], axis=1))
-    chart = yield from subtask(task, 0.2, 0.4)
-    frame = yield from subtask(_frames_task(surface, mesh, linear, conjugate, edges), 0.4, 1.0)
+    with progress(0.2, 0.4):
+        chart = connected_components(len(corner_uv), np.stack(edges[:2], axis=1))
+    with progress(0.4, 1.0):
+        frame = _frames(surface, mesh, linear, conjugate, edges)
     return UvCharts(corner_uv, linear, conjugate, gradient, chart, frame)
 
 
@@ -153,7 +150,7 @@ def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> SharedEdges:
     return SharedEdges(*(column[same] for column in edges))
 
 
-def uv_tangents_task(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> Task[np.ndarray]:
+def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.ndarray:
     """Compute unit tangents in the direction of u, averaged at the corners over each smooth fan.
 
     As renderers do for normal maps.
@@ -166,29 +163,26 @@ def uv_tangents_task(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> T
     triangle = np.arange(len(charts.linear))
     direction = _unit(charts.to_surface(triangle, np.ones(len(triangle))))
     edges = _chart_edges(mesh, charts.uv)
-    return (yield from _averaged_at_corners_task(surface, mesh, direction, edges))
+    return _averaged_at_corners(surface, mesh, direction, edges)
 
 
-def _frames_task(
+def _frames(
     surface: Surface,
     mesh: TangentMesh,
     linear: np.ndarray,
     conjugate: np.ndarray,
     edges: SharedEdges,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(T, 3) complex128 `UvCharts.frame`; `edges` are those of `_chart_edges`."""
     # The rotation of the polar decomposition turns this tangent to the u axis.
     mirrored = np.abs(conjugate) > np.abs(linear)
     direction = _unit(np.where(mirrored, conjugate, linear.conj()))
-    return _averaged_at_corners_task(surface, mesh, direction, edges)
+    return _averaged_at_corners(surface, mesh, direction, edges)
 
 
-def _averaged_at_corners_task(
-    surface: Surface,
-    mesh: TangentMesh,
-    direction: np.ndarray,
-    edges: SharedEdges,
-) -> Task[np.ndarray]:
+def _averaged_at_corners(
+    surface: Surface, mesh: TangentMesh, direction: np.ndarray, edges: SharedEdges
+) -> np.ndarray:
     """Average directions at the corners of triangles over each smooth fan of a chart.
 
     Parameters
@@ -206,16 +200,16 @@ def _averaged_at_corners_task(
     fan = surface.corner_fan[surface.triangles].ravel()
     pairs = np.concatenate(edges.ends())
     pairs = pairs[fan[pairs[:, 0]] == fan[pairs[:, 1]]]
-    task = connected_components_task(len(fan), pairs)
-    group = yield from subtask(task, 0.0, 0.6, STEP_LABEL)
-    yield Progress(0.6, STEP_LABEL)
+    with progress(0.0, 0.6, STEP_LABEL):
+        group = connected_components(len(fan), pairs)
+    report(0.6, STEP_LABEL)
     vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]
     total = np.stack(
         [np.bincount(group, np.repeat(component, 3)) for component in vector.T], axis=1
     )
     frame = np.empty((len(direction), 3), dtype=np.complex128)
     for corner in range(3):
-        yield Progress(0.7 + 0.1 * corner, STEP_LABEL)
+        report(0.7 + 0.1 * corner, STEP_LABEL)
         tangent, normal = total[group[corner::3]], mesh.corner_normal[:, corner]
         tangent = tangent - dot(tangent, normal)[:, None] * normal
         tangent = transport(tangent, normal, mesh.normal)

@@ -14,17 +14,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..line_drawing.tangent_mesh import TangentMesh, nearest_member
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .charts import uv_tangents_task
-from .line_order import CombedDirections, combed_directions_task
+from .charts import uv_tangents
+from .line_order import CombedDirections, combed_directions
 from .texel_surface import TexelSurface
 
 #: Label of all steps.
 STEP_LABEL = "drawing directions"
 
 
-def direction_map_task(on: TexelSurface, content: str, guiding_angle: float) -> Task[np.ndarray]:
+def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.ndarray:
     """Compute the anisotropy map or the flow map of a field.
 
     Parameters
@@ -34,10 +34,6 @@ def direction_map_task(on: TexelSurface, content: str, guiding_angle: float) -> 
     guiding_angle : float
         Direction that the direction of the map is near to; see `line_order`.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (P, 3) float32 ndarray
@@ -45,16 +41,17 @@ def direction_map_task(on: TexelSurface, content: str, guiding_angle: float) -> 
         1, and 0 where the field is undefined.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
-    combed = yield from subtask(combed_directions_task(mesh, guiding_angle), 0.0, 0.7)
+    with progress(0.0, 0.7):
+        combed = combed_directions(mesh, guiding_angle)
     is_flow = content == "flow"
     tangents = None
     if not is_flow:
-        task = uv_tangents_task(on.instance.surface, mesh, charts)
-        tangents = yield from subtask(task, 0.7, 0.8)
+        with progress(0.7, 0.8):
+            tangents = uv_tangents(on.instance.surface, mesh, charts)
     is_mirrored = charts.density < 0
     values = np.empty((len(texels), 3), dtype=np.float32)
     for block in pixel_blocks(len(texels)):
-        yield Progress(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
+        report(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         direction, is_defined = _directions_at(mesh, combed, triangle, weights)
         if is_flow:
@@ -70,7 +67,7 @@ def direction_map_task(on: TexelSurface, content: str, guiding_angle: float) -> 
     return values
 
 
-def corner_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[np.ndarray]:
+def corner_directions(mesh: TangentMesh, guiding_angle: float) -> np.ndarray:
     """Compute one direction of a field at each corner of the triangles.
 
     Parameters
@@ -79,17 +76,14 @@ def corner_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[np.n
     guiding_angle : float
         Direction that it is near to; see `line_order`.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (T, 3, 3) float32 ndarray
         Unit vectors, in world space; 0 where the field is undefined.
     """
-    combed = yield from subtask(combed_directions_task(mesh, guiding_angle), 0.0, 0.8)
-    yield Progress(0.8, STEP_LABEL)
+    with progress(0.0, 0.8):
+        combed = combed_directions(mesh, guiding_angle)
+    report(0.8, STEP_LABEL)
     triangle = np.repeat(np.arange(len(mesh.x)), 3)
     weights = np.tile(np.eye(3, dtype=np.float32), (len(mesh.x), 1))
     direction, is_defined = _directions_at(mesh, combed, triangle, weights)

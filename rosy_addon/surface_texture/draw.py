@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,30 +15,30 @@ from ..compositor.color_values import (
     value_range,
     value_scale,
 )
-from ..compositor.compose import colorize, layer_task
+from ..compositor.compose import colorize, compute_layer
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import noise_channel_count, with_cycle_distance
-from ..compositor.lic import lic_lengths_task
+from ..compositor.lic import lic_lengths
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.look_units import look_on_surface
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
 from ..errors import RosyError
-from ..line_drawing.tangent_mesh import TangentMesh, tangent_mesh_task
+from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from ..memory import check_memory, raise_mmap_threshold
-from ..progress import Progress, Task, run_to_completion, subtask
+from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles
-from .charts import UvCharts, uv_charts_task
-from .direction_maps import direction_map_task
-from .hatching import hatching_task
-from .margin import margin_task
-from .texel_field import texel_field_task
-from .texel_noise import texel_noise_task
+from .charts import UvCharts, uv_charts
+from .direction_maps import direction_map
+from .hatching import hatching
+from .margin import compute_margin
+from .texel_field import texel_field
+from .texel_noise import texel_noise
 from .texel_surface import TexelSurface
-from .texels import Texels, TextureFrame, texels_task, texture_frame
+from .texels import Texels, TextureFrame, compute_texels, texture_frame
 
 #: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
 #: mesh fills has lines of about the same width.
@@ -143,13 +144,6 @@ class Texture:
 
 
 def draw_texture(
-    instance: MeshInstance, uv: np.ndarray, look: Look, size: int, **options
-) -> Texture:
-    """Run `draw_texture_task` to its end."""
-    return run_to_completion(draw_texture_task(instance, uv, look, size, **options))
-
-
-def draw_texture_task(
     instance: MeshInstance,
     uv: np.ndarray,
     look: Look,
@@ -160,7 +154,7 @@ def draw_texture_task(
     lights: Sequence[Light] | None = None,
     content: str = "look",
     cache: Cache | None = None,
-) -> Task[Texture]:
+) -> Texture:
     """Draw the field of a mesh as a texture.
 
     Streamlines run on the surface. Texture and line width do not depend on the charts of the UV map.
@@ -188,10 +182,6 @@ def draw_texture_task(
     cache : Cache, optional
         Stores what does not depend on the look.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     Texture
@@ -207,40 +197,40 @@ def draw_texture_task(
     if texture_colors_values(look, content):
         check_color_values(look, [instance])
     raise_mmap_threshold()
-    mesh = yield from subtask(
-        tangent_mesh_task(
+    with progress(0.0, 0.05):
+        mesh = build_tangent_mesh(
             instance,
             display=look.display,
             cross_creases=look.cross_creases,
             crease_angle=look.crease_angle,
             cache=cache,
-        ),
-        0.0,
-        0.05,
-    )
-    charts = yield from subtask(uv_charts_task(instance.surface, mesh, uv), 0.05, 0.1)
+        )
+    with progress(0.05, 0.1):
+        charts = uv_charts(instance.surface, mesh, uv)
     frame = texture_frame(charts, size, name, is_udim)
     _check_texture_memory(frame, charts, mesh, look)
-    texels = yield from subtask(texels_task(charts, frame, name), 0.1, 0.15)
+    with progress(0.1, 0.15):
+        texels = compute_texels(charts, frame, name)
     step = step_length(mesh, charts, texels)
     crease_angle = None if look.cross_creases else look.crease_angle
-    field_task = texel_field_task(mesh, charts, texels, step, crease_angle)
-    field = yield from subtask(field_task, 0.15, 0.3)
+    with progress(0.15, 0.3):
+        field = texel_field(mesh, charts, texels, step, crease_angle)
     on = TexelSurface(instance, mesh, charts, texels, step)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
     surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"
     if is_direction:
-        pixels_task, is_data = direction_map_task(on, content, look.guiding_angle), True
+        pixels_task, is_data = partial(direction_map, on, content, look.guiding_angle), True
     elif is_hatched(look):
-        pixels_task = hatching_task(on, field, surface_look, look.guiding_angle, lights, cache)
+        pixels_task = partial(hatching, on, field, surface_look, look.guiding_angle, lights, cache)
         is_data = lights is None
     else:
-        pixels_task, is_data = _colors_task(on, field, surface_look), False
-    pixels = yield from subtask(pixels_task, 0.3, 0.95)
+        pixels_task, is_data = partial(_colors, on, field, surface_look), False
+    with progress(0.3, 0.95):
+        pixels = pixels_task()
     # Directions are relative to their chart.
-    filling_task = margin_task(frame, field, pixels, margin, crosses_seams=not is_direction)
-    image = yield from subtask(filling_task, 0.95, 1.0)
+    with progress(0.95, 1.0):
+        image = compute_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
     if image.shape[2] == 4:
         return Texture(frame, image, texels.overlap, is_data, mesh.family_count)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
@@ -301,11 +291,14 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
 
 
-def _colors_task(on: TexelSurface, field: PixelField, look: Look) -> Task[np.ndarray]:
+def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     """(P, 3) linear colors of the field at texels."""
-    noise = yield from subtask(texel_noise_task(on, look), 0.0, 0.3)
-    (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.3, 0.95)
-    layer = yield from subtask(layer_task(field, look, images), 0.95, 0.95)
+    with progress(0.0, 0.3):
+        noise = texel_noise(on, look)
+    with progress(0.3, 0.95):
+        (images,) = lic_lengths(field, [look], noise)
+    with progress(0.95):
+        layer = compute_layer(field, look, images)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if colors_values(look):
@@ -315,6 +308,6 @@ def _colors_task(on: TexelSurface, field: PixelField, look: Look) -> Task[np.nda
         field = replace(field, map_position=map_positions(values, low, scale))
     color = np.empty((len(field.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(color)):
-        yield Progress(0.95 + 0.05 * block.start / len(color), "drawing the colors")
+        report(0.95 + 0.05 * block.start / len(color), "drawing the colors")
         color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
     return color

@@ -27,7 +27,7 @@ from ..compositor.ink_thresholds import (
     sharp_look,
     threshold_pixels,
 )
-from ..compositor.lic import lic_lengths_task
+from ..compositor.lic import lic_lengths
 from ..compositor.lic_images import LicImages
 from ..compositor.look import Look
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
@@ -36,18 +36,17 @@ from ..compositor.shading import Light
 from ..compositor.streak_statistics import (
     break_steps,
     look_streak_statistics,
-    look_streak_statistics_task,
 )
 from ..compositor.target_tone import apply_tone_curve
-from ..compositor.undirected import undirected_texture_task
-from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field_task, solid_wobble_angle
-from ..progress import Progress, Task, subtask
+from ..compositor.undirected import undirected_texture
+from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_positions
-from ..projection.surface_lines import MAX_TRIANGLES, SurfaceLines, cached_surface_lines_task
-from .line_order import first_line_weights, line_order_task
+from ..projection.surface_lines import MAX_TRIANGLES, SurfaceLines, cached_surface_lines
+from .line_order import first_line_weights, line_order
 from .texel_field import frames_at
-from .texel_noise import texel_noise_task
+from .texel_noise import texel_noise
 from .texel_surface import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
@@ -64,13 +63,13 @@ MIN_SPOTS = 8
 STEP_LABEL = "drawing hatching"
 
 
-def thresholds_task(
+def thresholds(
     on: TexelSurface,
     field: PixelField,
     look: Look,
     guiding_angle: float,
     cache: Cache | None = None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Compute the thresholds of hatching at texels.
 
     Parameters
@@ -85,30 +84,26 @@ def thresholds_task(
     cache : Cache, optional
         Stores evenly spaced lines.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     (P, 4) float32 ndarray
         As of `threshold_pixels`.
     """
     look = sharp_look(look)
-    order_task = line_order_task(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
-    order = yield from subtask(order_task, 0.0, 0.1)
+    with progress(0.0, 0.1):
+        order = line_order(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
     wobble_angle = None
     if has_wobble(look):
-        wobble_angle = yield from subtask(_wobble_angle_task(on, look), 0.1, 0.15)
-        rotation_task = rotate_pixel_field_task(field, np.float32(look.wobble) * wobble_angle)
-        field = yield from subtask(rotation_task, 0.15, 0.15)
-    images, modulation = yield from subtask(
-        _lines_task(on, field, look, wobble_angle, cache), 0.15, 0.85
-    )
+        with progress(0.1, 0.15):
+            wobble_angle = _wobble_angle(on, look)
+        with progress(0.15):
+            field = rotate_pixel_field(field, np.float32(look.wobble) * wobble_angle)
+    with progress(0.15, 0.85):
+        images, modulation = _lines(on, field, look, wobble_angle, cache)
     members = all_members(field, look.guiding_angle)[: field.line_count]
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(pixels)):
-        yield Progress(0.85 + 0.15 * block.start / len(pixels), STEP_LABEL)
+        report(0.85 + 0.15 * block.start / len(pixels), STEP_LABEL)
         part_images = None if images is None else images.part(block)
         part = modulation.part(block)
         thresholds = np.stack(
@@ -127,44 +122,46 @@ def thresholds_task(
     return pixels
 
 
-def hatching_task(
+def hatching(
     on: TexelSurface,
     field: PixelField,
     look: Look,
     guiding_angle: float,
     lights: Sequence[Light] | None = None,
     cache: Cache | None = None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Draw hatching at texels: its thresholds, or its ink for some lights.
 
     Parameters
     ----------
     on, field, look, guiding_angle, cache
-        As for `thresholds_task`.
+        As for `thresholds`.
     lights : sequence of Light, optional
         In world space.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        From `thresholds_task` or `lit_ink_task`.
+        From `thresholds` or `lit_ink`.
     """
-    pixels = yield from subtask(thresholds_task(on, field, look, guiding_angle, cache), 0.0, 0.95)
+    with progress(0.0, 0.95):
+        pixels = thresholds(on, field, look, guiding_angle, cache)
     if lights is not None:
-        pixels = yield from subtask(lit_ink_task(on, pixels, lights, look), 0.95, 1.0)
+        with progress(0.95, 1.0):
+            pixels = lit_ink(on, pixels, lights, look)
     return pixels
 
 
-def lit_ink_task(
+def lit_ink(
     on: TexelSurface, pixels: np.ndarray, lights: Sequence[Light], look: Look
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Draw the ink of the diffuse light of lamps, without shadows.
 
     Parameters
     ----------
     on : TexelSurface
     pixels : (P, 4) float32 ndarray
-        From `thresholds_task`.
+        From `thresholds`.
     lights : sequence of Light
         In world space.
     look : Look
@@ -177,7 +174,7 @@ def lit_ink_task(
     """
     colors = np.ones_like(pixels)
     for block in pixel_blocks(len(pixels)):
-        yield Progress(block.start / len(pixels), STEP_LABEL)
+        report(block.start / len(pixels), STEP_LABEL)
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
         position = on.mesh.points_at(triangle, weights)
         normal = on.mesh.shading_normals_at(triangle, weights)
@@ -195,32 +192,34 @@ def lit_ink_task(
     return colors
 
 
-def _lines_task(
+def _lines(
     on: TexelSurface,
     field: PixelField,
     look: Look,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
-) -> Task[tuple[LicImages | None, LineModulation]]:
+) -> tuple[LicImages | None, LineModulation]:
     """Draw the streaks or the even lines of a field, and what makes them uneven."""
     is_even, is_broken = has_even_lines(look), has_breaks(look)
     undefined = not field.representation.all()
     images = even_lines = break_images = noise = undirected = paper_grain = None
     if not is_even or is_broken or undefined:
-        noise = yield from subtask(texel_noise_task(on, look), 0.0, 0.3)
+        with progress(0.0, 0.3):
+            noise = texel_noise(on, look)
     break_look = replace(look, length=break_steps(look))
     if is_even:
-        even_task = _even_lines_task(on, field, look, wobble_angle, cache)
-        even_lines = yield from subtask(even_task, 0.3, 0.6)
+        with progress(0.3, 0.6):
+            even_lines = _even_lines(on, field, look, wobble_angle, cache)
         if is_broken:
-            task = lic_lengths_task(field, [break_look], noise)
-            (break_images,) = yield from subtask(task, 0.6, 0.8)
+            with progress(0.6, 0.8):
+                (break_images,) = lic_lengths(field, [break_look], noise)
     elif is_broken:
-        task = lic_lengths_task(field, [look, break_look], noise)
-        images, break_images = yield from subtask(task, 0.3, 0.8)
+        with progress(0.3, 0.8):
+            images, break_images = lic_lengths(field, [look, break_look], noise)
     else:
-        (images,) = yield from subtask(lic_lengths_task(field, [look], noise), 0.3, 0.8)
-    yield from look_streak_statistics_task(look)
+        with progress(0.3, 0.8):
+            (images,) = lic_lengths(field, [look], noise)
+    look_streak_statistics(look)
     if undefined:
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
@@ -228,9 +227,10 @@ def _lines_task(
         grain = look.grain * on.step * float(np.median(texels_per_unit)) * size
         grain = min(grain, size / MIN_SPOTS)
         seen_noise = unconvolved_noise(noise, look)
-        undirected = yield from undirected_texture_task(field, seen_noise, grain)
+        undirected = undirected_texture(field, seen_noise, grain)
     if has_paper_grain(look):
-        paper_grain = yield from subtask(_paper_grain_task(on, field, look), 0.8, 1.0)
+        with progress(0.8, 1.0):
+            paper_grain = _paper_grain(on, field, look)
     return images, LineModulation(
         break_images=break_images,
         paper_grain=paper_grain,
@@ -239,49 +239,49 @@ def _lines_task(
     )
 
 
-def _paper_grain_task(on: TexelSurface, field: PixelField, look: Look) -> Task[np.ndarray]:
+def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     args = surface_paper_grain_args(look)
     args.pop("channels")
-    noise = yield from texel_noise_task(on, replace(look, noise="colour", **args))
+    noise = texel_noise(on, replace(look, noise="colour", **args))
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
 
 
-def _wobble_angle_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
+def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
     """(P,) float32 angles between lines and field at `Look.wobble` 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
     grain = look.grain * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)
     for block in pixel_blocks(len(angle)):
-        yield Progress(block.start / len(angle), "bending lines")
+        report(block.start / len(angle), "bending lines")
         position = on.interpolated(rest, block)
         angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(grain))
     return angle
 
 
-def _even_lines_task(
+def _even_lines(
     on: TexelSurface,
     field: PixelField,
     look: Look,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
-) -> Task[EvenLines]:
+) -> EvenLines:
     """Evaluate evenly spaced lines at the texels."""
     instance, texels = on.instance, on.texels
     spacing = SPACING_GRAINS * look.grain * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
-    task = cached_surface_lines_task(
-        instance.surface,
-        instance.matrix,
-        instance.field,
-        look.display,
-        spacing,
-        cache,
-        max_triangles,
-    )
-    lines: SurfaceLines = yield from subtask(task, 0.0, 0.8)
+    with progress(0.0, 0.8):
+        lines: SurfaceLines = cached_surface_lines(
+            instance.surface,
+            instance.matrix,
+            instance.field,
+            look.display,
+            spacing,
+            cache,
+            max_triangles,
+        )
     sides = on.mesh.points[:, 1:] - on.mesh.points[:, :1]
     sides = np.einsum("tkj,tj->kt", sides, on.mesh.x) + 1j * np.einsum(
         "tkj,tj->kt", sides, on.mesh.y
@@ -291,7 +291,7 @@ def _even_lines_task(
     jacobian = field.screen_jacobian
     area = np.abs((jacobian[:, 0].conj() * jacobian[:, 1]).imag)
     for block in pixel_blocks(len(texels)):
-        yield Progress(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
+        report(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         leaf, in_leaf = lines.tree.locate(triangle, weights)
         first, second = lines.heading.take(leaf, axis=1)

@@ -18,13 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.bisection import BisectionTree, bisection_task
-from ..field.connection import connection_task, laplacian_task
+from ..field.bisection import BisectionTree, bisect
+from ..field.connection import build_connection, laplacian
 from ..field.representation import power
-from ..field.surface import connected_components_task, surface_task
+from ..field.surface import build_surface, connected_components
 from ..field.surface_averages import SurfaceAverages
 from ..line_drawing.tangent_mesh import TangentMesh, nearest_member, shared_edges
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 
 #: Longest edge of the triangles on which the order is computed, as a fraction of the side of a square
 #: as large as the surface; and the most triangles, unless the mesh has more.
@@ -129,7 +129,7 @@ def first_line_weights(first: np.ndarray, members: np.ndarray, degree: int) -> n
     return weights.astype(np.float32, copy=False)
 
 
-def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Task[LineOrder]:
+def line_order(mesh: TangentMesh, guiding_angle: float, blend: float) -> LineOrder:
     """Find the order of the lines of a field.
 
     Parameters
@@ -141,10 +141,6 @@ def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Ta
     blend : float
         Width of the strip in which two lines swap, in Blender units.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     LineOrder
@@ -155,12 +151,13 @@ def line_order_task(mesh: TangentMesh, guiding_angle: float, blend: float) -> Ta
     On fields of directions: Viertel and Osting, "An Approach to Quad Meshing Based on Harmonic
     Cross-Valued Maps and the Ginzburg-Landau Theory", SIAM J. Sci. Comput. 41(1), 2019.
     """
-    refined = yield from subtask(_refined_task(mesh), 0.0, 0.4)
-    task = _first_lines_task(mesh, refined, guiding_angle, blend)
-    return (yield from subtask(task, 0.4, 1.0, STEP_LABEL))
+    with progress(0.0, 0.4):
+        refined = _refined(mesh)
+    with progress(0.4, 1.0, STEP_LABEL):
+        return _first_lines(mesh, refined, guiding_angle, blend)
 
 
-def combed_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[CombedDirections]:
+def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirections:
     """Choose one direction of a field at each point: a direction of the first line.
 
     Opposite directions of that line meet only where they must.
@@ -168,22 +165,23 @@ def combed_directions_task(mesh: TangentMesh, guiding_angle: float) -> Task[Comb
     Parameters
     ----------
     mesh, guiding_angle
-        As for `line_order_task`.
+        As for `line_order`.
 
     Returns
     -------
     CombedDirections
     """
-    refined = yield from subtask(_refined_task(mesh), 0.0, 0.3)
-    task = _first_lines_task(mesh, refined, guiding_angle, 0.0)
-    lines = yield from subtask(task, 0.3, 0.6, STEP_LABEL)
+    with progress(0.0, 0.3):
+        refined = _refined(mesh)
+    with progress(0.3, 0.6, STEP_LABEL):
+        lines = _first_lines(mesh, refined, guiding_angle, 0.0)
     if lines.degree == 1:
         return CombedDirections(lines, lines)
     root = refined.tree.leaf_root
     line = power(_unit_root(lines.first.sum(axis=1), 2), 2)
     guide = _guide(mesh, guiding_angle, 1)[root]
-    task = _aligned_task(refined, line, 2, guide, 1, AVERAGE_LENGTHS)
-    sense = yield from subtask(task, 0.6, 1.0, STEP_LABEL)
+    with progress(0.6, 1.0, STEP_LABEL):
+        sense = _aligned(refined, line, 2, guide, 1, AVERAGE_LENGTHS)
     return CombedDirections(lines, sense)
 
 
@@ -198,29 +196,31 @@ class _RefinedMesh(NamedTuple):
     side: float
 
 
-def _refined_task(mesh: TangentMesh) -> Task[_RefinedMesh]:
+def _refined(mesh: TangentMesh) -> _RefinedMesh:
     """Refine a mesh."""
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     side = float(np.sqrt(mesh.area.sum()))
-    points, triangle_vertex = yield from subtask(_welded_task(mesh), 0.0, 0.2)
+    with progress(0.0, 0.2):
+        points, triangle_vertex = _welded(mesh)
     # No number is very large or small.
     points = (points - points.mean(axis=0)) / side
     max_triangles = max(MAX_TRIANGLES, len(triangle_vertex))
-    tree_task = bisection_task(points, triangle_vertex, MAX_EDGE, max_triangles)
-    tree = yield from subtask(tree_task, 0.2, 0.3)
+    with progress(0.2, 0.3):
+        tree = bisect(points, triangle_vertex, MAX_EDGE, max_triangles)
     root = tree.leaf_root
     start = np.arange(0, 3 * len(root) + 1, 3, dtype=np.int32)
-    leaves_task = surface_task(tree.vertices, tree.leaf_vertex.ravel(), start)
-    leaves = yield from subtask(leaves_task, 0.3, 0.6)
-    connection = yield from subtask(connection_task(leaves), 0.6, 0.9)
-    yield Progress(0.9, STEP_LABEL)
+    with progress(0.3, 0.6):
+        leaves = build_surface(tree.vertices, tree.leaf_vertex.ravel(), start)
+    with progress(0.6, 0.9):
+        connection = build_connection(leaves)
+    report(0.9, STEP_LABEL)
     return _RefinedMesh(tree, SurfaceAverages(leaves, connection, mesh.x[root], mesh.y[root]), side)
 
 
-def _first_lines_task(
+def _first_lines(
     mesh: TangentMesh, refined: _RefinedMesh, guiding_angle: float, blend: float
-) -> Task[LineOrder]:
-    """Find the first line; see `line_order_task`."""
+) -> LineOrder:
+    """Find the first line; see `line_order`."""
     degree = mesh.degree // mesh.family_count
     tree = refined.tree
     z = np.einsum(
@@ -231,17 +231,17 @@ def _first_lines_task(
     else:  # the field distinguishes its lines
         first, lengths = mesh.family_z[tree.leaf_root], ()
     lengths = (*lengths, blend / refined.side)
-    return (yield from _aligned_task(refined, z, mesh.degree, first, degree, lengths))
+    return _aligned(refined, z, mesh.degree, first, degree, lengths)
 
 
-def _aligned_task(
+def _aligned(
     refined: _RefinedMesh,
     z: np.ndarray,
     z_degree: int,
     first: np.ndarray,
     degree: int,
     lengths: Sequence[float],
-) -> Task[LineOrder]:
+) -> LineOrder:
     """Align a guide with a field by threshold dynamics.
 
     Parameters
@@ -256,16 +256,17 @@ def _aligned_task(
     """
     averages = refined.averages
     connection = averages.connection
-    laplacian = yield from subtask(laplacian_task(connection, degree), 0.0, 0.1)
-    laplacian = laplacian.with_values(laplacian.data.astype(np.complex64))
+    with progress(0.0, 0.1):
+        laplacian_result = laplacian(connection, degree)
+    laplacian_result = laplacian_result.with_values(laplacian_result.data.astype(np.complex64))
     nodes = None
     for number, length in enumerate(lengths):
         done = 0.1 + 0.9 * number / len(lengths)
-        yield Progress(done, STEP_LABEL)
+        report(done, STEP_LABEL)
         snapped = power(nearest_member(_unit_root(first, degree), z, z_degree), degree)
         sums = averages.node_sums(snapped, degree)
-        task = averages.smooth_task(laplacian, length**2, sums, nodes)
-        nodes = yield from subtask(task, done, done, STEP_LABEL)
+        with progress(done, label=STEP_LABEL):
+            nodes = averages.smooth(laplacian_result, length**2, sums, nodes)
         first = averages.face_means(nodes, degree)
     angle = averages.frame_angle.reshape(-1, 3)
     corners = nodes[connection.corner_node].reshape(-1, 3) * np.exp(1j * degree * angle)
@@ -288,7 +289,7 @@ def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
     return power(-1j * turn * z, degree) + X_AXIS_WEIGHT * power(turn * x, degree)
 
 
-def _welded_task(mesh: TangentMesh) -> Task[tuple[np.ndarray, np.ndarray]]:
+def _welded(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray]:
     """Join the corners of triangles between which streamlines can cross.
 
     Returns
@@ -298,8 +299,8 @@ def _welded_task(mesh: TangentMesh) -> Task[tuple[np.ndarray, np.ndarray]]:
         Indices of the corners into the points.
     """
     pairs = np.concatenate(shared_edges(mesh).ends())
-    task = connected_components_task(3 * len(mesh.neighbor), pairs)
-    group = yield from subtask(task, 0.0, 1.0)
+    with progress(0.0, 1.0):
+        group = connected_components(3 * len(mesh.neighbor), pairs)
     points = np.empty((int(group.max()) + 1, 3))
     points[group] = mesh.points.reshape(-1, 3)
     return points, group.reshape(-1, 3).astype(np.int32)

@@ -10,21 +10,21 @@ import numpy as np
 
 from ..compositor.covering import ALL_NEIGHBORS
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
-from ..progress import Progress, Task
+from ..progress import report
 from .texels import TextureFrame
 
 #: Label of all steps.
 STEP_LABEL = "filling the margin"
 
 
-def margin_task(
+def compute_margin(
     frame: TextureFrame,
     field: PixelField,
     color: np.ndarray,
     margin: int,
     *,
     crosses_seams: bool = True,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """Draw the texels of charts and their margin into the frame.
 
     Parameters
@@ -43,7 +43,7 @@ def margin_task(
     (H, W, K) float32 ndarray
         The mean of the colors where there is neither chart nor margin.
     """
-    yield Progress(0.0, STEP_LABEL)
+    report(0.0, STEP_LABEL)
     height, width, channels = frame.height, frame.width, color.shape[1]
     image = np.empty((height, width, channels), dtype=np.float32)
     image[...] = color.mean(axis=0, dtype=np.float64)
@@ -60,7 +60,7 @@ def margin_task(
         filled[outer] = True
         ring = np.union1d(ring, outer)
     for number in range(margin):
-        yield Progress((number + 1) / (margin + 1), STEP_LABEL)
+        report((number + 1) / (margin + 1), STEP_LABEL)
         ring = _dilate(frame, flat, filled, ring)
     return image
 

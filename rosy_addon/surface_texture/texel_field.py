@@ -14,7 +14,7 @@ from ..field.frames import dot
 from ..field.representation import power, signed_power
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from ..line_drawing.tangent_mesh import TangentMesh
-from ..progress import Progress, Task, subtask
+from ..progress import progress, report
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import UvCharts
@@ -38,13 +38,9 @@ SEAM_BLOCK = 1 << 14
 STEP_LABEL = "following the surface across seams"
 
 
-def texel_field_task(
-    mesh: TangentMesh,
-    charts: UvCharts,
-    texels: Texels,
-    step: float,
-    crease_angle: float | None,
-) -> Task[PixelField]:
+def texel_field(
+    mesh: TangentMesh, charts: UvCharts, texels: Texels, step: float, crease_angle: float | None
+) -> PixelField:
     """Compute the field at texels.
 
     Parameters
@@ -57,10 +53,6 @@ def texel_field_task(
     crease_angle : float or None
         Streamlines end where the normals of neighboring texels differ by more than this angle, in
         radians. None if they cross creases.
-
-    Yields
-    ------
-    Progress
 
     Returns
     -------
@@ -81,7 +73,7 @@ def texel_field_task(
     corner_z = mesh.z.astype(np.complex64)
     corner_harmonics = [(number, values.astype(np.complex64)) for number, values in mesh.harmonics]
     for block in pixel_blocks(count):
-        yield Progress(0.3 * block.start / count, "finding directions")
+        report(0.3 * block.start / count, "finding directions")
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         frame = frames_at(charts, triangle, weights)
         z[block] = _interpolated(weights, corner_z, triangle) * power(frame.conj(), degree)
@@ -94,9 +86,10 @@ def texel_field_task(
         if mesh.family_z is not None:
             turn = signed_power(frame.conj(), rotation_order(family, degree))
             channels[family][block] = mesh.family_z[triangle] * turn
-    masks_task = _neighbor_masks_task(mesh, charts, texels, z != 0, crease_angle)
-    mask = yield from subtask(masks_task, 0.3, 0.7)
-    seam_steps = yield from subtask(_seam_steps_task(mesh, charts, texels, mask, z != 0), 0.7, 1.0)
+    with progress(0.3, 0.7):
+        mask = _neighbor_masks(mesh, charts, texels, z != 0, crease_angle)
+    with progress(0.7, 1.0):
+        seam_steps = _compute_seam_steps(mesh, charts, texels, mask, z != 0)
     return PixelField(
         degree=degree,
         width=texels.frame.width,
@@ -123,13 +116,13 @@ def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np
     return np.divide(frame, norm, out=charts.frame[triangle, 0], where=norm > 1e-6)
 
 
-def _neighbor_masks_task(
+def _neighbor_masks(
     mesh: TangentMesh,
     charts: UvCharts,
     texels: Texels,
     defined: np.ndarray,
     crease_angle: float | None,
-) -> Task[np.ndarray]:
+) -> np.ndarray:
     """(P,) uint16 `PixelField.neighbor_mask`: the neighbors in the same chart, near on the surface."""
     masks = np.zeros(len(texels), dtype=np.uint16)
     # Squared length on the surface that a texel is stretched to at most.
@@ -141,7 +134,7 @@ def _neighbor_masks_task(
     band_rows = max((1 << 16) // width, 1)
     corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
     for first_row in range(0, height, band_rows):
-        yield Progress(first_row / height, STEP_LABEL)
+        report(first_row / height, STEP_LABEL)
         # One more row: the first of the next band, or an empty one.
         first, stop = np.searchsorted(
             texels.index, [first_row * width, (first_row + band_rows + 1) * width]
@@ -185,9 +178,9 @@ def _neighbor_masks_task(
     return masks
 
 
-def _seam_steps_task(
+def _compute_seam_steps(
     mesh: TangentMesh, charts: UvCharts, texels: Texels, mask: np.ndarray, defined: np.ndarray
-) -> Task[SeamSteps]:
+) -> SeamSteps:
     """Trace the steps that `mask` does not have along the surface."""
     entry = np.full(texels.frame.width * texels.frame.height, -1, dtype=np.int32)
     entry[texels.index] = np.arange(len(texels), dtype=np.int32)
@@ -197,7 +190,7 @@ def _seam_steps_task(
     offsets = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])
     parts = []
     for start in range(0, len(source), SEAM_BLOCK):
-        yield Progress(start / len(source), STEP_LABEL)
+        report(start / len(source), STEP_LABEL)
         part = slice(start, start + SEAM_BLOCK)
         parts.append(
             _seam_steps(

@@ -8,7 +8,7 @@ from ..compositor.flow import noise_channel_count
 from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
 from ..compositor.look import Look
 from ..compositor.surface_noise import instance_hashes, solid_noise
-from ..progress import Progress, Task
+from ..progress import report
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
 from .texel_surface import TexelSurface
@@ -33,7 +33,7 @@ GRID_BLOCK = 1 << 18
 STEP_LABEL = "making noise"
 
 
-def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
+def texel_noise(on: TexelSurface, look: Look) -> np.ndarray:
     """Make noise that is anchored to the surface, at its texels.
 
     Parameters
@@ -60,7 +60,7 @@ def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
     instance_hash = instance_hashes([surface.name])
     total = np.empty((channels, len(texels)), dtype=np.float32)
     for block in pixel_blocks(len(texels)):
-        yield Progress(0.7 * block.start / len(texels), STEP_LABEL)
+        report(0.7 * block.start / len(texels), STEP_LABEL)
         triangle = texels.triangle[block]
         corners = triangle_vertex.take(triangle, axis=0).T
         change = gradient.take(triangle, axis=0).T
@@ -76,20 +76,17 @@ def texel_noise_task(on: TexelSurface, look: Look) -> Task[np.ndarray]:
         solid_noise(coordinates, size, block_hash, look.seed, look.density, out=total[:, block])
     if look.high_pass:
         sigma = BLUR_FACTOR * look.high_pass * step / scale
-        yield from _subtract_local_means_task(on, rest, total, sigma)
+        _subtract_local_means(on, rest, total, sigma)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
     for block in pixel_blocks(len(noise)):
-        yield Progress(1.0, STEP_LABEL)
+        report(1.0, STEP_LABEL)
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
 
 
-def _subtract_local_means_task(
-    on: TexelSurface,
-    rest: np.ndarray,
-    channels: np.ndarray,
-    sigma: float,
-) -> Task[None]:
+def _subtract_local_means(
+    on: TexelSurface, rest: np.ndarray, channels: np.ndarray, sigma: float
+) -> None:
     """Subtract a blur over the surface from (K, P) values at texels, in place.
 
     The blur is one in space: values are spread over a grid, and interpolated from it. So it knows no
@@ -121,7 +118,7 @@ def _subtract_local_means_task(
 
     sums = np.zeros((1 + len(channels), int(shape.prod())))
     for number, block in enumerate(blocks):
-        yield Progress(0.7 + 0.15 * number / len(blocks), STEP_LABEL)
+        report(0.7 + 0.15 * number / len(blocks), STEP_LABEL)
         block = slice(block.start, block.stop, SAMPLE_STRIDE)
         first, place = cells(block)
         weight = area[texels.triangle[block]]
@@ -132,7 +129,7 @@ def _subtract_local_means_task(
                 out += np.bincount(point, share * values[block], sums.shape[1])
     means = (sums[1:] / np.maximum(sums[0], np.finfo(float).tiny)).astype(np.float32)
     for number, block in enumerate(blocks):
-        yield Progress(0.85 + 0.15 * number / len(blocks), STEP_LABEL)
+        report(0.85 + 0.15 * number / len(blocks), STEP_LABEL)
         first, place = cells(block)
         for offset, share in _corner_shares(place, stride):
             for values, mean in zip(channels, means, strict=True):

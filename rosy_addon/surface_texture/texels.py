@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import Progress, Task, subtask
-from ..projection.rasterizer import rasterize_task
+from ..progress import progress, report
+from ..projection.rasterizer import rasterize
 from .charts import UvCharts
 
 #: Most tiles of a UV map.
@@ -150,7 +150,7 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
     )
 
 
-def texels_task(charts: UvCharts, frame: TextureFrame, name: str) -> Task[Texels]:
+def compute_texels(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
     """Find the texels whose centers are on the surface.
 
     Where charts overlap, a texel shows the triangle with the smallest index of the first tile.
@@ -170,8 +170,8 @@ def texels_task(charts: UvCharts, frame: TextureFrame, name: str) -> Task[Texels
         clip[:, 0], clip[:, 1] = 2 * (corners.real - u) - 1, 2 * (corners.imag - v) - 1
         clip[:, 3] = 1
         reaches = _reaches_tile(clip[:, :2].reshape(-1, 3, 2))
-        task = rasterize_task(clip, triangles[reaches], frame.size, frame.size)
-        fragments = yield from subtask(task, start, stop, STEP_LABEL)
+        with progress(start, stop, STEP_LABEL):
+            fragments = rasterize(clip, triangles[reaches], frame.size, frame.size)
         index = fragments.pixel + np.int32(frame.first_row(number) * frame.width)
         columns = index, reaches[fragments.triangle].astype(np.int32), fragments.barycentric
         if len(taken):
@@ -179,7 +179,7 @@ def texels_task(charts: UvCharts, frame: TextureFrame, name: str) -> Task[Texels
             columns = tuple(column[is_free] for column in columns)
             taken[columns[0]] = True
         parts.append(columns)
-    yield Progress(1.0, STEP_LABEL)
+    report(1.0, STEP_LABEL)
     index, triangle, barycentric = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not len(index):
         raise RosyError(

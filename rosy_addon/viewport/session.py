@@ -16,8 +16,7 @@ from ..cache import Cache
 from ..compositor.look import Look, has_flow
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import select_viewport_renderer
-from ..progress import run_to_completion
-from ..rendering.arrowheads import view_arrows_task
+from ..rendering.arrowheads import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.color_inputs import check_colored, color_attribute_of
@@ -335,8 +334,10 @@ class ViewportSession:
         if pointers not in self._arrowheads or self._arrowheads[pointers][0] != key:
             triangles = sum(len(instance.surface.triangles) for instance in view.instances)
             is_exact = triangles <= MAX_EXACT_TRIANGLES
-            task = view_arrows_task(view, self._marks_cache, is_exact=is_exact)
-            self._arrowheads[pointers] = key, run_to_completion(task)
+            self._arrowheads[pointers] = (
+                key,
+                view_arrows(view, self._marks_cache, is_exact=is_exact),
+            )
             self._marks_cache.evict_over_limit()
         draw_arrowheads(context, self._arrowheads[pointers][1])
 

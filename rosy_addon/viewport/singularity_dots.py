@@ -20,12 +20,11 @@ from ..annotation.singularity_marks import (
     HIDDEN_OPACITY,
     OUTLINE,
     OUTLINE_COLOR,
-    cached_singularities_task,
+    cached_singularities,
     dot_diameters,
 )
 from ..cache import Cache
 from ..color import from_hex
-from ..progress import run_to_completion
 from ..projection.clip_planes import is_cut_away
 from ..projection.gbuffer import MeshInstance
 from .pixel_frames import pixel_frames
@@ -72,7 +71,7 @@ def singularity_dots(
     clip_planes : (6, 4) float64 ndarray or None
         See `rendering.view_input.ViewInput`.
     """
-    vertex, index = run_to_completion(cached_singularities_task(instance, cache))
+    vertex, index = cached_singularities(instance, cache)
     points = instance.world_points()[vertex]
     kept = ~is_cut_away(points, clip_planes)
     return SingularityDots(points[kept], index[kept], instance.field.degree)

@@ -466,13 +466,13 @@ def test_frames_in_which_only_streaks_move_share_their_work(
     for frame, phase in ((1, 0.0), (11, 1.0)):
         look.flow_phase = phase
         look.keyframe_insert("flow_phase", frame=frame)
-    for module, name in ((projection, "project_task"), (stages, "streak_waves_task")):
+    for module, name in ((projection, "project"), (stages, "streak_waves")):
         real = getattr(module, name)
         monkeypatch.setattr(
             module, name, lambda *args, real=real, name=name: calls.append(name) or real(*args)
         )
     bake_animation(scene, [2, 3, 4], settings=OutputSettings(folder=tmp_path))
-    assert sorted(calls) == ["project_task", "streak_waves_task"]
+    assert sorted(calls) == ["project", "streak_waves"]
     assert len(set(frames_of(tmp_path).values())) == 3
     scene.frame_set(4)
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))

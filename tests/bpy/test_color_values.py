@@ -155,8 +155,9 @@ EXPECTED = {
 def test_pictures_and_turntables(scene, colored):
     (result,) = bake(scene)
     assert colors_in(pixels(result.image), 4) == EXPECTED
-    task = read_turntable_task(scene, depsgraph(), colored, Look(hue="values"))
-    instance, _ = run_to_completion(task)
+    instance, _ = run_to_completion(
+        read_turntable_task(scene, depsgraph(), colored, Look(hue="values"))
+    )
     assert np.isfinite(instance.color_values).sum() == 12
 
 

@@ -34,9 +34,9 @@ def run_stages(monkeypatch):
 
         monkeypatch.setattr(module, name, watched)
 
-    watch(projection, "project_task")
-    watch(stages, "surface_pixel_field_task")
-    watch(stages, "lic_lengths_task")
+    watch(projection, "project")
+    watch(stages, "compute_surface_pixel_field")
+    watch(stages, "lic_lengths")
     return names
 
 
@@ -106,7 +106,7 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
     change(scene, monkey)
     run_stages.clear()
     after = draw(scene)
-    assert run_stages == ["project_task", "surface_pixel_field_task", "lic_lengths_task"]
+    assert run_stages == ["project", "compute_surface_pixel_field", "lic_lengths"]
     assert not np.array_equal(before, after)
     np.testing.assert_array_equal(after, draw_uncached(scene))
 
@@ -117,14 +117,14 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
         ("gain", 1.0, []),
         ("shading", 0.2, []),
         ("light", "scene", []),
-        ("length", 20, ["lic_lengths_task"]),
-        ("seed", 3, ["lic_lengths_task"]),
-        ("guiding_angle", 0.4, ["lic_lengths_task"]),
-        ("noise", "colour", ["lic_lengths_task"]),
-        ("magnitude", "both", ["lic_lengths_task"]),
-        ("method", "members", ["lic_lengths_task"]),
-        ("crease_angle", 0.05, ["surface_pixel_field_task", "lic_lengths_task"]),
-        ("supersampling", 2, ["project_task", "surface_pixel_field_task", "lic_lengths_task"]),
+        ("length", 20, ["lic_lengths"]),
+        ("seed", 3, ["lic_lengths"]),
+        ("guiding_angle", 0.4, ["lic_lengths"]),
+        ("noise", "colour", ["lic_lengths"]),
+        ("magnitude", "both", ["lic_lengths"]),
+        ("method", "members", ["lic_lengths"]),
+        ("crease_angle", 0.05, ["compute_surface_pixel_field", "lic_lengths"]),
+        ("supersampling", 2, ["project", "compute_surface_pixel_field", "lic_lengths"]),
     ],
 )
 def test_a_setting_runs_the_stages_that_depend_on_it(

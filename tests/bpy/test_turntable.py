@@ -37,5 +37,9 @@ def test_lights_are_those_of_the_scene_in_the_space_of_each_camera(scene, monkey
         for light, other in zip(view.lights, expected, strict=True):
             np.testing.assert_allclose(light.vector, other.vector, atol=1e-6)
             assert light.strength == other.strength
-    task = read_turntable_task(scene, depsgraph, monkey, replace(look, light="lamp"))
-    assert run_to_completion(task)[1] == []
+    assert (
+        run_to_completion(
+            read_turntable_task(scene, depsgraph, monkey, replace(look, light="lamp"))
+        )[1]
+        == []
+    )

@@ -11,11 +11,14 @@ import importlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
 import numpy as np
+
+from rosy_addon.progress import as_task
 
 #: The modules of `compositor` that are used here.
 MODULES = (
@@ -50,7 +53,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
     def lengths_task(field, looks, noise, _band, _name):
         results = []
         for look in looks:
-            images = yield from rosy.brute_force.brute_force_task(field, look, noise)
+            images = yield from as_task(rosy.brute_force.brute_force, field, look, noise)
             if _is_antialiased(rosy, look) and rosy.hatching.is_hatched(look):
                 images = _smoothed(
                     rosy, rosy.covering.build_covering(field, look, noise), field, images
@@ -58,7 +61,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
             results.append(images)
         return results
 
-    convolve_still_task = rosy.brute_force.convolve_members_task
+    convolve_still_task = partial(as_task, rosy.brute_force.convolve_members)
 
     def convolve_task(field, look, *arguments):
         if look.flow or _is_antialiased(rosy, look):
@@ -66,8 +69,8 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
         return (yield from convolve_still_task(field, look, *arguments))
 
     with (
-        mock.patch.object(rosy.lic, "fast_lic_lengths_task", lengths_task),
-        mock.patch.object(rosy.brute_force, "convolve_members_task", convolve_task),
+        mock.patch.object(rosy.lic, "fast_lic_lengths", lengths_task),
+        mock.patch.object(rosy.brute_force, "convolve_members", convolve_task),
     ):
         yield
 
@@ -109,9 +112,9 @@ def _members_task(
     neighbors: np.ndarray,
     tracers: Any,
 ) -> Iterator[Any]:
-    """Do the same as `lic_images.convolve_members_task`, by kernels that move or with interpolated noise."""
+    """Do the same as `lic_images.convolve_members`, by kernels that move or with interpolated noise."""
     count = len(field.pixel)
-    limit = yield from rosy.lic_images.step_limits_task(field, look)
+    limit = yield from as_task(rosy.lic_images.compute_step_limits, field, look)
     length = np.full(count, look.length) if limit is None else limit
     kind = rosy.filter_kernel.kernel_of(look)
     reach = rosy.flow.streamline_reach(look)
@@ -162,7 +165,7 @@ def _members_task(
         number = samples[member].astype(np.float32)
         members[member] = rosy.contrast.normalize_variance(mean, number, look)
     mean_samples = samples.mean(axis=0).astype(np.float32)
-    return (yield from rosy.lic_images.lic_images_task(members, mean_samples))
+    return (yield from as_task(rosy.lic_images.lic_images, members, mean_samples))
 
 
 def _sampler(

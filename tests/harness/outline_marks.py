@@ -8,8 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from rosy_addon.field.surface import build_edges
-from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.rasterizer import rasterize_task
+from rosy_addon.projection.rasterizer import rasterize
 
 #: Coverage from which on a pixel belongs to a mark, or a silhouette is covered.
 MARK_COVERAGE, LINE_COVERAGE = 0.25, 0.3
@@ -68,7 +67,7 @@ def visible_silhouettes(
     screen = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (camera.width, camera.height)
     ends = _contour_edges(screen, triangles)
     size = camera.width * FINE, camera.height * FINE
-    fragments = run_to_completion(rasterize_task(clip, triangles.astype(np.int32), *size))
+    fragments = rasterize(clip, triangles.astype(np.int32), *size)
     fine_depth = np.full(size[0] * size[1], np.inf)
     fine_depth[fragments.pixel] = (
         depth[triangles[fragments.triangle]] * fragments.barycentric

@@ -22,7 +22,7 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import as_task, run_to_completion
 from rosy_addon.projection.camera import Camera
 from rosy_addon.rendering.cpu import CpuRenderer
 from rosy_addon.rendering.picture_memory import (
@@ -32,7 +32,7 @@ from rosy_addon.rendering.picture_memory import (
     view_coverage,
 )
 from rosy_addon.rendering.view_input import ViewInput
-from rosy_addon.turntable_video import turntable_task, turntable_views
+from rosy_addon.turntable_video import turntable, turntable_views
 
 
 def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) -> ViewInput:
@@ -251,7 +251,7 @@ def test_a_gif_is_refused_before_its_first_picture(tmp_path, monkeypatch, error_
     limit_memory(monkeypatch, 2e9)
     ball = cases.instance(1000, 4)
     views = turntable_views(ball, Look(), 500, (1000, 1000), (0, 0))
-    task = turntable_task(CpuRenderer(), views, 500, tmp_path / "a.gif", 24)
+    task = as_task(turntable, CpuRenderer(), views, 500, tmp_path / "a.gif", 24)
     assert "a .gif of 500 pictures of 1000 x 1000 pixels needs about 2.2 GB" in error_of(
         run_to_completion, task
     )

@@ -20,9 +20,9 @@ from rosy_addon.compositor.shading import Light
 from rosy_addon.errors import RosyError
 from rosy_addon.external.ffmpeg import find_encoder
 from rosy_addon.field.generate import axis_field
-from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, gif_task, lzw_compress
+from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw_compress
 from rosy_addon.processes import process_task
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import as_task, run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.cpu import CpuRenderer
 from rosy_addon.turntable_video import (
@@ -30,7 +30,7 @@ from rosy_addon.turntable_video import (
     check_still,
     check_video_path,
     evicting,
-    turntable_task,
+    turntable,
     turntable_views,
 )
 
@@ -105,7 +105,7 @@ def test_a_video_has_all_frames(tmp_path):
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     path = tmp_path / "film.gif"
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
-    assert run_to_completion(turntable_task(CpuRenderer(), views, 3, path, 12)) == path
+    assert turntable(CpuRenderer(), views, 3, path, 12) == path
     gif, actual = decode_frames(path.read_bytes())
     assert len(actual) == 3 and gif.size == (32, 32)
     assert (actual[0][0, 0] == 255).all(), "on white paper"
@@ -160,7 +160,7 @@ def test_the_encoder_is_stopped_with_the_task(tmp_path, monkeypatch):
         )
         yield from process_task([sys.executable, "-c", code], "encoding")
 
-    task = turntable_task(CpuRenderer(), views, 2, tmp_path / "film.mp4", 12, encode)
+    task = as_task(turntable, CpuRenderer(), views, 2, tmp_path / "film.mp4", 12, encode)
     while not pid_file.exists() or not pid_file.read_text():
         start = time.monotonic()
         progress = next(task)
@@ -180,14 +180,14 @@ def test_a_program_that_fails(tmp_path):
 
 def test_a_gif_is_encoded_frame_by_frame():
     frames = [np.full((4, 4, 3), value, dtype=np.uint8) for value in (0, 90, 200)]
-    assert [progress.fraction for progress in gif_task(frames, 20)] == [0, 1 / 3, 2 / 3]
+    assert [progress.fraction for progress in as_task(gif_bytes, frames, 20)] == [0, 1 / 3, 2 / 3]
 
 
 def test_an_unfinished_video_leaves_no_file(tmp_path):
     surface = icosphere(2)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
-    task = turntable_task(CpuRenderer(), views, 3, tmp_path / "film.gif", 12)
+    task = as_task(turntable, CpuRenderer(), views, 3, tmp_path / "film.gif", 12)
     for progress in task:
         if progress.label == "picture 3 of 3":
             break
@@ -203,7 +203,7 @@ def test_an_mp4_with_ffmpeg(tmp_path):
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     views = turntable_views(instance, QUICK, 4, (64, 48), (0.0, 0.0))
     path = tmp_path / "film.mp4"
-    run_to_completion(turntable_task(CpuRenderer(), views, 4, path, 12, find_encoder()))
+    turntable(CpuRenderer(), views, 4, path, 12, find_encoder())
     facts, *pictures = imageio_ffmpeg.read_frames(str(path))
     assert facts["fps"] == 12 and facts["codec"] == "h264" and facts["source_size"] == (64, 48)
     assert len(pictures) == 4

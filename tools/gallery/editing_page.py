@@ -13,15 +13,14 @@ from rosy_addon.field.closest_point import closest_triangles
 from rosy_addon.field.combing import Combing, start_combing
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
-from rosy_addon.field.guided_system import guided_system_task
+from rosy_addon.field.guided_system import guided_system
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.singularity_moves import move_index
 from rosy_addon.field.surface import Surface
 from rosy_addon.presets.store import load_preset
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.visible_vertices import project_vertices_task
+from rosy_addon.projection.visible_vertices import project_vertices
 
 from .fields_page import dotted_picture
 from .page import ROOT
@@ -116,8 +115,7 @@ def _moved_out_of_sight(
     camera = view(surface, angles, (SIDE, SIDE), 2)
     points = surface.vertices
     instance = MeshInstance(surface, np.eye(4))
-    task = project_vertices_task([instance], camera, [np.arange(len(points))])
-    is_seen = run_to_completion(task).is_visible
+    is_seen = project_vertices([instance], camera, [np.arange(len(points))]).is_visible
     singular, _ = find_singularities(surface, field)
     depth = cKDTree(points[is_seen]).query(points)[0]
     hidden = np.flatnonzero(depth > HIDDEN_DEPTH * surface.extent)
@@ -134,7 +132,7 @@ def _combed(head: Surface) -> Iterator[tuple[RosyField, list[np.ndarray]]]:
     """Yield the field and the strokes so far, piece by piece."""
     field = generate(head, "smoothest", DEGREE)
     yield field, []
-    system = run_to_completion(guided_system_task(head, DEGREE))
+    system = guided_system(head, DEGREE)
     no_guides = np.zeros((head.face_count, 3))
     combing = start_combing(system, field, no_guides, 0.1 * head.extent)
     lines: list[np.ndarray] = []
@@ -153,7 +151,7 @@ def _combed(head: Surface) -> Iterator[tuple[RosyField, list[np.ndarray]]]:
             lines[-1] = curve[: piece[-1] + 1]
             yield _field(combing), list(lines)
         combing.follow(stroke.finish())
-        run_to_completion(combing.settle_task())
+        combing.settle()
         yield _field(combing), list(lines)
     yield _field(combing), []
 

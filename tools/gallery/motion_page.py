@@ -9,10 +9,9 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.cpu import CpuRenderer
-from rosy_addon.turntable_video import evicting, turntable_task, turntable_views
+from rosy_addon.turntable_video import evicting, turntable, turntable_views
 
 from .page import ROOT
 from .shapes import sphere, suzanne
@@ -50,5 +49,4 @@ def _write_loop(surface: Surface, field: RosyField, look: Look, name: str) -> No
     instance = MeshInstance(surface, np.eye(4), field)
     cache = Cache()
     views = turntable_views(instance, look, COUNT, (SIDE, SIDE), ANGLES, still=True)
-    task = turntable_task(CpuRenderer(cache), evicting(views, cache), COUNT, IMAGES / name, RATE)
-    run_to_completion(task)
+    turntable(CpuRenderer(cache), evicting(views, cache), COUNT, IMAGES / name, RATE)

@@ -12,14 +12,13 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.image_io.png import png_task
+from rosy_addon.image_io.png import compute_png
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.presets.store import load_preset
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_basis, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.surface_texture.charts import uv_charts_task
+from rosy_addon.surface_texture.charts import uv_charts
 from rosy_addon.surface_texture.draw import draw_texture
 
 from .looks_page import IMAGES
@@ -41,7 +40,7 @@ def write() -> None:
     field = generate(surface, GeneratorSettings("form"), 4)
     instance = MeshInstance(surface, np.eye(4), field)
     texture = draw_texture(instance, uv, Look(), TEXTURE_SIDE).rgba
-    charts = run_to_completion(uv_charts_task(surface, build_tangent_mesh(instance), uv))
+    charts = uv_charts(surface, build_tangent_mesh(instance), uv)
     hue = np.random.default_rng(3).uniform(0.25, 0.95, (int(charts.chart.max()) + 1, 3))
     chart_color = to_linear(hue)[charts.chart]
 
@@ -82,7 +81,7 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
     for label, angle in (("horizontal strokes", 0.0), ("vertical strokes", np.pi / 2)):
         look = Look(guiding_angle=angle)
         pixels = draw_texture(instance, uv, look, TEXTURE_SIDE, content="anisotropy").rgba
-        png = run_to_completion(png_task(pixels, is_color=False))
+        png = compute_png(pixels, is_color=False)
         image = new_image("map", ImageData(pixels, png), is_color=False)
         material = new_anisotropy_material("metal", image, obj.data.uv_layers.active.name)
         obj.data.materials.clear()

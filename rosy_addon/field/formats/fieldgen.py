@@ -18,9 +18,9 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ...progress import Progress, Task, subtask
+from ...progress import progress, report
 from ..blocks import row_blocks
-from ..corner_fans import corner_angles_task, corner_rotations_task
+from ..corner_fans import compute_corner_rotations, corner_angles
 from ..frames import tangent_frame
 from ..representation import (
     complex_bincount,
@@ -31,13 +31,13 @@ from ..representation import (
 )
 from ..rosy_field import RosyField, check_degree
 from ..surface import Surface
-from ..validate import vertex_normals_task
-from .obj import read_obj_task
+from ..validate import vertex_normals
+from .obj import read_obj
 from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_STEP, TextRows, format_blocks, format_rows, read_rows_task
+from .text_rows import LABEL, ROWS_PER_STEP, TextRows, format_blocks, format_rows, read_rows
 
 
-def read_fieldgen_task(path: Path) -> Task[RawField]:
+def read_fieldgen(path: Path) -> RawField:
     """Read the mesh and the field of a fieldgen file.
 
     Returns
@@ -52,12 +52,14 @@ def read_fieldgen_task(path: Path) -> Task[RawField]:
         line for each vertex.
     """
     data = read_bytes(path, reject_binary=True)
-    polygons = yield from subtask(read_obj_task(path), 0.0, 0.5)
-    rows = yield from subtask(read_rows_task(path, comment=None, data=data), 0.5, 0.7)
+    with progress(0.0, 0.5):
+        polygons = read_obj(path)
+    with progress(0.5, 0.7):
+        rows = read_rows(path, comment=None, data=data)
     degree, vertex_lines = None, []
     for row, words in enumerate(rows.words):
         if row % ROWS_PER_STEP == 0:
-            yield Progress(0.7 + 0.1 * row / len(rows), LABEL)
+            report(0.7 + 0.1 * row / len(rows), LABEL)
         if not words[0].startswith(b"#"):
             continue
         words = words[words[0] == b"#" :]
@@ -76,9 +78,10 @@ def read_fieldgen_task(path: Path) -> Task[RawField]:
         [words for _, words in vertex_lines],
         [rows.line_numbers[row] for row, _ in vertex_lines],
     )
-    yield Progress(0.8, LABEL)
-    numbers = yield from subtask(vertex_rows.floats_task("part of a vector"), 0.8, 1.0)
-    yield Progress(1.0, LABEL)
+    report(0.8, LABEL)
+    with progress(0.8, 1.0):
+        numbers = vertex_rows.floats("part of a vector")
+    report(1.0, LABEL)
     numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)
@@ -87,13 +90,13 @@ def read_fieldgen_task(path: Path) -> Task[RawField]:
             f"{path}: expected one '# field' line for each of {count} vertices, found "
             f"{counted(len(vertex), 'line')} for vertices {vertex.min() + 1} to {vertex.max() + 1}"
         )
-    yield Progress(1.0, LABEL)
+    report(1.0, LABEL)
     values = np.zeros((count, 1, 3))
     values[vertex, 0] = numbers[:, 1:]
     return RawField(values, degree, domain="vertex", polygons=polygons)
 
 
-def fieldgen_text_task(surface: Surface, field: RosyField) -> Task[Iterator[str]]:
+def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     """Format a mesh and a field as a fieldgen file, in blocks of lines.
 
     The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
@@ -101,20 +104,25 @@ def fieldgen_text_task(surface: Surface, field: RosyField) -> Task[Iterator[str]
     """
     label = "averaging the field at the vertices"
     count = len(surface.vertices)
-    angle = yield from subtask(corner_angles_task(surface), 0.0, 0.2, label)
+    with progress(0.0, 0.2, label):
+        angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
-    normal = yield from subtask(vertex_normals_task(surface), 0.2, 0.5, label)
-    yield Progress(0.5, label)
+    with progress(0.2, 0.5, label):
+        normal = vertex_normals(surface)
+    report(0.5, label)
     face_x, face_y = face_frames(surface)
-    yield Progress(0.6, label)
+    report(0.6, label)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
-    task = corner_rotations_task(surface.face_normal, face_x, face, normal[vertex], label)
-    rotation = power((yield from subtask(task, 0.6, 0.8)), field.degree)
-    yield Progress(0.8, label)
+    with progress(0.6, 0.8):
+        rotation = power(
+            compute_corner_rotations(surface.face_normal, face_x, face, normal[vertex], label),
+            field.degree,
+        )
+    report(0.8, label)
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     modulus = np.abs(mean)
     mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    yield Progress(0.9, label)
+    report(0.9, label)
     member = from_representation(mean, *tangent_frame(normal), field.degree)
     return chain(
         format_blocks(surface.vertices, "v "),

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError
-from ...progress import run_to_completion
 from .text_rows import read_rows
 
 
@@ -27,7 +26,7 @@ def read_guide_strokes(path: Path) -> list[np.ndarray]:
     """
     path = Path(path)
     rows = read_rows(path)
-    points = run_to_completion(rows.points_task("point"))
+    points = rows.points("point")
     # Rows leave out empty lines, so a gap in the line numbers separates two strokes.
     ends = np.flatnonzero(np.diff(rows.line_numbers) > 1) + 1
     strokes = [stroke for stroke in np.split(points, ends) if len(stroke) > 1]

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import counted
-from ...progress import Progress, Task, run_to_completion, subtask
+from ...progress import progress, report
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, ROWS_PER_STEP, TextRows, read_rows_task
+from .text_rows import LABEL, ROWS_PER_STEP, TextRows, read_rows
 
 
-def read_obj_task(path: Path) -> Task[Polygons]:
+def read_obj(path: Path) -> Polygons:
     """Read the vertices and faces (`v` and `f` lines) of an .obj file.
 
     Corners may have the forms v, v/vt, v//vn and v/vt/vn. Negative indices are relative to the last
@@ -28,23 +28,28 @@ def read_obj_task(path: Path) -> Task[Polygons]:
     RosyError
         If the file cannot be read, a line is malformed, or an index is out of range.
     """
-    rows = yield from subtask(read_rows_task(path), 0.0, 0.4)
-    is_vertex, is_face = yield from subtask(_rows_of_kinds_task(rows, b"v", b"f"), 0.4, 0.5)
+    with progress(0.0, 0.4):
+        rows = read_rows(path)
+    with progress(0.4, 0.5):
+        is_vertex, is_face = _rows_of_kinds(rows, b"v", b"f")
     vertex_rows = _select_rows(rows, is_vertex, 3)
-    yield Progress(0.5, LABEL)
-    vertices = yield from subtask(vertex_rows.points_task("vertex"), 0.5, 0.6)
-    yield Progress(0.6, LABEL)
+    report(0.5, LABEL)
+    with progress(0.5, 0.6):
+        vertices = vertex_rows.points("vertex")
+    report(0.6, LABEL)
     corners = _select_rows(rows, is_face)
-    yield Progress(0.6, LABEL)
+    report(0.6, LABEL)
     for row, words in enumerate(corners.words):
         if len(words) < 3:
             raise corners.error(
                 row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
             )
     sizes = [len(words) for words in corners.words]
-    positions = yield from subtask(_position_indices_task(corners), 0.6, 0.9)
-    index = yield from subtask(positions.ints_task("vertex of a face"), 0.9, 1.0)
-    yield Progress(1.0, LABEL)
+    with progress(0.6, 0.9):
+        positions = _position_indices(corners)
+    with progress(0.9, 1.0):
+        index = positions.ints("vertex of a face")
+    report(1.0, LABEL)
     # A negative index is relative to the number of vertices above its line.
     vertices_so_far = np.cumsum(is_vertex)[is_face]
     corner_vertex = np.where(index < 0, index + np.repeat(vertices_so_far, sizes), index - 1)
@@ -58,11 +63,14 @@ def read_obj_task(path: Path) -> Task[Polygons]:
     return Polygons(vertices, corner_vertex, offsets_from_sizes(sizes))
 
 
-def _rows_of_kinds_task(rows: TextRows, *kinds: bytes) -> Task[list[np.ndarray]]:
+def _rows_of_kinds(
+    rows: TextRows,
+    *kinds: bytes,
+) -> list[np.ndarray]:
     """Whether the first word of each row is that of a kind: a (rows,) bool ndarray for each kind."""
     masks = [np.zeros(len(rows), dtype=bool) for _ in kinds]
     for start in range(0, len(rows), ROWS_PER_STEP):
-        yield Progress(start / len(rows), LABEL)
+        report(start / len(rows), LABEL)
         block = slice(start, start + ROWS_PER_STEP)
         first_words = [words[0] for words in rows.words[block]]
         for mask, kind in zip(masks, kinds, strict=True):
@@ -81,11 +89,11 @@ def _select_rows(rows: TextRows, is_selected: np.ndarray, max_words: int | None 
     )
 
 
-def _position_indices_task(corners: TextRows) -> Task[TextRows]:
+def _position_indices(corners: TextRows) -> TextRows:
     """Reduce corners v, v/vt, v//vn and v/vt/vn to v, the index of the position."""
     rows: list[Sequence[bytes]] = []
     for start in range(0, len(corners), ROWS_PER_STEP):
-        yield Progress(start / len(corners), LABEL)
+        report(start / len(corners), LABEL)
         words = corners.words[start : start + ROWS_PER_STEP]
         joined = b"\n".join(b" ".join(row) for row in words)
         if b"/" in joined:
@@ -96,11 +104,6 @@ def _position_indices_task(corners: TextRows) -> Task[TextRows]:
 
 
 def read_uv(path: Path) -> np.ndarray | None:
-    """Run `read_uv_task` to its end."""
-    return run_to_completion(read_uv_task(path))
-
-
-def read_uv_task(path: Path) -> Task[np.ndarray | None]:
     """Read the texture coordinates (`vt` lines) of the corners of an .obj file.
 
     Returns
@@ -113,7 +116,7 @@ def read_uv_task(path: Path) -> Task[np.ndarray | None]:
     RosyError
         If only some of the corners have texture coordinates, or an index is out of range.
     """
-    rows = yield from read_rows_task(path)
+    rows = read_rows(path)
     is_uv = np.array([words[0] == b"vt" for words in rows.words], dtype=bool)
     is_face = np.array([words[0] == b"f" for words in rows.words], dtype=bool)
     if not is_uv.any():
@@ -122,14 +125,14 @@ def read_uv_task(path: Path) -> Task[np.ndarray | None]:
     for row, words in enumerate(table.words):
         if len(words) < 2:
             raise table.error(row, "a texture coordinate has fewer than 2 numbers")
-    uv = (yield from table.floats_task("texture coordinate")).reshape(-1, 2)
+    uv = table.floats("texture coordinate").reshape(-1, 2)
     corners = _select_rows(rows, is_face)
     words = [[word.split(b"/")[1:2] for word in line] for line in corners.words]
     for row, line in enumerate(words):
         if not all(word and word[0] for word in line):
             raise corners.error(row, "a corner has no texture coordinate")
     uv_rows = TextRows(path, [[word[0] for word in line] for line in words], corners.line_numbers)
-    index = yield from uv_rows.ints_task("texture coordinate of a corner")
+    index = uv_rows.ints("texture coordinate of a corner")
     coordinates_so_far = np.repeat(np.cumsum(is_uv)[is_face], [len(line) for line in words])
     uv_index = np.where(index < 0, index + coordinates_so_far, index - 1)
     out_of_range = (uv_index < 0) | (uv_index >= len(uv))

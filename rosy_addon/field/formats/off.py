@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError, counted
-from ...progress import Progress, Task, subtask
+from ...progress import progress, report
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, TextRows, abbreviate, read_rows_task
+from .text_rows import LABEL, TextRows, abbreviate, read_rows
 
 _KEYWORD = re.compile(rb"(ST)?C?N?OFF$", re.IGNORECASE)
 
 
-def read_off_task(path: Path) -> Task[Polygons]:
+def read_off(path: Path) -> Polygons:
     """Read a text .off file.
 
     The counts may be on the line of the keyword or on the next one. Comments may be anywhere.
@@ -28,7 +28,8 @@ def read_off_task(path: Path) -> Task[Polygons]:
     RosyError
         If the file cannot be read, is binary, malformed or truncated, or an index is out of range.
     """
-    rows = _after_keyword((yield from subtask(read_rows_task(path), 0.0, 0.5)))
+    with progress(0.0, 0.5):
+        rows = _after_keyword(read_rows(path))
     if not len(rows):
         raise RosyError(f"{path}: ends before the numbers of vertices and faces")
     counts = rows[:1].ints("number of vertices, faces or edges")
@@ -42,10 +43,12 @@ def read_off_task(path: Path) -> Task[Polygons]:
             f"{counted(face_count, 'face')}, but ends after "
             f"{counted(len(body), 'row')}"
         )
-    vertices = yield from subtask(body[:vertex_count].points_task("vertex"), 0.5, 0.7)
+    with progress(0.5, 0.7):
+        vertices = body[:vertex_count].points("vertex")
     face_rows = body[vertex_count : vertex_count + face_count]
-    yield Progress(0.7, LABEL)
-    return Polygons(vertices, *(yield from subtask(_faces_task(face_rows, vertex_count), 0.7, 1.0)))
+    report(0.7, LABEL)
+    with progress(0.7, 1.0):
+        return Polygons(vertices, *_faces(face_rows, vertex_count))
 
 
 def _after_keyword(rows: TextRows) -> TextRows:
@@ -60,11 +63,11 @@ def _after_keyword(rows: TextRows) -> TextRows:
     return TextRows(rows.path, [rest, *rows.words[1:]], rows.line_numbers) if rest else rows[1:]
 
 
-def _faces_task(rows: TextRows, vertex_count: int) -> Task[tuple[np.ndarray, np.ndarray]]:
+def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """`corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
     first_words = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers)
-    sizes = yield from first_words.ints_task("number of corners of a face")
-    yield Progress(0.5, LABEL)
+    sizes = first_words.ints("number of corners of a face")
+    report(0.5, LABEL)
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
         if not 3 <= size < len(words):
             message = (
@@ -78,8 +81,9 @@ def _faces_task(rows: TextRows, vertex_count: int) -> Task[tuple[np.ndarray, np.
         [words[1 : size + 1] for size, words in zip(sizes.tolist(), rows.words, strict=True)],
         rows.line_numbers,
     )
-    corner_vertex = yield from subtask(corners.ints_task("vertex of a face"), 0.5, 1.0)
-    yield Progress(1.0, LABEL)
+    with progress(0.5, 1.0):
+        corner_vertex = corners.ints("vertex of a face")
+    report(1.0, LABEL)
     out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))

@@ -14,11 +14,11 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ...progress import Progress, Task, subtask
+from ...progress import progress, report
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
 from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_STEP, format_blocks, read_rows_task
+from .text_rows import LABEL, ROWS_PER_STEP, format_blocks, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -30,7 +30,7 @@ _NPY_HEADERS = {
 }
 
 
-def read_text_task(path: Path) -> Task[RawField]:
+def read_text(path: Path) -> RawField:
     """Read a text file with rows of 3, 3 N or 9 numbers.
 
     Numbers are separated by commas or white space. ``#`` starts a comment.
@@ -41,7 +41,8 @@ def read_text_task(path: Path) -> Task[RawField]:
         If the file cannot be read, holds no numbers, or its rows differ in length.
     """
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
-    rows = yield from subtask(read_rows_task(path, data=data), 0.0, 0.4)
+    with progress(0.0, 0.4):
+        rows = read_rows(path, data=data)
     if not len(rows):
         raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
@@ -51,8 +52,9 @@ def read_text_task(path: Path) -> Task[RawField]:
             raise rows.error(
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
-    values = yield from subtask(rows.floats_task("part of a vector"), 0.4, 1.0)
-    yield Progress(1.0, LABEL)
+    with progress(0.4, 1.0):
+        values = rows.floats("part of a vector")
+    report(1.0, LABEL)
     return _raw_field(values.reshape(-1, columns))
 
 
@@ -66,7 +68,7 @@ def _check_npy_size(data: bytes) -> None:
             raise ValueError(f"it declares the shape {shape}, which is more than it contains")
 
 
-def read_npy_task(path: Path) -> Task[RawField]:
+def read_npy(path: Path) -> RawField:
     """Read an `.npy` array of shape (n, 3), (n, 3 N), (n, N, 3) or, for tensors, (n, 3, 3).
 
     Raises
@@ -89,10 +91,10 @@ def read_npy_task(path: Path) -> Task[RawField]:
         raise RosyError(
             f"{path}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
-    yield Progress(0.5, LABEL)
+    report(0.5, LABEL)
     values = as_float64(values.reshape(len(values), -1))
     _check_columns(str(path), values.shape[1])
-    yield Progress(0.8, LABEL)
+    report(0.8, LABEL)
     return _raw_field(values)
 
 

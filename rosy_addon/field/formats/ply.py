@@ -14,10 +14,10 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ...progress import Progress, Task, run_to_completion, subtask
+from ...progress import progress, report
 from ..validate import as_float64
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, TextRows, abbreviate, read_rows_task
+from .text_rows import LABEL, TextRows, abbreviate, read_rows
 
 _DTYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -56,7 +56,7 @@ class _Element:
 _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 
-def read_ply_task(path: Path) -> Task[Polygons]:
+def read_ply(path: Path) -> Polygons:
     """Read the vertices and polygons of a .ply file.
 
     Raises
@@ -65,8 +65,8 @@ def read_ply_task(path: Path) -> Task[Polygons]:
         If the file cannot be read, is malformed or truncated, has no vertices or faces, or an index
         is out of range.
     """
-    columns, _ = yield from _read_columns_task(path)
-    yield Progress(1.0, LABEL)
+    columns, _ = _read_columns(path)
+    report(1.0, LABEL)
     try:
         vertices = np.stack([columns["vertex"][axis] for axis in "xyz"], axis=1)
     except KeyError as missing:
@@ -103,7 +103,7 @@ def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
     RosyError
         If the file cannot be read, is malformed or truncated.
     """
-    columns, elements = run_to_completion(_read_columns_task(path))
+    columns, elements = _read_columns(path)
     values = {}
     for prop in next((e.properties for e in elements if e.name == "vertex"), []):
         if prop.name in "xyz" or prop.count_type is not None:
@@ -114,13 +114,13 @@ def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
     return values
 
 
-def _read_columns_task(path: Path) -> Task[tuple[dict[str, _Columns], list[_Element]]]:
+def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
     """All values of a file by element and property, and the elements that its header declares."""
     data = read_bytes(path)
     byte_order, elements, offset = _header(path, data)
     if byte_order == "":
-        return (yield from _text_elements_task(path, data, elements)), elements
-    yield Progress(0.1, LABEL)
+        return _text_elements(path, data, elements), elements
+    report(0.1, LABEL)
     return _binary_elements(path, data, offset, byte_order, elements), elements
 
 
@@ -181,12 +181,11 @@ def _parse_count(word: str) -> int:
     return count
 
 
-def _text_elements_task(
-    path: Path, data: bytes, elements: list[_Element]
-) -> Task[dict[str, _Columns]]:
+def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
     """The values of all elements of a text file."""
     # The header is included, so that line numbers are those of the file.
-    rows = yield from subtask(read_rows_task(path, comment=None, data=data), 0.0, 0.5)
+    with progress(0.0, 0.5):
+        rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
     columns = {}
     for element in elements:
@@ -194,16 +193,16 @@ def _text_elements_task(
         if len(element_rows) < element.count:
             raise _truncated(path, element, len(element_rows))
         first += element.count
-        task = _text_columns_task(element_rows, element)
-        columns[element.name] = yield from subtask(task, 0.5, 1.0)
+        with progress(0.5, 1.0):
+            columns[element.name] = _text_columns(element_rows, element)
     return columns
 
 
-def _text_columns_task(rows: TextRows, element: _Element) -> Task[_Columns]:
+def _text_columns(rows: TextRows, element: _Element) -> _Columns:
     """The values of one element, given its rows."""
     starts = offsets_from_sizes([len(words) for words in rows.words])
-    values = yield from rows.floats_task(f"value of a {element.name}")
-    yield Progress(1.0, LABEL)
+    values = rows.floats(f"value of a {element.name}")
+    report(1.0, LABEL)
     position = starts[:-1]
     columns: _Columns = {}
     for prop in element.properties:

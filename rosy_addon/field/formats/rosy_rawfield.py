@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError, counted
-from ...progress import Task, subtask
+from ...progress import progress
 from ..rosy_field import RosyField, check_degree
 from .raw_field import RawField
-from .text_rows import TextRows, abbreviate, format_blocks, read_rows_task
+from .text_rows import TextRows, abbreviate, format_blocks, read_rows
 
 
-def read_rosy_task(path: Path) -> Task[RawField]:
+def read_rosy(path: Path) -> RawField:
     """Read a `.rosy` file: a count, N, and rows x y z.
 
     Count and N may be on one line or on two.
@@ -27,13 +27,15 @@ def read_rosy_task(path: Path) -> Task[RawField]:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    rows = yield from subtask(read_rows_task(path, comment=None), 0.0, 0.4)
+    with progress(0.0, 0.4):
+        rows = read_rows(path, comment=None)
     count, degree = _read_header(rows, "count", "degree")
-    table = yield from subtask(_vector_table_task(rows, 3, count), 0.4, 1.0)
+    with progress(0.4, 1.0):
+        table = _vector_table(rows, 3, count)
     return RawField(table.reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count)
 
 
-def read_rawfield_task(path: Path) -> Task[RawField]:
+def read_rawfield(path: Path) -> RawField:
     """Read a `.rawfield` file: N, a count, and rows of N vectors.
 
     Raises
@@ -41,10 +43,12 @@ def read_rawfield_task(path: Path) -> Task[RawField]:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    rows = yield from subtask(read_rows_task(path, comment=None), 0.0, 0.4)
+    with progress(0.0, 0.4):
+        rows = read_rows(path, comment=None)
     degree, count = _read_header(rows, "degree", "count")
     degree = _validated_degree(rows, 0, degree)
-    table = yield from subtask(_vector_table_task(rows, 3 * degree, count), 0.4, 1.0)
+    with progress(0.4, 1.0):
+        table = _vector_table(rows, 3 * degree, count)
     return RawField(table.reshape(-1, degree, 3), degree, count)
 
 
@@ -85,7 +89,7 @@ def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
         raise rows.error(rows.row_of_word(word), str(reason)) from None
 
 
-def _vector_table_task(rows: TextRows, columns: int, count: int) -> Task[np.ndarray]:
+def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
     """(n, columns) float64 numbers after the header; line breaks have no meaning.
 
     `count` is the number of rows that the header declares, for the message.
@@ -96,5 +100,5 @@ def _vector_table_task(rows: TextRows, columns: int, count: int) -> Task[np.ndar
             f"{rows.path}: declares {counted(count, 'row')} of {columns} numbers, but contains {row_count} and "
             "part of another"
         )
-    values = yield from rows.floats_task("part of a vector")
+    values = rows.floats("part of a vector")
     return values[2:].reshape(row_count, columns)

@@ -8,17 +8,17 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ...progress import Progress, Task, subtask
+from ...progress import progress, report
 from ..validate import as_float64
 from .polygons import Polygons
-from .text_rows import LABEL, TextRows, read_rows_task
+from .text_rows import LABEL, TextRows, read_rows
 
 #: Size of the header of a binary file, with the number of triangles in its last 4 bytes.
 _HEADER_BYTES = 84
 _TRIANGLE_DTYPE = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl_task(path: Path) -> Task[Polygons]:
+def read_stl(path: Path) -> Polygons:
     """Read an .stl file; corners at exactly the same position share a vertex.
 
     Raises
@@ -35,11 +35,12 @@ def read_stl_task(path: Path) -> Task[Polygons]:
         and data.lstrip()[:5].lower() == b"solid"
         and b"\0" not in data[:_HEADER_BYTES]
     ):
-        points = yield from subtask(_text_points_task(path, data), 0.0, 0.8)
+        with progress(0.0, 0.8):
+            points = _text_points(path, data)
     else:
         points = _binary_points(path, data, count)
     points = as_float64(points)
-    yield Progress(0.8, LABEL)
+    report(0.8, LABEL)
     vertices, corner_vertex = weld(points)
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 
@@ -84,9 +85,10 @@ def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     return np.frombuffer(data, _TRIANGLE_DTYPE, count, _HEADER_BYTES)["points"].reshape(-1, 3)
 
 
-def _text_points_task(path: Path, data: bytes) -> Task[np.ndarray]:
+def _text_points(path: Path, data: bytes) -> np.ndarray:
     """(3 T, 3) float64 corners of the triangles of a text file."""
-    rows = yield from subtask(read_rows_task(path, comment=None, data=data), 0.0, 0.6)
+    with progress(0.0, 0.6):
+        rows = read_rows(path, comment=None, data=data)
     corner_rows = [row for row, words in enumerate(rows.words) if words[0].lower() == b"vertex"]
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
     if len(corner_rows) != 3 * loops:
@@ -102,4 +104,5 @@ def _text_points_task(path: Path, data: bytes) -> Task[np.ndarray]:
     )
     if not corner_rows:
         return np.zeros((0, 3))
-    return (yield from subtask(vertex_rows.points_task("corner"), 0.6, 1.0))
+    with progress(0.6, 1.0):
+        return vertex_rows.points("corner")

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ...progress import Progress, Task, run_to_completion
+from ...progress import report
 
 #: Rows and words of a text file that are parsed or written in a step.
 ROWS_PER_STEP, WORDS_PER_STEP = 1 << 14, 1 << 16
@@ -49,19 +49,15 @@ class TextRows:
             return RosyError(f"{self.path}:{self.line_numbers[row]}: {message}")
         return RosyError(f"{self.path}: {message}")
 
-    def floats_task(self, label: str) -> Task[np.ndarray]:
+    def floats(self, label: str) -> np.ndarray:
         """Parse all words of all rows as one float64 array; `label` is for messages."""
-        return self._parse_task(float, np.float64, f"a number ({label})")
-
-    def ints_task(self, label: str) -> Task[np.ndarray]:
-        """Parse all words of all rows as one int64 array; `label` is for messages."""
-        return self._parse_task(int, np.int64, f"a whole number ({label})")
+        return self._parse(float, np.float64, f"a number ({label})")
 
     def ints(self, label: str) -> np.ndarray:
-        """Run `ints_task` to its end."""
-        return run_to_completion(self.ints_task(label))
+        """Parse all words of all rows as one int64 array; `label` is for messages."""
+        return self._parse(int, np.int64, f"a whole number ({label})")
 
-    def points_task(self, label: str) -> Task[np.ndarray]:
+    def points(self, label: str) -> np.ndarray:
         """Parse the first three words of each row as a point.
 
         Returns
@@ -78,9 +74,9 @@ class TextRows:
                 raise self.error(
                     row, f"{label} has {counted(len(words), 'coordinate')}, expected 3"
                 )
-        yield Progress(0.0, LABEL)
+        report(0.0, LABEL)
         coordinates = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers)
-        points = (yield from coordinates.floats_task(label)).reshape(-1, 3)
+        points = coordinates.floats(label).reshape(-1, 3)
         finite = np.isfinite(points).all(axis=1)
         if not finite.all():
             row = int(np.argmin(finite))
@@ -92,13 +88,13 @@ class TextRows:
         ends = list(accumulate(map(len, self.words)))
         return int(np.searchsorted(ends, word, side="right"))
 
-    def _parse_task(self, convert: Callable, dtype: type, expected: str) -> Task[np.ndarray]:
+    def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
         """Convert all words of all rows, or raise an error that names the first bad one."""
         count = sum(map(len, self.words))
         values = np.empty(count, dtype=dtype)
         words = chain.from_iterable(self.words)
         for start in range(0, count, WORDS_PER_STEP):
-            yield Progress(start / count, LABEL)
+            report(start / count, LABEL)
             stop = min(start + WORDS_PER_STEP, count)
             try:
                 values[start:stop] = list(map(convert, islice(words, stop - start)))
@@ -119,13 +115,6 @@ class TextRows:
 
 
 def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = None) -> TextRows:
-    """Run `read_rows_task` to its end."""
-    return run_to_completion(read_rows_task(path, comment=comment, data=data))
-
-
-def read_rows_task(
-    path: Path, *, comment: bytes | None = b"#", data: bytes | None = None
-) -> Task[TextRows]:
     """Read the rows of a text file; empty lines are left out.
 
     Parameters
@@ -142,18 +131,18 @@ def read_rows_task(
         If the file cannot be read or is not text.
     """
     data = read_bytes(path, reject_binary=True) if data is None else data
-    yield Progress(0.0, LABEL)
+    report(0.0, LABEL)
     # Also accept a lone CR, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        yield Progress(0.0, LABEL)
+        report(0.0, LABEL)
     lines = data.split(b"\n")
     has_comments = comment is not None and comment in data
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
     for start in range(0, len(lines), ROWS_PER_STEP):
-        yield Progress(start / len(lines), LABEL)
+        report(start / len(lines), LABEL)
         block = lines[start : start + ROWS_PER_STEP]
         if has_comments:
             block = [line.partition(comment)[0] for line in block]

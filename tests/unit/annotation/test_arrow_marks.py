@@ -13,11 +13,11 @@ from rosy_addon.annotation.arrow_marks import (
     NOTCH,
     WIDTH,
     ArrowMarks,
-    arrow_marks_task,
+    arrow_marks,
 )
-from rosy_addon.annotation.draw_arrows import draw_arrows_task
+from rosy_addon.annotation.draw_arrows import draw_arrows
 from rosy_addon.annotation.even_spacing import spaced_points
-from rosy_addon.annotation.surface_places import surface_places_task
+from rosy_addon.annotation.surface_places import surface_places
 from rosy_addon.cache import Cache
 from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.look import Look
@@ -41,7 +41,7 @@ CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 480, 400, fov=
 
 
 def arrows(instances, camera=CAMERA, spacing=24.0, size=8.0, **options) -> ArrowMarks:
-    return run_to_completion(arrow_marks_task(instances, camera, spacing, size, **options))
+    return arrow_marks(instances, camera, spacing, size, **options)
 
 
 def instance_of(surface, degree, kind="smoothest"):
@@ -187,9 +187,7 @@ def test_places_do_not_depend_on_how_a_mesh_is_deformed():
         surface, vertices=surface.vertices * (1.0, 1.0, 1.1), rest_vertices=surface.vertices
     )
     cache = Cache()
-    places = [
-        run_to_completion(surface_places_task(shape, 0.1, cache)) for shape in (surface, stretched)
-    ]
+    places = [surface_places(shape, 0.1, cache) for shape in (surface, stretched)]
     assert places[0] is places[1] and places[0].distance[-1] == places[0].finest <= 0.1
     corners = surface.vertices[surface.triangle_vertex[places[0].triangle]]
     points = np.einsum("nk,nki->ni", places[0].barycentric, corners)
@@ -232,7 +230,7 @@ def test_an_arrowhead_has_its_shape_and_its_outline():
     direction = np.array([[np.cos(0.5), np.sin(0.5)]])
     place = np.array([[40.2, 30.7]])
     marks = ArrowMarks(np.zeros((1, 3)), place, place, direction, 24.0)
-    picture = run_to_completion(draw_arrows_task(rgba, marks))
+    picture = draw_arrows(rgba, marks)
     fill = to_linear(from_hex(FILL_COLOR))[0]
     dark = np.where(picture[..., 3] > 0, (1 - picture[..., 0]) / (1 - fill), 0)
     y, x = np.mgrid[:60, :80] + 0.5
@@ -244,9 +242,9 @@ def test_an_arrowhead_has_its_shape_and_its_outline():
     sides = 2 * 24 * (np.hypot(1, WIDTH / 2) + np.hypot(NOTCH, WIDTH / 2))
     assert picture[..., 3].sum() - dark.sum() == pytest.approx(2.4 * sides, rel=0.1)
     none = ArrowMarks(np.zeros((0, 3)), *np.zeros((3, 0, 2)), 24.0)
-    np.testing.assert_array_equal(run_to_completion(draw_arrows_task(rgba, none)), rgba)
+    np.testing.assert_array_equal(draw_arrows(rgba, none), rgba)
     beside = replace(marks, position=np.array([[-300.0, 30.0]]))
-    np.testing.assert_array_equal(run_to_completion(draw_arrows_task(rgba, beside)), rgba)
+    np.testing.assert_array_equal(draw_arrows(rgba, beside), rgba)
 
 
 def rendered(view, **options):

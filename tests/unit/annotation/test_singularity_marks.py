@@ -9,7 +9,7 @@ import pytest
 from conftest import long
 from shapes import globe, icosphere, torus
 
-from rosy_addon.annotation.draw_marks import draw_marks_task
+from rosy_addon.annotation.draw_marks import draw_marks
 from rosy_addon.annotation.index_labels import LETTERS, placed_labels, text_segments, text_width
 from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN, OUTLINE, SingularityMarks
 from rosy_addon.color import from_hex, to_linear
@@ -43,7 +43,7 @@ def marks(position, index, degree=4, depth=1.0, is_visible=True, **settings) -> 
 
 
 def drawn(rgba, singularities):
-    return run_to_completion(draw_marks_task(rgba, singularities))
+    return draw_marks(rgba, singularities)
 
 
 def gray(height=60, width=80):

@@ -12,14 +12,14 @@ from shapes import icosphere, torus
 from rosy_addon.compositor import fast_lic
 from rosy_addon.compositor.band import Band
 from rosy_addon.compositor.band_division import context_rows, divide_rows
-from rosy_addon.compositor.compose import compose, compose_task
+from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.presets.store import load_preset
-from rosy_addon.progress import Progress, run_to_completion
+from rosy_addon.progress import Progress
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project, project_task
+from rosy_addon.projection.project import project
 from rosy_addon.rendering.view_input import ViewInput
 
 WIDTH, HEIGHT = 96, 320
@@ -64,11 +64,10 @@ def drawn(view: ViewInput, rows: list[tuple[int, int]], context: int) -> np.ndar
     samples = view.samples_per_side
     for start, stop in rows:
         band = Band(start, stop, context, exchange)
-        task = project_task(
+        gbuffer = project(
             view.instances, CAMERA, view.look.display, samples=samples, rows=band.rows(HEIGHT)
         )
-        gbuffer = run_to_completion(task)
-        parts.append(run_to_completion(compose_task(gbuffer, view.look, band=band)).rgba)
+        parts.append(compose(gbuffer, view.look, band=band).rgba)
     return np.concatenate(parts)
 
 

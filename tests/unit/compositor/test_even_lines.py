@@ -17,7 +17,7 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import (
     COARSE_RATIO,
     EvenLines,
-    even_lines_task,
+    even_lines,
     look_width_table,
     uneven_width,
 )
@@ -28,7 +28,6 @@ from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.presets.store import load_preset
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -69,7 +68,7 @@ def picture(instance, camera, look=LOOK):
 def lines_at_pixels(instance, camera, look=LOOK, cache=None):
     gbuffer = project([instance], camera)
     field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle, False)
-    return run_to_completion(even_lines_task(gbuffer, field, look, cache=cache)), gbuffer
+    return even_lines(gbuffer, field, look, cache=cache), gbuffer
 
 
 # --- lines in pictures -------------------------------------------------------------------------------
@@ -134,7 +133,7 @@ def test_members_get_the_lines_along_them(degree, side):
     gbuffer = project([instance], camera)
     field = surface_pixel_field(gbuffer, degree, 0.7, False)
     look = replace(LOOK, grain=8.0, guiding_angle=0.3)
-    lines = run_to_completion(even_lines_task(gbuffer, field, look))
+    lines = even_lines(gbuffer, field, look)
     members = all_members(field, look.guiding_angle)
     for member, streak in zip(members, lines.streaks, strict=False):
         image = streak.reshape(SIZE, SIZE)

@@ -14,14 +14,13 @@ from planar_fields import pair_angle, pixel_centers
 from scipy import ndimage
 
 from rosy_addon.compositor import fast_lic
-from rosy_addon.compositor.brute_force import brute_force_task
+from rosy_addon.compositor.brute_force import brute_force
 from rosy_addon.compositor.covering import build_covering
-from rosy_addon.compositor.fast_lic import fast_lic_task
+from rosy_addon.compositor.fast_lic import compute_fast_lic
 from rosy_addon.compositor.filter_kernel import kernel_weights
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import planar_pixel_field
-from rosy_addon.progress import run_to_completion
 
 SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
@@ -43,15 +42,11 @@ def make_noise(field, look=LOOK, channels=1):
 
 
 def fast_images(field, look=LOOK, noise=None):
-    return run_to_completion(
-        fast_lic_task(field, look, make_noise(field) if noise is None else noise)
-    )
+    return compute_fast_lic(field, look, make_noise(field) if noise is None else noise)
 
 
 def brute_force_images(field, look=LOOK, noise=None):
-    return run_to_completion(
-        brute_force_task(field, look, make_noise(field) if noise is None else noise)
-    )
+    return brute_force(field, look, make_noise(field) if noise is None else noise)
 
 
 def uniform_field(angle, degree, size=SIZE):

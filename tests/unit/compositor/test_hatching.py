@@ -16,7 +16,7 @@ from rosy_addon.color import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import EvenLines
 from rosy_addon.compositor.family_hues import line_families
-from rosy_addon.compositor.fast_lic import fast_lic_task
+from rosy_addon.compositor.fast_lic import compute_fast_lic
 from rosy_addon.compositor.hatching import (
     LineModulation,
     line_ink_indices,
@@ -34,15 +34,14 @@ from rosy_addon.compositor.shading import diffuse
 from rosy_addon.compositor.streak_statistics import (
     StreakSettings,
     break_steps,
-    streak_statistics_task,
+    streak_statistics,
 )
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
-from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field_task, wobble_angle
+from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field, wobble_angle
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.presets.store import load_preset, preset_keys
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -177,7 +176,7 @@ def test_presets_reproduce_a_ramp(name):
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Higher coverages have lower thresholds, and half coverage is near the mean."""
     settings = StreakSettings(81, 2.0, 0.5, 16.0, crispness)
-    threshold, deviation, *_ = run_to_completion(streak_statistics_task(settings))
+    threshold, deviation, *_ = streak_statistics(settings)
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
     assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric
@@ -280,12 +279,12 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     break_images = paper_grain = None
     if look.breaks or look.wobble:
         break_look = replace(look, length=break_steps(look))
-        break_images = run_to_completion(fast_lic_task(field, break_look, noise))
+        break_images = compute_fast_lic(field, break_look, noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
             field.pixel, field.width, look.grain, look.seed, 1, field.line_count
         )
-    images = run_to_completion(fast_lic_task(field, look, noise))
+    images = compute_fast_lic(field, look, noise)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
     _, alpha = render_hatching(
         field, images, look, tones, LineModulation(break_images, paper_grain)
@@ -388,7 +387,7 @@ def test_wobble_rotates_all_directions(degree):
     angle = np.linspace(-0.3, 0.3, 90).astype(np.float32)
     harmonics = {("deviation", j): np.full(90, c) for j, c in ((-1, 0.1j), (0, 1), (1, 0.2 + 0j))}
     field = replace(field, channels=harmonics)
-    turned = run_to_completion(rotate_pixel_field_task(field, angle))
+    turned = rotate_pixel_field(field, angle)
     member = np.exp(1j * np.angle(field.representation) / degree)
     before = field.member_direction(member)
     after = turned.member_direction(member * np.exp(1j * angle))

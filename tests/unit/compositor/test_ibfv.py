@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -18,11 +19,11 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.filter_kernel import full_sample_count
 from rosy_addon.compositor.flow import flow_at
 from rosy_addon.compositor.ibfv import decay_of_samples
-from rosy_addon.compositor.lic import lic_task, look_noise
+from rosy_addon.compositor.lic import lic, look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, SeamSteps, planar_pixel_field
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import as_task
 from rosy_addon.projection.project import project
 
 LOOK = Look(method="ibfv")
@@ -32,7 +33,7 @@ MARGIN = 40
 
 
 def draw(field: PixelField, look: Look = LOOK, noise: np.ndarray | None = None) -> LicImages:
-    return run_to_completion(lic_task(field, look, noise))
+    return lic(field, look, noise)
 
 
 def uniform(angle: float, degree: int, size: int = 192) -> PixelField:
@@ -300,8 +301,8 @@ def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):
     """And noise is carried once for all of them."""
     gbuffer = project([cases.instance(2000, 4)], cases.camera(64))
     calls = []
-    task = stages.streak_waves_task
-    monkeypatch.setattr(stages, "streak_waves_task", lambda *args: calls.append(1) or task(*args))
+    task = partial(as_task, stages.streak_waves)
+    monkeypatch.setattr(stages, "streak_waves", lambda *args: calls.append(1) or task(*args))
     cache = Cache()
     sequence = [compose(gbuffer, flow_at(FLOW, number), cache=cache).rgba for number in range(4)]
     assert len(calls) == 1

@@ -21,12 +21,12 @@ from rosy_addon.compositor.ink_thresholds import (
     threshold_pixels,
     unlit_look,
 )
-from rosy_addon.compositor.lic import lic_lengths_task, look_noise
+from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.paper_grain import picture_paper_grain
 from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.compositor.streak_statistics import break_steps
-from rosy_addon.compositor.undirected import undirected_texture_task
+from rosy_addon.compositor.undirected import undirected_texture
 from rosy_addon.field.generate import axis_field
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
@@ -46,11 +46,11 @@ def drawn_lines(look: Look, degree: int = 4, undefined: slice = slice(0)):
     field = planar_pixel_field(angles, degree)
     noise = look_noise(field, look)
     looks = [look, replace(look, length=break_steps(look))]
-    images, breaks = run_to_completion(lic_lengths_task(field, looks, noise))
+    images, breaks = lic_lengths(field, looks, noise)
     grain = None
     if look.paper_grain:
         grain = picture_paper_grain(field.pixel, SIZE, look.grain, 1, 1, field.line_count)
-    undirected = run_to_completion(undirected_texture_task(field, noise, look.grain))
+    undirected = undirected_texture(field, noise, look.grain)
     has_breaks = look.breaks > 0 or look.wobble > 0
     return (
         field,

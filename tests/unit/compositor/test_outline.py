@@ -14,16 +14,15 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.outline import (
     FULL_MARK_LENGTH,
     MIN_MARK_LENGTH,
-    _mark_strength_task,
+    _mark_strength,
     outline_coverage,
 )
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.outline_mesh import outline_mesh_task
+from rosy_addon.projection.outline_mesh import outline_mesh
 from rosy_addon.projection.project import project
 
 #: Width of outlines, and side of pictures in pixels.
@@ -246,7 +245,7 @@ def test_marks_grow_without_a_jump(block_side):
     frame = frame.repeat(block_side, axis=0).repeat(block_side, axis=1)
     pixel = np.flatnonzero(frame).astype(np.int32)
     border = np.zeros(len(pixel), dtype=np.uint8)
-    strength = run_to_completion(_mark_strength_task(pixel, border, frame.shape[1], block_side))
+    strength = _mark_strength(pixel, border, frame.shape[1], block_side)
     mark = pixel // frame.shape[1] // (4 * block_side)
     by_length = np.array([np.unique(strength[mark == index]) for index in range(len(lengths))])
     by_length = by_length[:, 0]
@@ -264,5 +263,4 @@ def test_deformed_meshes_keep_their_creases():
     deformed = build_surface(
         sheared, box.corner_vertex, box.face_start, sharp_angle=0.1, rest_vertices=box.vertices
     )
-    task = outline_mesh_task(deformed, np.eye(4), 1.4)
-    assert len(run_to_completion(task).crease_ends) == 12
+    assert len(outline_mesh(deformed, np.eye(4), 1.4).crease_ends) == 12

@@ -10,12 +10,11 @@ from shapes import icosphere, plane, torus
 from rosy_addon.color import map_colors, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import neighbor_table_task, surface_pixel_field
+from rosy_addon.compositor.pixel_field import neighbor_table, surface_pixel_field
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -139,7 +138,7 @@ def test_silhouettes_end_streamlines():
     field = axis_field(surface, 1, (0, 0, 1))
     gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
     pixel_field = surface_pixel_field(gbuffer, 1, 0.7, False)
-    linked = run_to_completion(neighbor_table_task(pixel_field))[:, :-1].T
+    linked = neighbor_table(pixel_field)[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])
     # The tube is 0.8 wide. At the two cusps where a silhouette ends, a pixel can span half of it.

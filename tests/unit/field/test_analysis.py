@@ -13,8 +13,7 @@ from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import description_task
-from rosy_addon.progress import run_to_completion
+from rosy_addon.field.singularities import description
 
 
 def rotating_field(surface, degree, rate):
@@ -110,12 +109,10 @@ def test_fields_are_described():
     """A smoothest 4-RoSy on a sphere has 8 singularities; two faces are undefined."""
     sphere = icosphere(3)
     field = generate(sphere, GeneratorSettings("smoothest"), 4)
-    task = description_task([(sphere, field)], count_singularities=True)
-    assert run_to_completion(task) == "8 singularities"
-    task = description_task([(sphere, field)], count_singularities=False)
-    assert run_to_completion(task) == ""
+    assert description([(sphere, field)], count_singularities=True) == "8 singularities"
+    assert description([(sphere, field)], count_singularities=False) == ""
     vectors = field.vectors.copy()
     vectors[[3, 70]] = 0
     fields = [(sphere, field), (sphere, RosyField(4, vectors))]
-    note = run_to_completion(description_task(fields, count_singularities=False))
+    note = description(fields, count_singularities=False)
     assert note == "2 faces without a direction"

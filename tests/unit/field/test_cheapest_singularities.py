@@ -9,17 +9,15 @@ from shapes import cylinder, globe, icosphere, torus
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field.analysis import dirichlet_energy
-from rosy_addon.field.cheapest_singularities import cheapest_singularities_task
+from rosy_addon.field.cheapest_singularities import cheapest_singularities
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
-from rosy_addon.progress import run_to_completion
 
 
 def completed(surface, degree, vertex, index):
-    task = cheapest_singularities_task(surface, degree, vertex, index)
-    return run_to_completion(task)
+    return cheapest_singularities(surface, degree, vertex, index)
 
 
 def energy_of(surface, degree, vertex, index):

@@ -13,18 +13,17 @@ from rosy_addon.field.combing import Combing, start_combing
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
-from rosy_addon.field.guided_system import guided_system_task
+from rosy_addon.field.guided_system import guided_system
 from rosy_addon.field.representation import to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
-from rosy_addon.progress import run_to_completion
 
 MAJOR, MINOR = 1.0, 0.4
 
 
 def start(surface: Surface, degree: int, kind: str = "smoothest", reach: float = 0.1) -> Combing:
-    system = run_to_completion(guided_system_task(surface, degree))
+    system = guided_system(surface, degree)
     no_guides = np.zeros((surface.face_count, 3))
     field = generate(surface, kind, degree)
     return start_combing(system, field, no_guides, reach * surface.extent)
@@ -41,7 +40,7 @@ def draw(combing: Combing, points: np.ndarray, batch: int = 1000, pressure: floa
         part = points[first : first + batch]
         combing.follow(stroke.extend(part, np.full(len(part), pressure)))
     combing.follow(stroke.finish())
-    run_to_completion(combing.settle_task())
+    combing.settle()
 
 
 def angles(combing: Combing, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -136,7 +135,7 @@ def test_field_near_the_brush_follows_at_once():
     points = on_torus(np.linspace(0, 0.8, 60))
     combing.follow(stroke.extend(points, np.ones(60)))
     early = combing.vectors
-    run_to_completion(combing.settle_task())
+    combing.settle()
     is_near = cKDTree(points[:-10]).query(combing.system.surface.face_center)[0] < 0.1
     assert angles(combing, early, combing.vectors)[is_near].max() < 3
 
@@ -197,7 +196,7 @@ def test_other_side_of_a_sheet_is_left_out():
 def test_magnitude_stays():
     surface = icosphere(3)
     field = axis_field(surface, 2)
-    system = run_to_completion(guided_system_task(surface, 2))
+    system = guided_system(surface, 2)
     combing = start_combing(system, field, np.zeros((surface.face_count, 3)), 0.1)
     angle = np.linspace(0, 1, 50)
     draw(combing, np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
@@ -215,7 +214,7 @@ def test_points_far_away_are_refused(far):
 
 def test_undefined_field_is_refused():
     surface = plane()
-    system = run_to_completion(guided_system_task(surface, 4))
+    system = guided_system(surface, 4)
     zero = np.zeros((surface.face_count, 3))
     with pytest.raises(RosyError, match="undefined everywhere: make a field first"):
         start_combing(system, RosyField(4, zero), zero, 0.1)
@@ -227,6 +226,6 @@ def test_exact_guides_survive_storing():
     is_exact = np.abs(combing.guides) > 0.99
     stored = combing.guide_vectors.astype(np.float32)
     again = start_combing(combing.system, RosyField(4, combing.vectors), stored, 0.1)
-    run_to_completion(again.settle_task())
+    again.settle()
     assert is_exact.any()
     assert angles(again, again.vectors, normalize(stored))[is_exact].max() < 1e-4

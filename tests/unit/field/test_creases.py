@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from shapes import cube, cylinder, from_triangles, icosphere
 
-from rosy_addon.field.creases import creases_task
+from rosy_addon.field.creases import compute_creases
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
 
 
 def creases(surface, angle=0.7):
-    return run_to_completion(creases_task(surface, angle))
+    return compute_creases(surface, angle)
 
 
 def ridge(height, cells=48, noise=0.0):

@@ -7,13 +7,12 @@ import pytest
 from awkward import AWKWARD
 from shapes import cube, cylinder, icosphere, plane, torus
 
-from rosy_addon.field.feature_curvature import feature_curvature_task
+from rosy_addon.field.feature_curvature import feature_curvature as field_feature_curvature
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
 
 
 def feature_curvature(surface):
-    return run_to_completion(feature_curvature_task(surface))
+    return field_feature_curvature(surface)
 
 
 def with_noise(surface, share):

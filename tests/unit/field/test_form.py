@@ -7,18 +7,18 @@ import pytest
 from conftest import mainly
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
-from rosy_addon.field.connection import connection_task, laplacian_task
-from rosy_addon.field.form import form_task
+from rosy_addon.field.connection import build_connection, laplacian
+from rosy_addon.field.form import form
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import generate
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.salient_edges import filtered_normals_task, salient_edges_task
+from rosy_addon.field.salient_edges import filtered_normals, salient_edges
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_edges, build_surface
 from rosy_addon.field.surface_averages import SurfaceAverages
-from rosy_addon.field.vertex_noise import noise_sample_task
-from rosy_addon.progress import run_to_completion
+from rosy_addon.field.vertex_noise import noise_sample
+from rosy_addon.progress import as_task
 
 AXES = np.array([1.0, 0.8, 0.6])
 
@@ -66,8 +66,8 @@ def cross_errors(surface: Surface, field: RosyField, expected: np.ndarray) -> np
 
 def salient(surface: Surface) -> np.ndarray:
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    filtered = run_to_completion(filtered_normals_task(surface, edges))
-    return run_to_completion(salient_edges_task(surface, edges, *filtered))
+    filtered = filtered_normals(surface, edges)
+    return salient_edges(surface, edges, *filtered)
 
 
 @pytest.mark.slow
@@ -104,8 +104,8 @@ def test_noise_is_measured():
     for surface, share in ((torus(200, 100), 0.002), (ellipsoid(), 0.0005)):
         noisy = with_noise(surface, share)
         edges = build_edges(noisy.corner_vertex, noisy.face_start)
-        _, angle = run_to_completion(filtered_normals_task(noisy, edges))
-        sample = run_to_completion(noise_sample_task(noisy, edges, angle))
+        _, angle = filtered_normals(noisy, edges)
+        sample = noise_sample(noisy, edges, angle)
         expected = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
         assert np.sqrt(dot(sample, sample).mean()) == pytest.approx(expected, rel=0.2)
 
@@ -181,7 +181,7 @@ def test_disconnected_parts_and_stray_faces():
 
 
 def test_long_work_is_done_in_steps():
-    steps = [progress.fraction for progress in form_task(torus(64, 32), 4)]
+    steps = [progress.fraction for progress in as_task(form, torus(64, 32), 4)]
     assert len(steps) > 60
     assert steps == sorted(steps)
 
@@ -189,23 +189,23 @@ def test_long_work_is_done_in_steps():
 def test_averages_of_numbers_below_all_normal_ones():
     """They are 0, without an overflow of their inverse."""
     surface = icosphere(1)
-    connection = run_to_completion(connection_task(surface))
+    connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, *face_frames(surface))
-    matrix = run_to_completion(laplacian_task(connection, 0))
+    matrix = laplacian(connection, 0)
     matrix = matrix.with_values(matrix.data.real.astype(np.float32))
     sums = averages.node_sums(np.full(surface.face_count, 1e-320), 0)
     assert sums.any()
-    assert not run_to_completion(averages.smooth_task(matrix, 0.1, sums)).any()
+    assert not averages.smooth(matrix, 0.1, sums).any()
 
 
 def test_averages_with_an_indefinite_matrix():
     """Obtuse triangles have negative weights: conjugate gradients end at their last good step."""
     surface = icosphere(0)
-    connection = run_to_completion(connection_task(surface))
+    connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, *face_frames(surface))
     # With unit masses, five neighbors and 4 on the diagonal, the sum of every row is 0.
-    matrix = run_to_completion(laplacian_task(connection, 0))
+    matrix = laplacian(connection, 0)
     matrix = matrix.with_values(np.where(matrix.data.real > 0, 4.0, -1.0).astype(np.float32))
     sums = np.ones(connection.node_count)
     area = float(averages.mass.mean())
-    assert not run_to_completion(averages.smooth_task(matrix, area, sums)).any()
+    assert not averages.smooth(matrix, area, sums).any()

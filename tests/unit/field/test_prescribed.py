@@ -10,13 +10,12 @@ from shapes import cylinder, from_quads, globe, icosphere, torus
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field import prescribed, turning_angles
-from rosy_addon.field.face_graph import face_graph_task, spanning_forest_task
+from rosy_addon.field.face_graph import face_graph, spanning_forest
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_frames, matching_angles, to_representation
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.field.triangle_graph import triangle_graph
-from rosy_addon.progress import run_to_completion
 
 
 def block(holes: int, missing: int = 0) -> Surface:
@@ -64,7 +63,7 @@ def spread_vertices(surface: Surface, count: int, seed: int) -> np.ndarray:
 
 
 def graph_of(surface):
-    return run_to_completion(face_graph_task(surface, *face_frames(surface)))
+    return face_graph(surface, *face_frames(surface))
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -229,8 +228,9 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
     )
     turn = 2 * np.pi / degree
     required = turn * node_index - faces.defect
-    task = spanning_forest_task(len(graph.component), graph.source, graph.target)
-    loops = run_to_completion(turning_angles._loops_task(graph, run_to_completion(task)))
+    loops = turning_angles._loops(
+        graph, spanning_forest(len(graph.component), graph.source, graph.target)
+    )
     rows = np.zeros((len(loops), len(edge)))
     for row, (crossed, signs) in zip(rows, loops, strict=True):
         row[crossed] = signs
@@ -247,8 +247,7 @@ def test_the_energy_is_that_of_a_dense_solver(surface, degree, vertex, index):
         energies.append(solution @ solution)
         to_center = triangles.turns_to_centers(solution / root)
         angles.append(triangles.on_faces(root * solution, to_center))
-    task = turning_angles.turning_angles_task(surface, faces, degree, required)
-    angle, _ = run_to_completion(task)
+    angle, _ = turning_angles.turning_angles(surface, faces, degree, required)
     nearest = int(np.argmin([np.abs(other - angle).max() for other in angles]))
     np.testing.assert_allclose(angle, angles[nearest], atol=1e-6)
     assert energies[nearest] == pytest.approx(min(energies), rel=1e-6, abs=1e-9)

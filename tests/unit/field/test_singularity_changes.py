@@ -14,9 +14,8 @@ from rosy_addon.field.prescribed import change_singularities, prescribed_field
 from rosy_addon.field.representation import face_frames, face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.singularity_pairs import opposite_pairs_task
+from rosy_addon.field.singularity_pairs import opposite_pairs
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
 
 #: Many faces meet at its poles, so that they can have large indices.
 BALL = globe(32, 64)
@@ -131,8 +130,10 @@ def test_pairs_are_the_nearest_along_edges():
     index = np.array([1, -1, 1, 1, -1, 1])
 
     def pairs(steps):
-        task = opposite_pairs_task(surface, vertex, index, (steps + 0.01) * step)
-        return {tuple(pair) for pair in run_to_completion(task).tolist()}
+        return {
+            tuple(pair)
+            for pair in opposite_pairs(surface, vertex, index, (steps + 0.01) * step).tolist()
+        }
 
     assert pairs(1.9) == set()
     assert pairs(2) == {(1, 2)}

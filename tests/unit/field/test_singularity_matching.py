@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from rosy_addon.field.singularity_matching import match_singularities_task
-from rosy_addon.progress import run_to_completion
+from rosy_addon.field.singularity_matching import match_singularities
 
 
 def match(*arguments):
-    return run_to_completion(match_singularities_task(*arguments))
+    return match_singularities(*arguments)
 
 
 def greedy_pairs(points, index, other_points, other_index, reach):

@@ -20,15 +20,15 @@ from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
-from rosy_addon.field.smoothest import smallest_eigenvectors_task, smoothest_field, smoothest_task
+from rosy_addon.field.smoothest import smallest_eigenvectors, smoothest_field
 from rosy_addon.field.sparse_multigrid import (
     from_coo,
-    hierarchy_task,
-    matrix_product_task,
+    hierarchy,
+    matrix_product,
     w_cycle,
 )
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import as_task
 
 
 def random_sphere(count, seed=1):
@@ -56,9 +56,7 @@ def random_matrix(rows, columns, seed):
 def test_products_of_sparse_matrices():
     a, b = random_matrix(60, 40, 0), random_matrix(40, 25, 1)
     dense = as_scipy(a).toarray() @ as_scipy(b).toarray()
-    np.testing.assert_allclose(
-        as_scipy(run_to_completion(matrix_product_task(a, b))).toarray(), dense, atol=1e-12
-    )
+    np.testing.assert_allclose(as_scipy(matrix_product(a, b)).toarray(), dense, atol=1e-12)
     vector = np.arange(40) * (1 + 2j)
     np.testing.assert_allclose(a @ vector, as_scipy(a) @ vector, atol=1e-10)
 
@@ -66,8 +64,8 @@ def test_products_of_sparse_matrices():
 def test_products_of_larger_matrices_take_more_steps(monkeypatch):
     monkeypatch.setattr(sparse_multigrid, "BLOCKS_PER_STEP", 1)
     small, large = (laplacian(build_connection(icosphere(level)), 4, shift=1.0) for level in (3, 5))
-    assert sum(1 for _ in matrix_product_task(small, small)) <= 2
-    assert sum(1 for _ in matrix_product_task(large, large)) >= len(large) / 2**13
+    assert sum(1 for _ in as_task(matrix_product, small, small)) <= 2
+    assert sum(1 for _ in as_task(matrix_product, large, large)) >= len(large) / 2**13
 
 
 def test_the_adjoint():
@@ -80,7 +78,7 @@ def test_the_adjoint():
 def test_multigrid_cycles_converge(degree):
     connection = build_connection(bumpy(icosphere(5)))
     matrix = laplacian(connection, degree, 0.1)
-    levels = run_to_completion(hierarchy_task(matrix))
+    levels = hierarchy(matrix)
     assert len(levels) > 2
     right = np.random.default_rng(0).standard_normal(len(matrix)) + 0j
     expected = spsolve(as_scipy(matrix).tocsc(), right)
@@ -107,7 +105,7 @@ def test_multigrid_cycles_ignore_rows_of_rounding():
     right = np.append(np.random.default_rng(0).standard_normal(count), 0) + 0j
     solution = np.zeros_like(right)
     with np.errstate(divide="raise", invalid="raise", over="raise"):
-        levels = run_to_completion(hierarchy_task(with_row))
+        levels = hierarchy(with_row)
         for _ in range(12):
             solution += w_cycle(levels, right - with_row @ solution)
     assert len(levels) > 1
@@ -153,7 +151,7 @@ def test_energies_on_the_unit_sphere():
     """The smallest eigenvalue on the round sphere is N."""
     connection = build_connection(random_sphere(10_000))
     for degree in (1, 4):
-        _, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
+        _, energy = smallest_eigenvectors(connection, degree)
         assert energy == pytest.approx(degree, rel=0.01)
 
 
@@ -174,7 +172,7 @@ def shapes_of_other_programs():
 def test_the_eigenvector_matches_scipy(shapes, degree):
     for name, surface in shapes():
         connection = build_connection(surface)
-        z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
+        z, energy = smallest_eigenvectors(connection, degree)
         below = -1e-6 / connection.mass.sum()
         actual, vectors = eigsh(
             as_scipy(laplacian(connection, degree)),
@@ -239,7 +237,7 @@ def test_the_field_matches_another_library(degree):
     mass[vertex] = connection.mass
     actual, vectors = eigsh(raised, k=2, M=sparse.diags(mass), sigma=-1e-6)
     expected = vectors[:, np.argmin(actual)]
-    z, energy = run_to_completion(smallest_eigenvectors_task(connection, degree))
+    z, energy = smallest_eigenvectors(connection, degree)
     assert energy[0] == pytest.approx(actual.min(), rel=1e-5)
     our_z = np.empty(count, dtype=complex)
     our_z[vertex] = z
@@ -295,10 +293,9 @@ def test_each_component_has_its_own_field():
     corners = np.concatenate([first.corner_vertex, second.corner_vertex + len(first.vertices)])
     starts = np.concatenate([first.face_start, second.face_start[1:] + first.face_start[-1]])
     both = build_connection(build_surface(points, corners, starts))
-    _, energy = run_to_completion(smallest_eigenvectors_task(both, 4))
+    _, energy = smallest_eigenvectors(both, 4)
     separately = [
-        run_to_completion(smallest_eigenvectors_task(build_connection(surface), 4))[1][0]
-        for surface in (first, second)
+        smallest_eigenvectors(build_connection(surface), 4)[1][0] for surface in (first, second)
     ]
     np.testing.assert_allclose(energy, [separately[0], separately[1] / 0.09], rtol=1e-4)
 
@@ -324,7 +321,7 @@ def test_no_area_at_all_is_an_error():
 
 
 def test_progress_never_decreases():
-    fractions = [step.fraction for step in smoothest_task(icosphere(4), 4)]
+    fractions = [step.fraction for step in as_task(smoothest_field, icosphere(4), 4)]
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0] <= fractions[-1] <= 1
     assert len(fractions) > 20

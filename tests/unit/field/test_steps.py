@@ -7,10 +7,10 @@ import pytest
 from shapes import torus
 
 from rosy_addon.field import blocks, surface
-from rosy_addon.field.field_io import load_field, load_field_task, write_field, write_field_task
+from rosy_addon.field.field_io import load_field, write_field
 from rosy_addon.field.formats import fieldgen, obj, plain, text_rows
 from rosy_addon.field.generate import axis_field
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import as_task
 
 #: Rows of the blocks in these tests, and faces of the mesh.
 BLOCK, SIDE = 64, 32
@@ -53,20 +53,20 @@ def test_a_step_reads_and_writes_one_block(mesh, tmp_path, suffix, small_blocks)
     least = mesh.face_count / BLOCK
     path = tmp_path / f"a{suffix}"
     field = axis_field(mesh, 4, (1, 0.3, 0.2))
-    assert step_count(write_field_task(path, field, mesh)) > least
+    assert step_count(as_task(write_field, path, field, mesh)) > least
     # Each block of rows is split into words, and each block of words into numbers.
-    assert step_count(load_field_task(path, mesh)) > 4 * least
+    assert step_count(as_task(load_field, path, mesh)) > 4 * least
 
 
 def test_a_cancelled_export_leaves_the_old_file(mesh, tmp_path, small_blocks):
     path = tmp_path / "a.rosy"
     path.write_bytes(b"old")
-    task = write_field_task(path, axis_field(mesh, 4, (1, 0.3, 0.2)), mesh)
+    task = as_task(write_field, path, axis_field(mesh, 4, (1, 0.3, 0.2)), mesh)
     for _ in range(8):
         next(task)
     assert len(list(tmp_path.iterdir())) == 2
     task.close()
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
-    run_to_completion(write_field_task(path, axis_field(mesh, 4, (1, 0.3, 0.2)), mesh))
+    write_field(path, axis_field(mesh, 4, (1, 0.3, 0.2)), mesh)
     assert path.read_bytes().startswith(b"1024\n4\n")

@@ -7,13 +7,12 @@ import pytest
 from shapes import icosphere, plane
 
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.line_drawing.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view_task
+from rosy_addon.line_drawing.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.visibility import project_to_pixels
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
@@ -37,7 +36,7 @@ def mesh_and_part(name):
         axis_field(surface, 4, (1, 0.3, 0)) if name == "ground" else generate(surface, "form", 4)
     )
     mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
-    return mesh, run_to_completion(mesh_in_view_task(mesh, camera)), camera
+    return mesh, mesh_in_view(mesh, camera), camera
 
 
 def random_weights(count, rng):
@@ -104,7 +103,7 @@ def test_a_mesh_in_the_frame_is_not_changed():
     surface = icosphere(2)
     mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), generate(surface, "form", 4)))
     camera = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 100, 100)
-    assert run_to_completion(mesh_in_view_task(mesh, camera)).mesh is mesh
+    assert mesh_in_view(mesh, camera).mesh is mesh
 
 
 @pytest.mark.slow

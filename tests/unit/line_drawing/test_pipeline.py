@@ -15,7 +15,6 @@ from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing import lateral_neighbors, separation, visibility
 from rosy_addon.line_drawing.pipeline import (
     draw_instances,
-    draw_instances_task,
     offset_toward_camera,
     simplify_strokes,
     stroke_geometry,
@@ -23,8 +22,9 @@ from rosy_addon.line_drawing.pipeline import (
 from rosy_addon.line_drawing.spacing import lit_tone
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
-from rosy_addon.line_drawing.trace import trace_strokes_task
+from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
+from rosy_addon.progress import as_task
 from rosy_addon.projection.camera import (
     look_at,
     orbit_camera,
@@ -190,7 +190,7 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
     instance = MeshInstance(
         surface, IDENTITY, generate(surface, GeneratorSettings("axis", (1, 0, 0)), 2)
     )
-    task = trace_strokes_task(instance, 0.1)
+    task = as_task(trace_strokes, instance, 0.1)
     with pytest.raises(StopIteration) as done:
         for _ in range(300):
             next(task)
@@ -213,7 +213,7 @@ def test_blocks_divide_the_work_and_do_not_change_strokes(module, monkeypatch):
 
     def draw():
         """Return the number of steps, and the strokes."""
-        steps, task = 0, draw_instances_task([SPHERE], CAMERA, style)
+        steps, task = 0, as_task(draw_instances, [SPHERE], CAMERA, style)
         while True:
             try:
                 next(task)
@@ -240,7 +240,7 @@ def test_seeding_ends_where_all_strokes_are_short():
     )
     instance = MeshInstance(surface, IDENTITY, generate(surface, "smoothest", 6))
     camera = orbit_camera(surface, 45, 20, 150, 100)
-    task = draw_instances_task([instance], camera, StrokeStyle(curvature=0.5, hidden=True))
+    task = as_task(draw_instances, [instance], camera, StrokeStyle(curvature=0.5, hidden=True))
     assert sum(1 for _ in zip(range(400), task, strict=False)) < 300
 
 

@@ -11,7 +11,7 @@ from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.seen_triangles import (
     HIDDEN_MARGIN,
-    seen_triangles_task,
+    seen_triangles,
     triangles_near,
 )
 from rosy_addon.line_drawing.style import StrokeStyle
@@ -22,7 +22,6 @@ from rosy_addon.line_drawing.visibility import (
     project_to_pixels,
     rasterize_depth,
 )
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
@@ -34,9 +33,7 @@ def instance(surface, location=(0, 0, 0)):
 
 
 def seen(instances, index, camera):
-    return run_to_completion(
-        seen_triangles_task(instances, index, camera, rasterize_depth(instances, camera))
-    )
+    return seen_triangles(instances, index, camera, rasterize_depth(instances, camera))
 
 
 SIDE = perspective_camera(look_at((0, -6, 1.5), (0, 0, 0)), 240, 180)

@@ -8,9 +8,9 @@ from shapes import torus
 
 from rosy_addon.field.generate import axis_field
 from rosy_addon.line_drawing import seeding
-from rosy_addon.line_drawing.tangent_mesh import tangent_mesh_task
-from rosy_addon.line_drawing.trace import trace_on_mesh_task
-from rosy_addon.progress import run_to_completion
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
+from rosy_addon.line_drawing.trace import trace_on_mesh
+from rosy_addon.progress import as_task
 from rosy_addon.projection.gbuffer import MeshInstance
 
 
@@ -19,8 +19,8 @@ def traced(monkeypatch, batch_size):
     monkeypatch.setattr(seeding, "SEED_BATCH_SIZE", batch_size)
     surface = torus(32, 16)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0.2, 0.3, 1.0)))
-    mesh = run_to_completion(tangent_mesh_task(instance))
-    task = trace_on_mesh_task(mesh, np.full(len(surface.vertices), 0.1), surface_name="torus")
+    mesh = build_tangent_mesh(instance)
+    task = as_task(trace_on_mesh, mesh, np.full(len(surface.vertices), 0.1), surface_name="torus")
     steps = 0
     while True:
         try:

@@ -27,14 +27,14 @@ from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
 from rosy_addon.line_drawing.directional_spacing import spacing_in_picture
 from rosy_addon.line_drawing.families import global_labels
-from rosy_addon.line_drawing.head_on_ends import head_on_ends_task
+from rosy_addon.line_drawing.head_on_ends import head_on_ends
 from rosy_addon.line_drawing.outline import outline
 from rosy_addon.line_drawing.separation import enforce_separation
 from rosy_addon.line_drawing.separation_rules import SeparationRules
 from rosy_addon.line_drawing.singularity_seeds import singularities
 from rosy_addon.line_drawing.spacing import (
     headlight_tone,
-    spacing_by_curvature_task,
+    spacing_by_curvature,
     spacing_by_tone,
     values_at_points,
     weight_by_tone,
@@ -45,7 +45,6 @@ from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_t
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -539,7 +538,7 @@ def test_strokes_are_denser_where_the_surface_is_more_curved():
     surface = build_surface(
         sphere.vertices * (1, 1, 3), sphere.corner_vertex, sphere.face_start, name="ellipsoid"
     )
-    spacing = run_to_completion(spacing_by_curvature_task(surface, 0.06, 1.0))
+    spacing = spacing_by_curvature(surface, 0.06, 1.0)
     assert np.ptp(spacing) > 0.01
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0, 0, 1)))
     mesh = build_tangent_mesh(instance)
@@ -554,7 +553,7 @@ def test_strokes_are_denser_where_the_surface_is_more_curved():
 
 def test_curvature_and_light():
     surface = torus()
-    spacing = run_to_completion(spacing_by_curvature_task(surface, 1.0, 0.5))
+    spacing = spacing_by_curvature(surface, 1.0, 0.5)
     assert spacing.shape == (len(surface.vertices),) and np.ptp(spacing) > 0
     camera = orbit_camera(surface, 0, 90, 100, 100, perspective=False)
     tone = headlight_tone(MeshInstance(surface, IDENTITY), camera)
@@ -643,13 +642,13 @@ def test_ends_that_meet_head_on_are_not_tapered():
     directions = np.repeat([[1.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]], 11, axis=0)
     strokes = planar_strokes(np.array(points), directions, 0.1)
     # The last end of stroke 2 is beside that of stroke 0, and also meets stroke 1.
-    assert run_to_completion(head_on_ends_task(strokes)).tolist() == [
+    assert head_on_ends(strokes).tolist() == [
         [False, True],
         [True, False],
         [False, True],
         [False, False],
     ]
-    tapered = strokes.tapered(2.0, 0.2, ~run_to_completion(head_on_ends_task(strokes)))
+    tapered = strokes.tapered(2.0, 0.2, ~head_on_ends(strokes))
     first, last = tapered.start[:-1], tapered.start[1:] - 1
     end_width = np.stack([tapered.width[first], tapered.width[last]], axis=1)
     assert np.allclose(end_width, [[0.2, 1], [1, 0.2], [0.2, 1], [0.2, 0.2]])

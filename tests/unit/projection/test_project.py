@@ -12,11 +12,12 @@ from rosy_addon.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import as_task
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.camera import perspective_camera as lens
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.pixel_neighbors import screen_jacobians
-from rosy_addon.projection.project import project, project_task
+from rosy_addon.projection.project import project
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -499,11 +500,11 @@ def test_progress_grows_and_the_task_can_be_closed():
     surface = torus()
     instances = [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))] * 2
     camera = orbit_camera(surface, 0, 40, 300, 300)
-    fractions = [step.fraction for step in project_task(instances, camera)]
+    fractions = [step.fraction for step in as_task(project, instances, camera)]
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0] <= fractions[-1] <= 1
     assert len(fractions) > 4
-    task = project_task(instances, camera)
+    task = as_task(project, instances, camera)
     next(task)
     task.close()
 

@@ -16,11 +16,11 @@ from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
+from rosy_addon.progress import as_task
 from rosy_addon.projection.surface_lines import (
-    cached_surface_lines_task,
+    cached_surface_lines,
     rest_matrix,
-    surface_lines_task,
+    surface_lines,
 )
 
 #: Part of the surface on which distances between lines differ by at most `TOLERANCE`, where no line
@@ -30,7 +30,7 @@ SHARE, TOLERANCE, AWAY = 0.95, 0.1, 1.0
 
 def lines_of(surface, field, spacing, stretch=None, display="smooth"):
     stretch = np.eye(3) if stretch is None else stretch
-    return run_to_completion(surface_lines_task(surface, stretch, field, display, spacing))
+    return surface_lines(surface, stretch, field, display, spacing)
 
 
 def gradients(lines):
@@ -236,8 +236,7 @@ def test_undefined_faces_have_no_lines():
 def test_the_number_of_triangles_is_bounded():
     surface = icosphere(2)
     field = generate(surface, "smoothest", 4)
-    task = surface_lines_task(surface, np.eye(3), field, "smooth", 0.004, max_triangles=2000)
-    lines = run_to_completion(task)
+    lines = surface_lines(surface, np.eye(3), field, "smooth", 0.004, max_triangles=2000)
     assert 500 < len(lines.tree.leaf_root) <= 2000
     assert np.isfinite(lines.pattern.phase).all()
 
@@ -259,8 +258,7 @@ def test_deformations_and_rotations_keep_the_lines():
     cache = Cache()
 
     def cached(surface, matrix):
-        task = cached_surface_lines_task(surface, matrix, field, "smooth", 0.05, cache)
-        return run_to_completion(task)
+        return cached_surface_lines(surface, matrix, field, "smooth", 0.05, cache)
 
     def deformed(amount):
         points = surface.vertices * (1, 1, amount)
@@ -292,7 +290,7 @@ def test_steps_are_short(degree):
     """No step does more than a small part of the work."""
     surface = icosphere(5)
     field = generate(surface, "smoothest", degree)
-    task = surface_lines_task(surface, np.eye(3), field, "smooth", 0.02)
+    task = as_task(surface_lines, surface, np.eye(3), field, "smooth", 0.02)
     times = [time.process_time()]
     try:
         while True:

@@ -7,11 +7,10 @@ import pytest
 from shapes import cube, icosphere, plane, torus
 
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection import visible_vertices
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.visible_vertices import project_vertices_task
+from rosy_addon.projection.visible_vertices import project_vertices
 
 EYE = np.array([3.0, -4.0, 2.0])
 CAMERAS = [
@@ -23,7 +22,7 @@ CAMERAS = [
 def project(instances, camera, **options):
     """All vertices of all instances."""
     vertices = [np.arange(len(instance.surface.vertices)) for instance in instances]
-    return run_to_completion(project_vertices_task(instances, camera, vertices, **options))
+    return project_vertices(instances, camera, vertices, **options)
 
 
 def moved(surface, offset=(0, 0, 0), scale=1.0) -> MeshInstance:

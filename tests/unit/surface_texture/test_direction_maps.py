@@ -12,10 +12,9 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.line_drawing.tangent_mesh import tangent_mesh_task
-from rosy_addon.progress import run_to_completion
+from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.surface_texture.direction_maps import corner_directions_task
+from rosy_addon.surface_texture.direction_maps import corner_directions
 from rosy_addon.surface_texture.draw import draw_texture
 
 #: Largest mean error of a direction in radians, and the largest one of 95 %. With 8 bits a direction is right
@@ -91,8 +90,8 @@ def test_a_line_goes_on_where_its_directions_turn_over():
     surface = build_surface(ball.vertices * (1, 0.7, 0.5), ball.corner_vertex, ball.face_start)
     field, line = (generate(surface, GeneratorSettings("curvature"), n) for n in (4, 2))
     instance = MeshInstance(surface, np.eye(4), field)
-    mesh = run_to_completion(tangent_mesh_task(instance))
-    tangent = run_to_completion(corner_directions_task(mesh, 0.0))[:, 0]
+    mesh = build_tangent_mesh(instance)
+    tangent = corner_directions(mesh, 0.0)[:, 0]
     a, b, c = 1.0, 0.7, 0.5
     umbilic = np.sqrt(
         [a**2 * (a**2 - b**2) / (a**2 - c**2), 0, c**2 * (b**2 - c**2) / (a**2 - c**2)]

@@ -13,8 +13,9 @@ from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
+from rosy_addon.progress import as_task
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.surface_lines import cached_surface_lines_task
+from rosy_addon.projection.surface_lines import cached_surface_lines
 from rosy_addon.surface_texture import hatching
 from rosy_addon.surface_texture.draw import SURFACE_PIXELS, draw_texture
 
@@ -204,11 +205,11 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
     counts = []
 
     def counted_task(*args):
-        lines = yield from cached_surface_lines_task(*args)
+        lines = yield from as_task(cached_surface_lines, *args)
         counts.append(len(lines.tree.leaf_root))
         return lines
 
-    monkeypatch.setattr(hatching, "cached_surface_lines_task", counted_task)
+    monkeypatch.setattr(hatching, "cached_surface_lines", counted_task)
     grid = plane(1, 200)
     surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))

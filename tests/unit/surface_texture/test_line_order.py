@@ -10,9 +10,8 @@ from shapes import cube, cylinder, icosphere, torus
 
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh, nearest_member
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.surface_texture.line_order import first_line_weights, line_order_task
+from rosy_addon.surface_texture.line_order import first_line_weights, line_order
 
 
 def mesh_of(surface, kind: str, degree: int, matrix=None) -> TangentMesh:
@@ -24,7 +23,7 @@ def mesh_of(surface, kind: str, degree: int, matrix=None) -> TangentMesh:
 
 def first_lines(mesh: TangentMesh, angle: float = 0.0, blend: float = 0.02):
     """(T, 3) unit vectors along the first line at the centers of triangles, and (T,) their weights."""
-    order = run_to_completion(line_order_task(mesh, angle, blend))
+    order = line_order(mesh, angle, blend)
     triangle = np.arange(len(mesh.area))
     weights = np.full((len(triangle), 3), 1 / 3, dtype=np.float32)
     first = order.first_at(triangle, weights)

@@ -15,12 +15,11 @@ from rosy_addon.compositor.streamline_batch import StreamlineBatch
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, advance
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh, nearest_member
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.surface_texture.charts import uv_charts_task
+from rosy_addon.surface_texture.charts import uv_charts
 from rosy_addon.surface_texture.draw import step_length
-from rosy_addon.surface_texture.texel_field import frames_at, texel_field_task
-from rosy_addon.surface_texture.texels import texels_task, texture_frame
+from rosy_addon.surface_texture.texel_field import frames_at, texel_field
+from rosy_addon.surface_texture.texels import compute_texels, texture_frame
 
 #: Steps of the streamlines that are compared.
 STEPS = 40
@@ -37,11 +36,11 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
         surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), degree)
     )
     mesh = build_tangent_mesh(instance)
-    charts = run_to_completion(uv_charts_task(surface, mesh, patches_uv(3)))
+    charts = uv_charts(surface, mesh, patches_uv(3))
     assert charts.chart.max() + 1 == 32
-    texels = run_to_completion(texels_task(charts, texture_frame(charts, 1024, "torus"), "torus"))
+    texels = compute_texels(charts, texture_frame(charts, 1024, "torus"), "torus")
     step = step_length(mesh, charts, texels)
-    field = run_to_completion(texel_field_task(mesh, charts, texels, step, np.pi))
+    field = texel_field(mesh, charts, texels, step, np.pi)
     look = look_on_surface(Look(), step, step)
     covering = build_covering(field, look, np.full((len(texels), 1), 0.1, dtype=np.float32))
     start = np.unique(field.seam_steps.source)
@@ -82,9 +81,9 @@ def test_steps_across_seams_are_isometries():
         surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), 4)
     )
     mesh = build_tangent_mesh(instance)
-    charts = run_to_completion(uv_charts_task(surface, mesh, patches_uv(3)))
-    texels = run_to_completion(texels_task(charts, texture_frame(charts, 512, "torus"), "torus"))
-    steps = run_to_completion(texel_field_task(mesh, charts, texels, 0.01, np.pi)).seam_steps
+    charts = uv_charts(surface, mesh, patches_uv(3))
+    texels = compute_texels(charts, texture_frame(charts, 512, "torus"), "torus")
+    steps = texel_field(mesh, charts, texels, 0.01, np.pi).seam_steps
     source, target = texels.triangle[steps.source], texels.triangle[steps.target]
     displacement = np.exp(1j * np.arange(len(source)))
     before = charts.to_surface(source, displacement / 512)

@@ -1,0 +1,92 @@
+"""The program of a helper: it calls the functions that are sent to it until the other process ends."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from multiprocessing import connection
+from typing import Any
+
+from ..cache import BAKE_CACHE
+from ..progress import listening
+from .channel import Channel
+from .pool import POOL
+
+#: Seconds without work after which memory is given back.
+IDLE_SECONDS = 120.0
+
+#: Seconds between two reports. The end of the other process is noticed at one of them.
+REPORT_SECONDS = 0.05
+
+
+class _Reporter:
+    """Tells the other process how far a call has come, and ends this one if the other has ended."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel, self._next_time = channel, 0.0
+
+    def __call__(self, fraction: float, label: str) -> None:
+        now = time.monotonic()
+        if now < self._next_time:
+            return
+        self._next_time = now + REPORT_SECONDS
+        try:
+            has_ended = self._channel.poll()  # while a call runs, nothing comes but the end
+            self._channel.send(("progress", fraction, label))
+        except OSError:
+            has_ended = True
+        if has_ended:
+            os._exit(1)
+
+
+def main(handle: int, package: str) -> None:
+    """Call functions until the other process ends.
+
+    Parameters
+    ----------
+    handle : int
+        Of this end of the connection.
+    package : str
+        The name of this package in the other process.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal
+    kind = connection.PipeConnection if sys.platform == "win32" else connection.Connection
+    channel = Channel(kind(handle), package)
+    reporter = _Reporter(channel)
+    try:
+        channel.send(("ready",))
+        while True:
+            if not channel.poll(IDLE_SECONDS):
+                BAKE_CACHE.clear()
+                POOL.close()
+                channel.poll(None)
+            function, arguments = channel.receive()
+            answer = _answer(function, arguments, reporter)
+            del function, arguments
+            try:
+                channel.send(answer)
+            except (pickle.PicklingError, TypeError, AttributeError) as error:
+                channel.send(("error", RuntimeError(f"{type(error).__name__}: {error}"), ""))
+            del answer
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+def _answer(
+    function: Callable[..., Any], arguments: tuple[Any, ...], reporter: _Reporter
+) -> tuple[Any, ...]:
+    """Call a function, and return the message with what it returns or raises."""
+    try:
+        with listening(reporter):
+            return "result", function(*arguments)
+    except Exception as error:
+        return "error", error, traceback.format_exc()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2])

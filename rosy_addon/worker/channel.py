@@ -1,0 +1,174 @@
+"""Messages between a process and its helper: pickles whose large arrays are not copied.
+
+Meshes and fields are sent once. Later messages name them, so that a picture with another look costs some
+kilobytes, and so that caches, which compare meshes by identity, find them again.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+from collections.abc import Callable
+from dataclasses import fields
+from multiprocessing.connection import Connection
+from typing import Any
+
+from ..compositor.target_tone import ReferenceRender
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..projection.gbuffer import MeshInstance
+from ..projection.surface_tone import SurfaceTone
+
+#: Immutable classes whose instances the other process keeps: they are large, and used again.
+KEPT_CLASSES = (MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
+
+#: The name of this package, which differs between Blender, a helper and an installed wheel.
+PACKAGE = __package__.rpartition(".")[0]
+
+#: Bytes of an array that are written at a time.
+CHUNK_BYTES = 1 << 20
+
+
+class Channel:
+    """One end of a connection to another process of this package.
+
+    Parameters
+    ----------
+    connection : Connection
+    package : str
+        The name of this package in the other process.
+    """
+
+    def __init__(self, connection: Connection, package: str) -> None:
+        self.connection = connection
+        self._package = package
+        #: What the other process keeps: its number there and the object, by its id.
+        self._sent: dict[int, tuple[int, Any]] = {}
+        self._last_number = 0
+        #: What this process keeps for the other one, by number.
+        self._kept: dict[int, Any] = {}
+
+    def poll(self, timeout: float = 0.0) -> bool:
+        """Return whether there is something to receive, an end of the connection included."""
+        return self.connection.poll(timeout)
+
+    def send(self, message: Any) -> None:
+        """Send an object. What the last message had and this one has not is no longer kept.
+
+        Raises
+        ------
+        OSError
+            If the other process has ended.
+        """
+        stream, buffers = io.BytesIO(), []
+        pickler = _Pickler(stream, self._sent, self._last_number, buffers.append)
+        pickler.dump(message)
+        forgotten = [number for number, _ in self._sent.values() if number not in pickler.used]
+        arrays = [buffer.raw() for buffer in buffers]
+        self.connection.send((forgotten, [array.nbytes for array in arrays]))
+        self.connection.send_bytes(stream.getbuffer())
+        for array in arrays:
+            for start in range(0, array.nbytes, CHUNK_BYTES):
+                self.connection.send_bytes(array[start : start + CHUNK_BYTES])
+        self._last_number = pickler.last_number
+        self._sent = {id(kept): (number, kept) for number, kept in pickler.used.items()}
+
+    def receive(self) -> Any:
+        """Wait for an object and return it.
+
+        Raises
+        ------
+        EOFError, OSError
+            If the other process has ended.
+        """
+        forgotten, sizes = self.connection.recv()
+        stream, buffers = self.connection.recv_bytes(), []
+        for size in sizes:
+            buffer = bytearray(size)
+            for start in range(0, size, CHUNK_BYTES):
+                self.connection.recv_bytes_into(buffer, start)
+            buffers.append(buffer)
+        for number in forgotten:
+            del self._kept[number]
+        return _Unpickler(stream, buffers, self._kept, self._package).load()
+
+    def close(self) -> None:
+        """Close this end. The other process ends."""
+        self.connection.close()
+
+
+class _Pickler(pickle.Pickler):
+    """Names what the other process keeps, and sends the rest.
+
+    Attributes
+    ----------
+    used : dict of int to object
+        What the message has of `KEPT_CLASSES`, by number.
+    last_number : int
+    """
+
+    def __init__(
+        self,
+        stream: io.BytesIO,
+        sent: dict[int, tuple[int, Any]],
+        last_number: int,
+        add_buffer: Callable[[pickle.PickleBuffer], Any],
+    ) -> None:
+        super().__init__(stream, 5, buffer_callback=add_buffer)
+        self._sent, self.last_number = sent, last_number
+        self.used: dict[int, Any] = {}
+
+    def persistent_id(self, obj: Any) -> int | None:
+        """Return the number of an object that the other process keeps, or else None."""
+        if not isinstance(obj, KEPT_CLASSES) or id(obj) not in self._sent:
+            return None
+        number = self._sent[id(obj)][0]
+        self._use(number, obj)
+        return number
+
+    def _use(self, number: int, obj: Any) -> None:
+        """Note that an object is used, with the objects that it has."""
+        self.used[number] = obj
+        for value in vars(obj).values():
+            if isinstance(value, KEPT_CLASSES):
+                self.persistent_id(value)
+
+    def reducer_override(self, obj: Any) -> Any:
+        """Send the fields of an object that the other process is to keep, without cached properties."""
+        if not isinstance(obj, KEPT_CLASSES):
+            return NotImplemented
+        self.last_number += 1
+        self.used[self.last_number] = obj
+        state = {field.name: getattr(obj, field.name) for field in fields(obj)}
+        return _keep, (self.last_number, type(obj), state)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Finds what is kept, and the classes of this package by the name that it has here."""
+
+    def __init__(
+        self, stream: bytes, buffers: list[bytearray], kept: dict[int, Any], package: str
+    ) -> None:
+        super().__init__(io.BytesIO(stream), buffers=buffers)
+        self._kept, self._package = kept, package
+
+    def persistent_load(self, number: int) -> Any:
+        """Return an object that is kept."""
+        return self._kept[number]
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return a class or a function."""
+        if module == self._package or module.startswith(f"{self._package}."):
+            module = PACKAGE + module.removeprefix(self._package)
+        found = super().find_class(module, name)
+        return self._keep if found is _keep else found
+
+    def _keep(self, number: int, kind: type, state: dict[str, Any]) -> Any:
+        self._kept[number] = kept = object.__new__(kind)
+        vars(kept).update(state)
+        return kept
+
+
+def _keep(number: int, kind: type, state: dict[str, Any]) -> Any:
+    """Stand in pickles for `_Unpickler._keep`."""
+    raise NotImplementedError

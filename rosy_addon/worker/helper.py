@@ -1,0 +1,214 @@
+"""`Helper`: a process that computes for this one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from multiprocessing.connection import Connection, Pipe
+from pathlib import Path
+from typing import Any
+
+from .channel import PACKAGE, Channel
+
+#: Seconds that a helper may take until it is ready.
+START_SECONDS = 60.0
+
+
+class HelperLostError(Exception):
+    """A helper has ended before its work was done, or cannot be started.
+
+    Attributes
+    ----------
+    has_started : bool
+        Whether the helper was ready before.
+    """
+
+    def __init__(self, message: str, has_started: bool) -> None:
+        super().__init__(message, has_started)
+        self.has_started = has_started
+
+    def __str__(self) -> str:
+        return self.args[0]
+
+
+class _RemoteTracebackError(Exception):
+    """The traceback of an error in a helper, as text. The cause of that error here."""
+
+
+class Helper:
+    """A process that computes for this one, a call at a time.
+
+    It ends when this object is closed, and when this process ends, however it ends.
+
+    Parameters
+    ----------
+    environment : mapping of str to str
+        Added to the environment of the process.
+    """
+
+    def __init__(self, environment: Mapping[str, str] | None = None) -> None:
+        self._environment = dict(environment or {})
+        self._process: subprocess.Popen[bytes] | None = None
+        self._channel: Channel | None = None
+        self._is_ready, self._start_time = False, 0.0
+
+    def start(self) -> None:
+        """Start the process if it does not run, without waiting until it is ready.
+
+        Raises
+        ------
+        HelperLostError
+            If it cannot be started.
+        """
+        if self._process is not None and self._process.poll() is None:
+            return
+        self.close()
+        connection, other_end = Pipe()
+        try:
+            with other_end:
+                self._process = _start_process(other_end, self._environment)
+        except OSError as error:
+            connection.close()
+            raise HelperLostError(f"no helper process can be started: {error}", False) from None
+        self._channel = Channel(connection, PACKAGE.rpartition(".")[2])
+        self._is_ready, self._start_time = False, time.monotonic()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Handle:
+        """Let the process call a function of this package.
+
+        Parameters
+        ----------
+        function : function
+            Of a module that needs no Blender.
+        *arguments
+            Anything that can be pickled.
+
+        Returns
+        -------
+        Handle
+        """
+        self.start()
+        return Handle(self, (function, arguments))
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        process, channel = self._process, self._channel
+        self._process = self._channel = None
+        if process is not None:
+            process.kill()
+            process.wait()
+        if channel is not None:
+            channel.close()
+
+    @property
+    def connection(self) -> Connection | None:
+        """What becomes readable when the process has something to say, or ends."""
+        return None if self._channel is None else self._channel.connection
+
+    def _is_prepared(self) -> bool:
+        """Return whether the process is ready for a call."""
+        if not self._is_ready and self._channel.poll():
+            self._channel.receive()
+            self._is_ready = True
+        if not self._is_ready and time.monotonic() - self._start_time > START_SECONDS:
+            raise EOFError
+        return self._is_ready
+
+    def _lost(self) -> HelperLostError:
+        """End what is left of the process, and return what is wrong."""
+        has_started, process = self._is_ready, self._process
+        self.close()
+        status = "" if process is None else f" (status {process.returncode})"
+        what = "has ended" if has_started else "cannot be started"
+        return HelperLostError(f"the helper process {what}{status}", has_started)
+
+
+class Handle:
+    """A call that a helper works on.
+
+    Attributes
+    ----------
+    fraction : float
+        How far it has come.
+    label : str
+        What is being done.
+    is_done : bool
+    """
+
+    def __init__(self, helper: Helper, call: tuple[Callable[..., Any], tuple[Any, ...]]) -> None:
+        self.fraction, self.label, self.is_done = 0.0, "starting", False
+        self._helper = helper
+        self._call: tuple[Callable[..., Any], tuple[Any, ...]] | None = call
+        self._result: Any = None
+        self._error: BaseException | None = None
+
+    def poll(self) -> bool:
+        """Hear what the helper says, without waiting. Return whether the call is done.
+
+        Raises
+        ------
+        HelperLostError
+            If the helper has ended. The call may be submitted again.
+        """
+        helper = self._helper
+        channel = helper._channel
+        if self.is_done:
+            return True
+        if channel is None:
+            raise helper._lost()
+        try:
+            if self._call is not None:
+                if not helper._is_prepared():
+                    return False
+                channel.send(self._call)
+                self._call = None
+            while not self.is_done and channel.poll():
+                kind, *content = channel.receive()
+                if kind == "progress":
+                    self.fraction, self.label = content
+                    continue
+                self.is_done = True
+                if kind == "result":
+                    (self._result,) = content
+                else:
+                    self._error, text = content
+                    self._error.__cause__ = _RemoteTracebackError(f"\n{text}")
+        except (EOFError, OSError):
+            raise helper._lost() from None
+        return self.is_done
+
+    def result(self) -> Any:
+        """Return what the function has returned, or raise what it has raised, once the call is done."""
+        if self._error is not None:
+            raise self._error
+        return self._result
+
+    def cancel(self) -> None:
+        """End the helper at once, if the call is not done."""
+        if not self.is_done:
+            self._helper.close()
+
+
+def _start_process(connection: Connection, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+    """Start this package as a program, with one end of a connection."""
+    # The helper imports what this process imports, in the same order, and this package.
+    folders = [*sys.path, str(Path(__file__).parents[2])]
+    options: dict[str, Any] = {}
+    if sys.platform == "win32":
+        os.set_handle_inheritable(connection.fileno(), True)
+        handles = {"handle_list": [connection.fileno()]}
+        options["startupinfo"] = subprocess.STARTUPINFO(lpAttributeList=handles)
+        options["creationflags"] = subprocess.CREATE_NO_WINDOW
+    else:
+        options["pass_fds"] = [connection.fileno()]
+    module = f"{PACKAGE.rpartition('.')[2]}.worker"
+    return subprocess.Popen(
+        [sys.executable, "-s", "-S", "-P", "-m", module, str(connection.fileno()), PACKAGE],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(folders)} | environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        **options,
+    )

@@ -1,0 +1,105 @@
+"""Jobs: work that reads, has something computed, and applies it, whoever computes.
+
+A job is a generator. It yields each `Call` that takes long, and gets its result. A script runs it in place
+(`run`). In a window, an operator has its calls made by a helper, so that Blender stays responsive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from functools import update_wrapper
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+
+from ..progress import progress, report
+
+Result = TypeVar("Result")
+Arguments = ParamSpec("Arguments")
+
+
+class Call(NamedTuple):
+    """A call of a function that needs no Blender, as one part of a job.
+
+    Attributes
+    ----------
+    function : function
+    arguments : tuple
+        Anything that can be pickled.
+    start, stop : float
+        Fractions of the job at which the call begins and ends.
+    label : str or None
+        Replaces the labels that the function reports.
+    """
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    start: float = 0.0
+    stop: float = 1.0
+    label: str | None = None
+
+    def __call__(self) -> Any:
+        """Make the call in this process."""
+        with progress(self.start, self.stop, self.label):
+            return self.function(*self.arguments)
+
+
+class Step(NamedTuple):
+    """A pause of a job that works in Blender's process: with the graphics card, or from frame to frame.
+
+    Attributes
+    ----------
+    fraction : float
+        How far the job has come.
+    label : str
+        What is done next.
+    """
+
+    fraction: float
+    label: str
+
+
+#: What a job yields is computed or reported, and the results are sent to it. Closing it cancels the job.
+Steps = Generator[Call | Step, Any, Result]
+
+
+def run(steps: Steps[Result]) -> Result:
+    """Run a job to its end in this process, and return its result."""
+    answer, error = None, None
+    while True:
+        try:
+            step = steps.send(answer) if error is None else steps.throw(error)
+        except StopIteration as end:
+            return end.value
+        answer, error = None, None
+        try:
+            if isinstance(step, Call):
+                answer = step()
+            else:
+                report(*step)
+        except Exception as raised:
+            error = raised
+
+
+class Job(Generic[Arguments, Result]):
+    """A function that runs a job to its end; `begin` returns the steps instead."""
+
+    def __init__(self, begin: Callable[Arguments, Steps[Result]]) -> None:
+        self.begin = begin
+        update_wrapper(self, begin)
+
+    def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        return run(self.begin(*args, **kwargs))
+
+
+def job(begin: Callable[Arguments, Steps[Result]]) -> Job[Arguments, Result]:
+    """Make a generator of steps a function that runs them in place; see `Job`.
+
+    Examples
+    --------
+    >>> @job
+    ... def squares(count):
+    ...     total = yield Call(sum, ([i * i for i in range(count)],))
+    ...     return total
+    >>> squares(4)
+    14
+    """
+    return Job(begin)

@@ -54,11 +54,10 @@ STAGES = {
 #: Settings of two looks whose times are compared, by the name of the option.
 COMPARISONS: dict[str, dict[str, dict[str, Any]]] = {
     "flow": {"still": {}, "drifting": {"flow": 2.0}},
-    "ibfv": {"traced": {}, "carried": {"method": "ibfv"}},
 }
 
 #: Degrees of these looks.
-COMPARED_DEGREES = {"flow": (4,), "ibfv": DEGREES}
+COMPARED_DEGREES = {"flow": (4,)}
 
 #: Number of frames of a median, and the maximum of their total time in seconds.
 FRAMES = 21

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -31,12 +31,13 @@ class CpuViewportRenderer:
 
     Attributes
     ----------
-    downscale_factors, needs_occluders
+    downscale_factors, needs_occluders, stand_ins
         See `ViewportRenderer`. Pictures have no depth, so occluders are needed.
     """
 
     downscale_factors = 4, 2
     needs_occluders = True
+    stand_ins: Mapping[str, str] = {}
 
     def __init__(self, device: Device) -> None:
         self._device = device

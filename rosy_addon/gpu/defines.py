@@ -18,7 +18,6 @@ from ..compositor.even_lines import COARSE_RATIO, GROWTH_OCTAVES, MAX_BREAK_AMOU
 from ..compositor.filter_kernel import Kernel
 from ..compositor.flow import ONE_WAY_COSINE
 from ..compositor.hatching import MIN_COVERAGE, PIXEL_SOFTNESS, RANK_BLEND
-from ..compositor.ibfv import MAX_PARTING, OWN_WEIGHT
 from ..compositor.image_noise import (
     CHANNEL_FACTOR,
     FINALIZER_FACTORS,
@@ -86,13 +85,6 @@ CREASES_PER_ROW, CREASE_SLICES = 1024, 16
 #: Bit of a pixel that contains an edge, besides those of borders in `outline`.
 EDGE_BIT = 4
 
-#: Bit that makes a normal float of a word of up to 29 bits.
-WORD_EXPONENT = 0x40000000
-
-#: Units of a pixel in the origins of states. A word has 15 bits for a pixel, 12 for these units and 2 of the
-#: 4 bits of a sheet.
-ORIGIN_UNITS = 4096
-
 #: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.
 REDUCE_BLOCK = 16
 
@@ -113,8 +105,6 @@ FLOAT_CONSTANTS = {
     "MIN_COVERAGE": MIN_COVERAGE,
     "MIN_EFFECTIVE_SAMPLES": MIN_EFFECTIVE_SAMPLES,
     "ONE_WAY_COSINE": ONE_WAY_COSINE,
-    "OWN_WEIGHT": OWN_WEIGHT,
-    "MAX_PARTING": float(MAX_PARTING),
     "DEPTH_JUMP": DEPTH_JUMP,
     "MIN_STEP": MIN_STEP,
     "STEP_RATIO": STEP_RATIO,
@@ -150,7 +140,6 @@ INT_CONSTANTS = {
     "MIN_MARK_LENGTH": MIN_MARK_LENGTH,
     "FULL_MARK_LENGTH": FULL_MARK_LENGTH,
     "REDUCE_BLOCK": REDUCE_BLOCK,
-    "ORIGIN_UNITS": ORIGIN_UNITS,
     "ROW_BITS": ROW_BITS,
     "POSITION_TEXEL": POSITION_TEXEL,
     "NORMAL_TEXEL": NORMAL_TEXEL,
@@ -180,7 +169,6 @@ UNSIGNED_CONSTANTS = dict(
     "HASH_CHANNEL": CHANNEL_FACTOR,
     "HASH_FINALIZER_0": FINALIZER_FACTORS[0],
     "HASH_FINALIZER_1": FINALIZER_FACTORS[1],
-    "WORD_EXPONENT": WORD_EXPONENT,
 }
 
 

@@ -8,18 +8,16 @@ from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
 from ..compositor.look import Look, is_hatched
-from ..progress import Progress, Task, subtask
+from ..progress import Progress, Task
 from . import lookup_tables, passes
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
 from .field_kind import FieldKind
 from .frame import Frame
-from .ibfv_stage import carry_task, is_carried, states_fit
 from .passes import WORKGROUP_SIZE, ComputePass
 from .resources import GpuResources
 from .screen_box import Box
 from .uniforms import (
     camera_uniforms,
-    carried_uniforms,
     covering_uniforms,
     direction_uniforms,
     look_uniforms,
@@ -54,11 +52,7 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
     covering = covering_uniforms(kind, look)
     is_antialiased = int(frame.samples is not None)
     uniforms = {**covering, **look_uniforms(kind, look), "is_antialiased": is_antialiased}
-    if is_carried(look) and states_fit(frame.size, kind.degree):
-        uniforms |= carried_uniforms(kind, look_for_symmetry(frame.look, kind.symmetry))
-    traces_lines = not uniforms["is_carried"] or uniforms["overshoot_steps"] > 0
-    unfold_task = _unfold_task(frame, kind, box, covering, traces_lines)
-    textures = {**frame.textures, **(yield from unfold_task)}
+    textures = {**frame.textures, **(yield from _unfold_task(frame, kind, box, covering))}
     yield Progress(0.0, "measuring streaks")
     textures |= {
         "noise_gradients": textures["directions"],
@@ -66,12 +60,8 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
     }
-    if uniforms["is_carried"]:
-        task = carry_task(frame, kind, box, textures, uniforms)
-        textures["line_image"] = yield from subtask(task, 0.0, 0.0)
-    if frame.samples is not None and traces_lines:
+    if frame.samples is not None:
         textures["noise_gradients"] = _noise_gradients(frame, box, textures)
-    if frame.samples is not None and not uniforms["is_carried"]:
         uniforms["gain"] *= INTERPOLATED_CONTRAST
     if not is_hatched(look):
         yield from _trace_task(
@@ -138,8 +128,7 @@ def _trace_task(
     yield from frame.resources.device.compile_task([shader.variant(uniforms)])
     yield Progress(0.0, "tracing streamlines")
     left, bottom, right, top = box
-    is_traced = uniforms["half_length"] and not uniforms["is_carried"]
-    half_steps = streamline_reach(frame.look) if is_traced else 0
+    half_steps = streamline_reach(frame.look) if uniforms["half_length"] else 0
     row_steps = (right - left) * kind.line_count * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)
@@ -151,12 +140,9 @@ def _trace_task(
 
 
 def _unfold_task(
-    frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any], traces_lines: bool
+    frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]
 ) -> Task[dict[str, Any]]:
-    """Return the images of the covering: its cells, and directions without and with their gradients.
-
-    Those with gradients are for streamlines only.
-    """
+    """Return the images of the covering: its cells, and directions without and with their gradients."""
     yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
     has_color_noise = noise_args(frame.look)["channels"] > 1
@@ -175,8 +161,6 @@ def _unfold_task(
     )
     yield Progress(0.0, "finding directions")
     textures = {"cells": cells, "directions": directions}
-    if not traces_lines:
-        return {**textures, "angle_gradients": directions}
     images = {"angle_gradients": image("angle_gradients", *frame.size, "RGBA16F", lines)}
     frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
     return {**textures, **images}

@@ -438,53 +438,6 @@ NOISE_GRADIENTS = ComputePass(
     (*_BOX_ORIGIN, ("noise_layers", "int")),
 )
 
-#: Uniforms of passes over the states of `ibfv`.
-_STATES: Uniforms = (*_BOX_ORIGIN, ("degree", "int"), ("sheet_count", "int"))
-
-#: Images that these passes write: one layer per sheet.
-_STATE_IMAGES = (("next_origins[]", "RG32F"), ("next_sums[]", "RGBA16F"))
-
-IBFV_LINKS = ComputePass("ibfv_links", ("cells",), (("links", "R32F"),), _STATES)
-
-IBFV_START = ComputePass(
-    "ibfv_start",
-    ("cells", "links", "directions[]"),
-    _STATE_IMAGES,
-    (
-        *_STATES,
-        ("line_count", "int"),
-        ("first_sheet", "int"),
-        ("step_length", "float"),
-        ("sharpening", "float"),
-        ("flow_mode", "int"),
-        ("break_steps", "int"),
-    ),
-    includes=("ibfv_states", "ibfv_source"),
-)
-
-IBFV_DOUBLE = ComputePass(
-    "ibfv_double",
-    ("links", "field_values", "max_magnitude", "state_origins[]", "state_sums[]"),
-    _STATE_IMAGES,
-    (
-        *_BOX_ORIGIN,
-        *_COVERING[:2],
-        ("kernel", "int"),
-        ("flow_mode", "int"),
-        ("magnitude_mode", "int"),
-        ("magnitude_range", "float"),
-        ("half_length", "int"),
-        ("break_steps", "int"),
-        ("decay", "float"),
-        ("break_decay", "float"),
-        ("step_count", "float"),
-        ("wave_turn", "vec2"),
-        ("is_last", "int"),
-    ),
-    includes=("ibfv_states", "magnitude", "full_samples", "ibfv_decay"),
-    switches=("kernel", "flow_mode", "magnitude_mode", "is_last"),
-)
-
 #: The depth map of a light.
 SHADOW_MAP = RasterPass(
     "shadow_map",
@@ -567,11 +520,10 @@ _MAGNITUDE: Uniforms = (("magnitude_mode", "int"), ("magnitude_range", "float"))
 
 _FLOW: Uniforms = (("flow_mode", "int"), ("flow_shifts", "vec4"), ("flow_weights", "vec4"))
 
-#: Textures and uniforms of `lic_lines.glsl`, for lines without breaks and overshoot. The array ``line_image`` is
-#: that of the sums of `IBFV_DOUBLE`.
+#: Textures and uniforms of `lic_lines.glsl`, for lines without breaks and overshoot.
 _LINE_TEXTURES = (
     *("cells", "angle_gradients[]", "tones", "field_values", "max_magnitude", "wobble_angles"),
-    *("line_image[]", "noise_gradients[]"),
+    "noise_gradients[]",
 )
 _LINES: Uniforms = (
     *_BOX_ORIGIN,
@@ -581,12 +533,6 @@ _LINES: Uniforms = (
     *_MAGNITUDE,
     *_FLOW,
     ("kernel", "int"),
-    ("is_carried", "int"),
-    ("decay", "float"),
-    ("break_decay", "float"),
-    ("carried_contrast", "float"),
-    ("sharpening", "float"),
-    ("wave_phase", "vec2"),
     ("half_length", "int"),
     ("full_samples", "float"),
     ("step_length", "float"),
@@ -594,13 +540,10 @@ _LINES: Uniforms = (
     ("break_samples", "float"),
     ("is_antialiased", "int"),
 )
-_LINE_FILES = (
-    *("magnitude", "line_angle", "pixel_tone", "gray", "full_samples", "lic_trace", "ibfv_source"),
-    *("ibfv_decay", "lic_carried", "lic_lines"),
-)
+_LINE_FILES = ("magnitude", "line_angle", "pixel_tone", "gray", "lic_trace", "lic_lines")
 _LINE_SWITCHES = (
     *("degree", "line_count", "sheet_count"),
-    *("kernel", "flow_mode", "is_carried", "magnitude_mode", "noise_channels", "is_antialiased"),
+    *("kernel", "flow_mode", "magnitude_mode", "noise_channels", "is_antialiased"),
 )
 
 #: The picture of a look without ink.
@@ -786,9 +729,6 @@ ALL_PASSES = (
     OUTLINE_MEAN,
     ANGLE_GRADIENT,
     NOISE_GRADIENTS,
-    IBFV_LINKS,
-    IBFV_START,
-    IBFV_DOUBLE,
     SHADOW_MAP,
     SHADOW_VISIBILITY,
     LIGHTING,

@@ -6,7 +6,7 @@ is traced from every pixel and line: unlike `fast_lic`, no averages are shared b
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,12 +15,12 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
-from ..compositor.look import colors_magnitude
+from ..compositor.look import Look, colors_magnitude
 from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
-from ..errors import RosyError
+from ..errors import DeviceError, RosyError
 from ..progress import Progress, Task, as_task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -34,7 +34,6 @@ from .device import Device
 from .even_lines_stage import even_lines_task
 from .frame import Frame
 from .gbuffer_stage import gbuffer_shaders, render_gbuffer
-from .ibfv_stage import check_states
 from .lic_stage import largest_magnitude, lic_task
 from .noise_stage import noise_task
 from .outline_stage import outline_task
@@ -49,6 +48,18 @@ COMPOSITE_DEPTH_BIAS = 2e-5
 #: Bytes of the places of arrowheads, and of what their directions are found with, that are kept.
 MAX_ARROWHEAD_BYTES = 1 << 26
 
+#: LIC methods that the card does not have, and those that it draws in 3D views instead.
+STAND_INS = {"members": "brute", "ibfv": "sheets"}
+
+
+def check_method(look: Look) -> None:
+    """Raise an error if the graphics card does not have the method of a look."""
+    if look.method in STAND_INS:
+        raise DeviceError(
+            f"the graphics card cannot draw the method '{look.method}': choose another method, or the "
+            "processor"
+        )
+
 
 class GpuRenderer:
     """Draws pictures on a graphics card. Implements `Renderer` and `ViewportRenderer`.
@@ -59,13 +70,14 @@ class GpuRenderer:
 
     Attributes
     ----------
-    device_name, downscale_factors, needs_occluders
+    device_name, downscale_factors, needs_occluders, stand_ins
         See `Renderer` and `ViewportRenderer`.
     """
 
     device_name = "gpu"
     downscale_factors = 2, 1
     needs_occluders = False
+    stand_ins: Mapping[str, str] = STAND_INS
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -80,14 +92,15 @@ class GpuRenderer:
         ------
         RosyError
             As `Renderer.render_task`. Also if the driver rejects the shaders or the size.
+        DeviceError
+            If the card does not have the look's method.
         """
         look, camera, instances = view.look, view.camera, view.instances
+        check_method(look)
         check_tone(look, [instance.tone for instance in instances], view.reference)
         check_color_values(look, instances)
         check_instances(instances, view.sample_camera, look.display)
         items = self.upload(instances, look.display)
-        for degree in {item.kind.degree for item in items if item.kind is not None}:
-            check_states(look, (camera.width, camera.height), degree)
         texture = yield from self.render_texture_task(items, view)
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
@@ -118,8 +131,8 @@ class GpuRenderer:
     ) -> Task[Any]:
         """As `ViewportRenderer.render_texture_task`.
 
-        The streamlines of the covering are traced, whatever the look's method is, except "ibfv" where it
-        can be drawn. The texture is reused by later pictures.
+        The streamlines of the covering are traced, whatever the look's method is. The texture is reused by
+        later pictures.
 
         Raises
         ------

@@ -155,13 +155,10 @@ class GpuResources:
     Attributes
     ----------
     device : Device
-    contents : dict of int to any
-        What images hold, by their ids, if that is known. It is forgotten with the image.
     """
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self.contents: dict[int, Any] = {}
         self._meshes: dict[tuple, GpuMesh] = {}
         self._images: dict[tuple, Any] = {}
         self._last_used: dict[tuple, int] = {}
@@ -187,8 +184,7 @@ class GpuResources:
 
     def release(self) -> None:
         """Free all resources."""
-        caches = self._meshes, self._images, self._last_used, self._lookup_textures, self.contents
-        for cache in caches:
+        for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
             cache.clear()
         self._mesh_cache.clear()
 
@@ -370,7 +366,6 @@ class GpuResources:
         """Free images of names and sizes that were not used for some uploads."""
         oldest_kept = self._upload_count - IMAGE_LIFETIME_UPLOADS
         for key in [key for key, last_used in self._last_used.items() if last_used < oldest_kept]:
-            self.contents.pop(id(self._images[key]), None)
             del self._images[key], self._last_used[key]
 
     def _draw_item_task(

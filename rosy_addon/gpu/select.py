@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..cache import Cache
 from ..compositor.look import Look
 from ..errors import DeviceError
@@ -10,8 +12,7 @@ from ..rendering.cpu import CpuRenderer
 from ..rendering.renderer import Renderer, ViewportRenderer
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
-from .ibfv_stage import ibfv_obstacle
-from .renderer import GpuRenderer
+from .renderer import GpuRenderer, check_method
 
 #: Devices that draw pictures, by key: label and description in the user interface.
 RENDER_DEVICES = {
@@ -19,10 +20,6 @@ RENDER_DEVICES = {
     "gpu": ("Graphics Card", "Faster. Single pixels can differ between cards"),
     "auto": ("Automatic", "The graphics card if there is one, otherwise the processor"),
 }
-
-
-#: LIC methods that the graphics card does not have. In 3D views it traces streamlines instead.
-CPU_METHODS = ("members",)
 
 
 def select_renderer(
@@ -56,17 +53,7 @@ def select_renderer(
     if device == "cpu":
         return CpuRenderer(cache, keep_gbuffers=keep_gbuffers, workers=workers)
     try:
-        if look.method in CPU_METHODS:
-            raise DeviceError(
-                f"the graphics card cannot draw the method '{look.method}': choose another method, or the "
-                "processor"
-            )
-        obstacle = ibfv_obstacle(look) if look.method == "ibfv" else None
-        if obstacle:
-            raise DeviceError(
-                f"the graphics card cannot draw the method 'ibfv' with {obstacle}: choose another method, or "
-                "the processor"
-            )
+        check_method(look)
         return GpuRenderer(blender_device())
     except DeviceError:
         if device == "gpu":
@@ -89,3 +76,27 @@ def select_viewport_renderer(device: str) -> ViewportRenderer:
     """
     gpu_device = blender_device()
     return CpuViewportRenderer(gpu_device) if device == "cpu" else GpuRenderer(gpu_device)
+
+
+def look_in_view(look: Look, renderer: ViewportRenderer) -> tuple[Look, str | None]:
+    """Return the look that a renderer draws in 3D views, and a line that says so if it is another one.
+
+    Parameters
+    ----------
+    look : Look
+    renderer : ViewportRenderer
+
+    Returns
+    -------
+    look : Look
+        Of a method that the renderer has.
+    message : str or None
+    """
+    method = renderer.stand_ins.get(look.method)
+    if method is None:
+        return look, None
+    message = (
+        f"live views on the graphics card draw the method '{method}' instead of '{look.method}': bake to see "
+        f"'{look.method}'"
+    )
+    return replace(look, method=method), message

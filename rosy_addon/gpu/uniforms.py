@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -27,13 +26,6 @@ from ..compositor.hatching import (
     has_breaks,
     has_overshoot,
     has_paper_grain,
-)
-from ..compositor.ibfv import (
-    contrast_match,
-    full_decay,
-    is_two_sided,
-    sharpening_strength,
-    step_turn,
 )
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
@@ -71,16 +63,6 @@ from .defines import (
 from .field_kind import FieldKind
 from .passes import INK_SETTINGS, LIC_SETTINGS, TONE_SETTINGS
 from .resources import DrawItem
-
-#: The uniforms of `carried_uniforms` for streaks that are traced.
-NOT_CARRIED = {
-    "is_carried": 0,
-    "decay": 0.0,
-    "break_decay": 0.0,
-    "carried_contrast": 0.0,
-    "sharpening": 0.0,
-    "wave_phase": (0.0, 0.0),
-}
 
 #: Planes that clip nothing.
 NO_CLIP_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
@@ -128,7 +110,6 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         **setting_values(look, (*LIC_SETTINGS, *INK_SETTINGS)),
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, look),
-        **NOT_CARRIED,
         "half_length": 0 if has_even_lines(look) else look.length,
         "full_samples": full_sample_count(look),
         "step_length": look.step,
@@ -165,38 +146,6 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": FADE_PIXELS,
         "crowded_pixels": crowded_pixels(look),
-    }
-
-
-def carried_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the uniforms of streaks that are carried, beside those of the LIC pass; see `ibfv`.
-
-    `look` is in pixels of the frame, and for the symmetry of the kind.
-    """
-    two_sided = is_two_sided(kind.symmetry, look)
-    comes_against = not kind.symmetry.has_opposites and not look.oriented
-    phase = 2 * math.pi * look.flow_phase
-    decay = float(full_decay(look, two_sided))
-    break_decay = float(full_decay(replace(look, length=break_steps(look)), two_sided))
-    decays = [decay, break_decay] if has_breaks(look) else [decay]
-    return {
-        "is_carried": 1,
-        "decay": decay,
-        "break_decay": break_decay,
-        "carried_contrast": float(contrast_match(two_sided)),
-        "sharpening": sharpening_strength(decays),
-        "wave_phase": (math.cos(phase), math.sin(phase)),
-        "first_sheet": kind.line_count if comes_against else 0,
-    }
-
-
-def doubling_uniforms(look: Look, steps: int, is_last: bool) -> dict[str, Any]:
-    """Return the uniforms of the pass that doubles sums over a number of steps."""
-    turn = step_turn(look) * steps
-    return {
-        "step_count": float(steps),
-        "wave_turn": (math.cos(turn), math.sin(turn)),
-        "is_last": int(is_last),
     }
 
 

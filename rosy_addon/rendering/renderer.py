@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from ..compositor.picture import Picture
@@ -47,10 +47,13 @@ class ViewportRenderer(Protocol):
     needs_occluders : bool
         Whether the meshes must include those without a field. Otherwise the view's own depth
         buffer hides what is occluded.
+    stand_ins : mapping of str to str
+        LIC methods that it does not have, and those that it draws instead.
     """
 
     downscale_factors: tuple[int, int]
     needs_occluders: bool
+    stand_ins: Mapping[str, str]
 
     def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
         """Do what takes long before the first picture: compile shaders, and `upload`.

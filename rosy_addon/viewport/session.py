@@ -15,7 +15,7 @@ from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..compositor.look import Look, has_flow
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
-from ..gpu.select import select_viewport_renderer
+from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.arrowheads import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
@@ -105,7 +105,7 @@ class ViewportSession:
         self.flow_clock = FlowClock()
         #: Whether a view has shown streaks that drift since the clock was advanced.
         self._has_shown_flow = False
-        #: Why a view shows no picture.
+        #: Why a view shows no picture, or one by another method.
         self._problems: dict[ViewPointers, str] = {}
         #: The lines of text in each view.
         self._lines: dict[ViewPointers, list[str]] = {}
@@ -380,6 +380,9 @@ class ViewportSession:
         """
         # Dots and arrowheads are drawn over the picture.
         look = replace(read_look(context.scene.rosy), singularity_dots="none", arrows=0.0)
+        look, message = look_in_view(look, self.progressive.renderer)
+        if message is not None:
+            self._problems[space.as_pointer(), region.as_pointer()] = message
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
         if layer.is_starting:

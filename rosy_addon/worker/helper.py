@@ -192,7 +192,9 @@ class Handle:
             self._helper.close()
 
 
-def _start_process(connection: Connection, environment: Mapping[str, str]) -> subprocess.Popen[bytes]:
+def _start_process(
+    connection: Connection, environment: Mapping[str, str]
+) -> subprocess.Popen[bytes]:
     """Start this package as a program, with one end of a connection."""
     # The helper imports what this process imports, in the same order, and this package.
     folders = [*sys.path, str(Path(__file__).parents[2])]

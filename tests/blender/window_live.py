@@ -319,6 +319,25 @@ def even_lines_are_those_of_a_bake():
     check_nothing_is_left()
 
 
+def methods_that_the_card_lacks_are_named():
+    """The view then draws another method, and says so as long as it does."""
+    yield from fresh_scene(levels=0)
+    switch("ON")
+    yield from wait_for_final_pictures()
+    look = bpy.context.scene.rosy.look
+    for method, drawn in (("ibfv", "sheets"), ("members", "brute")):
+        look.method = method
+        view()[1].tag_redraw()
+        yield from wait_for_final_pictures()
+        assert len(messages()) == 1 and f"'{drawn}' instead of '{method}'" in messages()[0]
+    look.method = "sheets"
+    view()[1].tag_redraw()
+    yield from wait_for_final_pictures()
+    assert not messages()
+    switch("OFF")
+    check_nothing_is_left()
+
+
 def only_visible_objects_are_drawn():
     """Hidden objects, local view, bounds and wireframe; the frame of a camera; a clipped region."""
     yield from fresh_scene()
@@ -1224,6 +1243,7 @@ STEPS = (
     surfaces_in_front_occlude,
     paper_is_behind_everything,
     even_lines_are_those_of_a_bake,
+    methods_that_the_card_lacks_are_named,
     only_visible_objects_are_drawn,
     clipped_region,
     tones_are_those_of_a_bake,

@@ -106,7 +106,7 @@ def draw_pair(
 ) -> Pair:
     """Draw a picture on the card and with numpy.
 
-    Numpy uses brute force, which averages each streamline separately, except for the method "ibfv".
+    Numpy uses brute force, which averages each streamline separately.
 
     Parameters
     ----------
@@ -135,9 +135,7 @@ def draw_pair(
         centers = rosy.project(instances, view.camera, look.display)
         is_center = np.isin(gbuffer.pixel, centers.pixel)
     has_flow = module_of(rosy.package, "compositor.look").has_flow
-    if look.method == "ibfv":
-        numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
-    elif has_flow(look) or supersampling > 1:
+    if has_flow(look) or supersampling > 1:
         with one_streamline_per_pixel(rosy.package):
             numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
     else:

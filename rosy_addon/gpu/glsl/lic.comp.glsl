@@ -1,6 +1,5 @@
-// The picture: line integral convolution along each line through a pixel, in both directions, or streaks
-// that have been carried there. The mean of the images of all lines gets the contrast of one of them. Then
-// color and light are applied.
+// The picture: line integral convolution along each line through a pixel, in both directions. The mean of
+// the images of all lines gets the contrast of one of them. Then color and light are applied.
 
 void main()
 {
@@ -16,12 +15,11 @@ void main()
   float relative_magnitude = magnitude_mode != 0 ? magnitude_share(value.xy) : 1.0;
   float line_angle = line_angle_of(pixel, value.xy);
   Families families = families_at(pixel);
-  vec3 source = is_carried != 0 ? sharpened_source(pixel, cell) : vec3(0.0);
   Reach reach = reach_at(relative_magnitude);
   vec3 lic_sum = vec3(0.0), hue_sum = vec3(0.0);
   float sample_sum = 0.0, hue_weight = 0.0;
   for (int line = 0; line < line_count; ++line) {
-    FilteredLine filtered = filtered_line(pixel, line, cell, reach, line_angle, source);
+    FilteredLine filtered = filtered_line(pixel, line, cell, reach, line_angle);
     lic_sum += filtered.mean;
     sample_sum += filtered.samples;
     if (family_count > 1) {

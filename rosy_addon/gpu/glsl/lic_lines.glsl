@@ -1,11 +1,8 @@
 // The filtered noise of the lines through a pixel. Included by lic.comp.glsl and streaks.comp.glsl.
 
-// How far the noise is filtered at a pixel: over how many steps in each direction, or with which decay, and
-// what has drifted.
+// How far the noise is filtered at a pixel: over how many steps in each direction, and what has drifted.
 struct Reach {
   int overshoot_count;
-  float decay_of_line;
-  float decay_of_breaks;
   Drift drift;
   Drift break_drift;
 };
@@ -31,16 +28,6 @@ Reach reach_at(float relative_magnitude)
   }
   // Even lines have no streaks, but breaks.
   step_count = even_lines != 0 ? break_steps : step_count;
-  reach.decay_of_line = decay;
-  reach.decay_of_breaks = break_decay;
-  if (is_carried != 0) {
-    if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
-      reach.decay_of_line = decay_of_steps(step_count);
-      reach.decay_of_breaks = decay_of_steps(break_step_count);
-    }
-    // Nothing is traced but overshoot.
-    step_count = break_step_count = 0;
-  }
   reach.drift.half_steps = step_count;
   reach.break_drift.half_steps = break_step_count;
   reach.drift.shifts = reach.break_drift.shifts = vec3(0.0);
@@ -54,8 +41,8 @@ Reach reach_at(float relative_magnitude)
   return reach;
 }
 
-// `line_angle` is that of line 0, and `source` is `sharpened_source` if streaks are carried.
-FilteredLine filtered_line(ivec2 pixel, int line, vec4 cell, Reach reach, float line_angle, vec3 source)
+// `line_angle` is that of line 0.
+FilteredLine filtered_line(ivec2 pixel, int line, vec4 cell, Reach reach, float line_angle)
 {
   bool has_opposite_sheet = sheet_count == 2 * line_count;
   int backward_sheet = has_opposite_sheet ? line + line_count : line;
@@ -72,31 +59,16 @@ FilteredLine filtered_line(ivec2 pixel, int line, vec4 cell, Reach reach, float 
     drift.forward_share = smooth_unit_step(0.5 + cosine * (0.5 / ONE_WAY_COSINE));
   }
   break_drift.forward_share = drift.forward_share;
-  Half forward, backward;
-  forward.tones = backward.tones = vec2(0.0);
-  if (is_carried == 0 || overshoot_steps > 0) {
-    forward = traced_half(pixel, line, 1.0, cell, 1.0, drift, break_drift, reach.overshoot_count,
-                          weight_slope(along));
-    backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
-                           reach.overshoot_count, weight_slope(-along));
-  }
+  Half forward = traced_half(pixel, line, 1.0, cell, 1.0, drift, break_drift, reach.overshoot_count,
+                             weight_slope(along));
+  Half backward = traced_half(pixel, backward_sheet, backward_sign, cell, -1.0, drift, break_drift,
+                              reach.overshoot_count, weight_slope(-along));
   FilteredLine result;
   result.break_mean = vec3(0.0);
   result.tone = 0.0;
   if (overshoot_steps > 0) {
     vec2 tone_sum = vec2(tone_at(pixel), 1.0) + forward.tones + backward.tones;
     result.tone = tone_sum.x / tone_sum.y;
-  }
-  if (is_carried != 0) {
-    float forward_share = flow_mode == FLOW_NONE ? 0.5 : drift.forward_share;
-    SheetSums sums = sums_of_line(pixel, line, forward_share, source);
-    Carried carried = carried_mean(sums, reach.decay_of_line, full_samples);
-    result.mean = carried.mean;
-    result.samples = carried.samples;
-    if (break_steps > 0) {
-      result.break_mean = carried_mean(sums_of_breaks(sums), reach.decay_of_breaks, break_samples).mean;
-    }
-    return result;
   }
   Sums sums = both_halves(cell.yzw, forward.all, backward.all, drift);
   result.mean = normalized_mean(sums, full_samples, drift);

@@ -104,6 +104,15 @@ Sums both_halves(vec3 start, Sums forward, Sums backward, Drift drift)
   return sums;
 }
 
+// The effective samples of a streamline of full length, by a kernel at rest (`filter_kernel`).
+float samples_at_rest(int half_steps)
+{
+  float width = float(half_steps + 1), count = 2.0 * width - 1.0;
+  return kernel == KERNEL_TAPER ? 3.0 * width * width * width / (2.0 * width * width + 1.0) :
+         kernel == KERNEL_RAMP  ? 3.0 * width * count / (4.0 * width - 1.0) :
+                                  count;
+}
+
 // The number of samples of equal weight whose mean has the same variance (`filter_kernel`, and
 // `flow.MovingKernel`).
 float effective_samples(Sums sums, Drift drift)

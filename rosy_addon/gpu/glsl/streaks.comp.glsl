@@ -14,10 +14,9 @@ void main()
   }
   vec4 value = texelFetch(field_values, pixel, 0);
   float relative_magnitude = magnitude_mode != 0 ? magnitude_share(value.xy) : 1.0;
-  vec3 source = is_carried != 0 ? sharpened_source(pixel, cell) : vec3(0.0);
   float line_angle = flow_mode == FLOW_TO_ANGLE ? line_angle_of(pixel, value.xy) : 0.0;
   FilteredLine filtered =
-      filtered_line(pixel, line, cell, reach_at(relative_magnitude), line_angle, source);
+      filtered_line(pixel, line, cell, reach_at(relative_magnitude), line_angle);
   vec4 means = vec4(gray(filtered.mean), gray(filtered.break_mean), filtered.tone, 0.0);
   imageStore(line_means, ivec3(pixel, line), means);
 }

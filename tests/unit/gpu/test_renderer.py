@@ -6,7 +6,6 @@ skipped without moderngl or without a context (EGL; software OpenGL is enough).
 
 from __future__ import annotations
 
-import itertools
 import re
 from dataclasses import replace
 from functools import lru_cache
@@ -29,7 +28,7 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.gpu import ibfv_stage, lic_stage, mesh_buffers, passes, resources, uniforms
+from rosy_addon.gpu import lic_stage, mesh_buffers, passes, resources, uniforms
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
 from rosy_addon.gpu.field_kind import field_kinds
 from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, mesh_buffers_task, split_matrix
@@ -762,43 +761,7 @@ DRIFTING_LOOKS = {
     | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
     "color noise, which does not drift": DRIFTING | {"noise": "colour"},
 }
-#: Noise that is carried along the sheets.
-CARRIED = {"method": "ibfv"}
-CARRIED_LOOKS = {
-    "carried": CARRIED,
-    "carried, one direction": CARRIED | {"degree": 1},
-    "carried, three directions": CARRIED | {"degree": 3},
-    "carried, oriented": CARRIED | {"oriented": True, "degree": 3, "density": 0.03},
-    "carried, six directions, guided": CARRIED | {"degree": 6, "guiding_angle": 0.7},
-    "carried, foreshortened": CARRIED | {"foreshorten": True, "degree": 2},
-    "carried, color noise": CARRIED | {"noise": "colour", "degree": 3},
-    "carried, supersampled": CARRIED | {"supersampling": 2},
-    "carried on the surface, short steps": CARRIED
-    | {"anchor": "surface", "step": 0.5, "taper": True},
-    "carried, families": CARRIED | {"hue": "families", "degree": 6},
-    "carried, hatched": CARRIED | {"ink": "hatch", "shading": 1.0, "grain": 3.0},
-    "carried, hatched, overshoot": CARRIED
-    | {"ink": "hatch", "shading": 1.0, "overshoot": 9.0, "paper_grain": 0.5, "degree": 3},
-    "carried, magnitude as length": CARRIED | {"magnitude": "length"},
-    "carried, magnitude as both, with a range": CARRIED
-    | {"magnitude": "both", "magnitude_range": 0.9, "taper": True, "degree": 3},
-    "carried, hatched, with breaks": CARRIED
-    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
-    "carried, hatched, breaks and length by magnitude": CARRIED
-    | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude": "both", "degree": 3},
-    "carried, hatched, wobbling": CARRIED
-    | {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5, "overshoot": 6.0},
-    "carried, even lines": CARRIED
-    | {"ink": "hatch", "lines": "even", "shading": 0.9, "grain": 3.0},
-    "carried, drifting, length by magnitude": CARRIED | DRIFTING | {"magnitude": "length"},
-    "carried, drifting": CARRIED | DRIFTING,
-    "carried, drifting, one direction": CARRIED | DRIFTING | {"degree": 1, "flow_distance": 13.0},
-    "carried, drifting, oriented": CARRIED | DRIFTING | {"degree": 3, "oriented": True},
-    "carried, drifting, hatched": CARRIED
-    | DRIFTING
-    | {"ink": "hatch", "shading": 0.9, "degree": 2},
-}
-ALL_LOOKS = LOOKS | DRIFTING_LOOKS | CARRIED_LOOKS
+ALL_LOOKS = LOOKS | DRIFTING_LOOKS
 #: Looks that take long, and of which others have every part.
 RARE_LOOKS = {
     "hatched on paper grain, supersampled",
@@ -814,7 +777,7 @@ RARE_LOOKS = {
 @pytest.mark.parametrize(
     "name",
     mainly(
-        set(list(LOOKS)[1::2] + list(DRIFTING_LOOKS) + list(CARRIED_LOOKS)[::2]) - RARE_LOOKS,
+        set(list(LOOKS)[1::2] + list(DRIFTING_LOOKS)) - RARE_LOOKS,
         ALL_LOOKS,
     ),
 )
@@ -1204,100 +1167,6 @@ def test_streaks_of_free_directions_drift(card, name):
     assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
 
 
-@pytest.mark.parametrize("flow", [0.0, 2.0])
-@pytest.mark.parametrize("name", ["two", "three", "two lines"])
-def test_noise_is_carried_along_free_directions(card, name, flow):
-    look = replace(
-        LOOK, method="ibfv", hue="families", guiding_angle=0.6, flow=flow, flow_phase=0.4
-    )
-    instances = [MeshInstance(BALL, np.eye(4), FREE[name](BALL))]
-    assert_parity(card, instances, view(), look, likeness=0.99)
-
-
-def test_noise_is_carried_on_meshes_of_several_degrees(card):
-    """Each with states of its own, and not from one mesh to another."""
-    instances = [
-        ball(degree, placed((0.3 + 0.05 * index) * rotation(index, 0, 1), grid_position(index)))
-        for index, degree in enumerate((1, 4, 3, 4))
-    ]
-    assert_parity(card, instances, view(), replace(LOOK, method="ibfv"), likeness=0.99)
-
-
-def test_twelve_sheets_have_numbers_of_their_own(card):
-    """The origins of states hold the numbers of their sheets bit by bit."""
-    look = replace(LOOK, method="ibfv")
-    assert_parity(card, [ball(12)], view(), look, likeness=0.99)
-
-
-def test_only_the_phase_of_the_flow_leaves_sums_as_they_are(device, monkeypatch):
-    """Then noise is not carried again, and the picture is the same as if it were."""
-    look = replace(LOOK, method="ibfv", flow=1.0, magnitude="length")
-    card, counts = GpuRenderer(device), []
-    compute = device.compute
-    monkeypatch.setattr(
-        device,
-        "compute",
-        lambda shader, *rest: counts.append(shader.name) or compute(shader, *rest),
-    )
-
-    def draw(renderer, items, camera, phase, **changes):
-        counts.clear()
-        changed = replace(look, flow_phase=phase, **changes)
-        picture = renderer.read(render_texture(renderer, items, camera, changed), *SIZE).copy()
-        return picture, "ibfv_double" in counts
-
-    items, other = (card.upload([ball(degree)], "smooth") for degree in (4, 3))
-    turned = card.upload([ball(4, placed(rotation(0, 0, 1)))], "smooth")
-    cases = [
-        (items, view(), 0.0, {}, True),
-        (items, view(), 0.4, {}, False),
-        (items, view(azimuth=0.5), 0.4, {}, True),
-        (turned, view(azimuth=0.5), 0.4, {}, True),
-        (other, view(azimuth=0.5), 0.4, {}, True),
-        (turned, view(azimuth=0.5), 0.7, {}, False),
-        (turned, view(azimuth=0.5), 0.7, {"seed": 3}, True),
-    ]
-    for shown, camera, phase, changes, is_carried in cases:
-        picture, was_carried = draw(card, shown, camera, phase, **changes)
-        assert was_carried == is_carried
-        np.testing.assert_array_equal(
-            picture, draw(GpuRenderer(device), shown, camera, phase, **changes)[0]
-        )
-
-
-def test_pictures_drawn_in_turns_do_not_leave_their_sums(card):
-    """Two tasks with the same images: neither knows what these hold."""
-    look = replace(LOOK, method="ibfv")
-    items = card.upload([ball(4)], "smooth")
-    inputs = [ViewInput((), view(azimuth=azimuth), look) for azimuth in (0.1, 0.2)]
-    one, other = (card.render_texture_task(items, view_input) for view_input in inputs)
-    carrying = (progress for progress in one if progress.label == ibfv_stage.STEP_LABEL)
-    for _ in itertools.islice(carrying, 4):
-        pass
-    run_to_completion(other)
-    run_to_completion(one)
-    for view_input in inputs:
-        drawn = card.read(run_to_completion(card.render_texture_task(items, view_input)), *SIZE)
-        fresh = GpuRenderer(card.device)
-        alone = fresh.read(run_to_completion(fresh.render_texture_task(items, view_input)), *SIZE)
-        np.testing.assert_array_equal(drawn, alone)
-
-
-def test_states_that_take_too_much_memory(card, monkeypatch, error_of):
-    """Pictures need a smaller size. Live views trace streamlines."""
-    look = replace(LOOK, method="ibfv")
-    monkeypatch.setattr(ibfv_stage, "MAX_STATE_BYTES", 160 * 144 * 4 * ibfv_stage.STATE_BYTES)
-    assert_parity(card, [ball(4)], view(), look)
-    task = card.render_task(ViewInput((ball(5),), view(), look))
-    message = error_of(run_to_completion, task)
-    assert "160 x 144" in message and "ibfv" in message and "processor" in message
-    items = card.upload([ball(5)], "smooth")
-    traced = card.read(render_texture(card, items, view(), replace(look, method="sheets")), *SIZE)
-    traced = traced.copy()
-    drawn = card.read(render_texture(card, items, view(), look), *SIZE)
-    np.testing.assert_array_equal(drawn, traced)
-
-
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
 def test_families_of_rosys(card, degree):
     lines = degree if degree % 2 else degree // 2
@@ -1407,16 +1276,12 @@ UNDEFINED_LOOKS = {
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
     "drifting": DRIFTING,
     "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "taper": True},
-    "carried": CARRIED,
-    "carried, drifting, hatched": CARRIED | DRIFTING | {"ink": "hatch", "shading": 1.0},
 }
 
 
 @pytest.mark.parametrize(
     "name",
-    mainly(
-        ["soft", "hatched", "hatched, all effects", "drifting, hatched", "carried"], UNDEFINED_LOOKS
-    ),
+    mainly(["soft", "hatched", "hatched, all effects", "drifting, hatched"], UNDEFINED_LOOKS),
 )
 @pytest.mark.parametrize("degree", [3, *long(4)])
 def test_where_the_field_is_undefined(card, degree, name):

@@ -1,47 +1,57 @@
-"""Which looks the graphics card refuses, before it is asked for."""
+"""Which looks the graphics card refuses, before it is asked for, and what 3D views draw of them."""
 
 from __future__ import annotations
 
 import pytest
 
-from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look import Look, has_flow
 from rosy_addon.gpu import select
+from rosy_addon.gpu.cpu_viewport import CpuViewportRenderer
 from rosy_addon.gpu.renderer import GpuRenderer
+from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.view_input import ViewInput
 
-HATCHED = {"ink": "hatch", "breaks": 0.5}
-DRAWN = {
-    "ibfv": {"method": "ibfv"},
-    "ibfv, drifting": {"method": "ibfv", "flow": 1.0, "magnitude": "both"},
-    "ibfv, with breaks": {"method": "ibfv", **HATCHED},
-    "ibfv, even lines": {"method": "ibfv", "ink": "hatch", "lines": "even"},
-}
-REFUSED = {
-    "members": {"method": "members"},
-    "drift": {"method": "ibfv", "flow": 1.0, **HATCHED},
-    "colored": {"method": "ibfv", "noise": "colour", "ink": "hatch", "wobble": 0.3},
-    "even lines": {"method": "ibfv", "lines": "even", **HATCHED},
-}
+REFUSED = {"members": "brute", "ibfv": "sheets"}
 
 
 @pytest.fixture
-def card(monkeypatch):
+def unused_card(monkeypatch):
     """A graphics card that is never drawn with."""
     monkeypatch.setattr(select, "blender_device", lambda: None)
 
 
-@pytest.mark.usefixtures("card")
-@pytest.mark.parametrize("name", DRAWN)
-def test_looks_that_the_card_draws(name):
-    for device in ("gpu", "auto"):
-        renderer = select.select_renderer(device, Look(**DRAWN[name]))
-        assert isinstance(renderer, GpuRenderer)
+@pytest.mark.usefixtures("unused_card")
+@pytest.mark.parametrize("device", ["gpu", "auto"])
+@pytest.mark.parametrize("method", ["sheets", "brute"])
+def test_methods_that_the_card_draws(method, device):
+    assert isinstance(select.select_renderer(device, Look(method=method)), GpuRenderer)
 
 
-@pytest.mark.usefixtures("card")
-@pytest.mark.parametrize("name", REFUSED)
-def test_looks_that_the_processor_draws_instead(name, error_of):
-    look = Look(**REFUSED[name])
+@pytest.mark.usefixtures("unused_card")
+@pytest.mark.parametrize("method", REFUSED)
+def test_methods_that_the_processor_draws_instead(method, error_of):
+    look = Look(method=method)
     message = error_of(select.select_renderer, "gpu", look)
-    assert look.method in message and name in message and "processor" in message
+    assert f"'{method}'" in message and "processor" in message
     assert isinstance(select.select_renderer("auto", look), CpuRenderer)
+    assert select.automatic_device(look) == "cpu"
+    task = GpuRenderer(None).render_task(ViewInput((), None, look))
+    assert error_of(run_to_completion, task) == message
+
+
+@pytest.mark.parametrize("method", REFUSED)
+def test_views_say_that_they_draw_another_method(method):
+    look = Look(method=method, flow=1.5)
+    drawn, message = select.look_in_view(look, GpuRenderer(None))
+    assert drawn == look.with_settings({"method": REFUSED[method]})
+    assert has_flow(drawn) == has_flow(look)
+    assert f"'{method}'" in message and f"'{drawn.method}'" in message and "bake" in message
+
+
+def test_views_draw_other_methods_as_they_are():
+    on_card, on_processor = GpuRenderer(None), object.__new__(CpuViewportRenderer)
+    for renderer, methods in ((on_card, ("sheets", "brute")), (on_processor, REFUSED)):
+        for method in methods:
+            look = Look(method=method)
+            assert select.look_in_view(look, renderer) == (look, None)

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 from rosy_addon.image_io.png import write_png
 from rosy_addon.progress import run_to_completion
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.picture_memory import picture_memory, view_coverage
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -141,7 +141,7 @@ def estimate_and_draw(name: str) -> tuple[float, float]:
     estimate = picture_memory(view, view_coverage(view))
     Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     held = _resident_bytes("VmRSS")
-    rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
+    rgba = (draw_picture(view)).rgba
     with TemporaryDirectory() as folder:
         write_png(Path(folder) / "picture.png", rgba)
     return estimate / 1e9, (_resident_bytes("VmHWM") - held) / 1e9
@@ -160,7 +160,7 @@ def draw(name: str) -> float:
     triangles, degree, settings = CASES[name]
     look = replace(cases.LOOK, **settings)
     view = ViewInput((cases.instance(triangles, degree),), cases.camera(*WIDE), look)
-    run_to_completion(CpuRenderer().render_task(view))
+    (draw_picture(view))
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak * (1 if sys.platform == "darwin" else 1024) / 1e9
 

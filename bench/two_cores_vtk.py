@@ -14,7 +14,7 @@ import numpy as np
 
 from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases

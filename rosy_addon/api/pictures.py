@@ -25,7 +25,7 @@ from ..projection.camera import check_size
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from ..rendering.band_workers import BandWorkers
-from ..rendering.cpu import CpuRenderer
+from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.view_input import ViewInput
 from ..turntable_video import (

@@ -184,11 +184,12 @@ def compose(
     color_range = common_color_range(color_tops)
     if map_position is not None:
         color_range = value_ends(look, value_ranges(gbuffer.instances))
+    line_count = max((len(layer.images.members) for layer in layers), default=0)
     if not draws_thresholds:
-        return Picture(rgba, tuple(layers), color_range=color_range)
+        return Picture(rgba, tuple(layers), None, color_range, None, line_count)
     with progress(1.0):
         spread_rgba = _resolve_pixels(gbuffer.pixel, spread, alpha, *frame)
-    return Picture(rgba, tuple(layers), spread_rgba[..., 0], color_range)
+    return Picture(rgba, tuple(layers), spread_rgba[..., 0], color_range, None, line_count)
 
 
 def compose_planar(

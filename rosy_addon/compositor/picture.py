@@ -42,7 +42,8 @@ class Picture:
         Linear, not premultiplied. Alpha is the fraction of the pixel in which a field is visible
         or, with clear paper, the coverage by ink.
     layers : tuple of DegreeLayer
-        One per visible degree, in ascending order. Empty if the picture is from a graphics card.
+        One per visible degree, in ascending order. Empty if the picture is from a graphics card, or was
+        drawn in strips.
     spread : (H, W) float32 ndarray or None
         If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
         is the fraction of the pixel in which a field is visible.
@@ -51,6 +52,8 @@ class Picture:
         fields of several degrees have ranges of their own.
     marks : SingularityMarks or None
         The singularities that are drawn over it. None if it has no dots.
+    line_count : int
+        The largest number of lines of its fields through a point; 0 if the picture is from a graphics card.
     """
 
     rgba: np.ndarray
@@ -58,11 +61,7 @@ class Picture:
     spread: np.ndarray | None = None
     color_range: tuple[float, float] | None = None
     marks: SingularityMarks | None = None
-
-    @property
-    def line_count(self) -> int:
-        """The largest number of lines of its fields through a point; 0 without layers."""
-        return max((len(layer.images.members) for layer in self.layers), default=0)
+    line_count: int = 0
 
 
 def common_color_range(tops: Collection[float]) -> tuple[float, float] | None:

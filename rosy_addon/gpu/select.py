@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..cache import Cache
 from ..compositor.look import Look
 from ..errors import DeviceError
-from ..rendering.band_workers import BandWorkers
-from ..rendering.cpu import CpuRenderer
-from ..rendering.renderer import Renderer, ViewportRenderer
+from ..compositor.picture import Picture
+from ..progress import subtask
+from ..rendering.draw import bake_picture
+from ..rendering.renderer import ViewportRenderer
+from ..rendering.view_input import ViewInput
+from ..worker.job import Call, Steps
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer, check_method
@@ -22,28 +24,19 @@ RENDER_DEVICES = {
 }
 
 
-def select_renderer(
-    device: str,
-    look: Look,
-    cache: Cache | None = None,
-    *,
-    keep_gbuffers: bool = True,
-    workers: BandWorkers | None = None,
-) -> Renderer:
-    """Return the renderer that draws a look on a device.
-
-    The choice depends on the device and on the look alone.
+def select_device(device: str, look: Look) -> str:
+    """Return which device draws the pictures of a look.
 
     Parameters
     ----------
     device : {"cpu", "gpu", "auto"}
         "auto" is the graphics card if there is one that draws the look, otherwise the processor.
     look : Look
-    cache : Cache, optional
-    keep_gbuffers : bool
-        Whether the processor keeps G-buffers in the cache; see `CpuRenderer`.
-    workers : BandWorkers, optional
-        Processes that draw large pictures, if the processor does.
+
+    Returns
+    -------
+    {"cpu", "gpu"}
+        Part of cache keys: the pixels of the two differ slightly.
 
     Raises
     ------
@@ -51,19 +44,53 @@ def select_renderer(
         If the device is "gpu" and there is no graphics card, or it does not draw this look.
     """
     if device == "cpu":
-        return CpuRenderer(cache, keep_gbuffers=keep_gbuffers, workers=workers)
+        return "cpu"
     try:
         check_method(look)
-        return GpuRenderer(blender_device())
+        blender_device()
     except DeviceError:
         if device == "gpu":
             raise
-    return CpuRenderer(cache, keep_gbuffers=keep_gbuffers, workers=workers)
+        return "cpu"
+    return "gpu"
+
+
+def picture_steps(
+    view: ViewInput,
+    device: str,
+    *,
+    keep_gbuffers: bool = True,
+    workers: int = 0,
+    part: tuple[float, float] = (0.0, 1.0),
+) -> Steps[Picture]:
+    """Draw a picture as part of a job: on the graphics card in steps, or with numpy in one call.
+
+    Parameters
+    ----------
+    view : ViewInput
+    device : {"cpu", "gpu"}
+        From `select_device`.
+    keep_gbuffers, workers
+        As for `bake_picture`.
+    part : (float, float)
+        Fractions of the job at which the drawing begins and ends.
+
+    Yields
+    ------
+    Call or Step
+
+    Returns
+    -------
+    Picture
+    """
+    if device == "cpu":
+        return (yield Call(bake_picture, (view, keep_gbuffers, workers), *part))
+    return (yield from subtask(GpuRenderer(blender_device()).render_task(view), *part))
 
 
 def automatic_device(look: Look) -> str:
     """Return which device draws a look if the device is "auto": "cpu" or "gpu"."""
-    return select_renderer("auto", look).device_name
+    return select_device("auto", look)
 
 
 def select_viewport_renderer(device: str) -> ViewportRenderer:

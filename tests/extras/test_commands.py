@@ -25,7 +25,7 @@ from rosy_addon.external.simulation_files import (
 from rosy_addon.extras.film import SimulationFields
 from rosy_addon.field.array_field import SurfaceArrays, array_field
 from rosy_addon.progress import run_to_completion
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -187,7 +187,7 @@ def test_film_has_one_camera_and_one_range(growing):
     look = views[0].look
     expected = mesh_view(instance, look, (30.0, 20.0), (60, 50))
     assert views[0].camera.view == pytest.approx(expected.camera.view, abs=1e-12)
-    pictures = [run_to_completion(CpuRenderer().render_task(v)) for v in (views[0], expected)]
+    pictures = [(draw_picture(v)) for v in (views[0], expected)]
     assert pictures[0].rgba == pytest.approx(pictures[1].rgba, abs=1e-4)
     given = Look(magnitude="length", magnitude_range=3.0)
     film = Film(SimulationFields(steps[:2]), given, (0.0, 0.0), (60, 50))

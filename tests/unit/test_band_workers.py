@@ -22,7 +22,7 @@ from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering import band_workers
 from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 #: Fields with many lines need many strips.

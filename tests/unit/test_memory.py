@@ -24,7 +24,7 @@ from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.progress import as_task, run_to_completion
 from rosy_addon.projection.camera import Camera
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.picture_memory import (
     STATISTICS_BYTES,
     Coverage,
@@ -152,7 +152,7 @@ def traced_peak(work) -> int:
 def test_estimates_of_pictures_are_within_a_quarter(degree, settings):
     view = ball_view(degree=degree, **settings)
     expected = picture_memory(view, view_coverage(view))
-    peak = traced_peak(lambda: run_to_completion(CpuRenderer().render_task(view)))
+    peak = traced_peak(lambda: draw_picture(view))
     assert 0.75 <= expected / peak <= 1.25
 
 
@@ -196,7 +196,7 @@ def test_pictures_are_refused_before_they_are_drawn(monkeypatch, error_of):
     limit_memory(monkeypatch, 0.9 * needed)
 
     def draw():
-        return run_to_completion(CpuRenderer().render_task(view))
+        return draw_picture(view)
 
     peak = traced_peak(lambda: error_of(draw))
     assert peak < 0.02 * needed

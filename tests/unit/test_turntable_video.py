@@ -24,7 +24,7 @@ from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw
 from rosy_addon.processes import process_task
 from rosy_addon.progress import as_task, run_to_completion
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import (
     VideoWriter,
     check_still,
@@ -90,7 +90,7 @@ def test_the_object_stays_in_the_frame_in_all_views():
     instance = MeshInstance(surface, matrix, axis_field(surface, 2))
     covered = []
     for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
-        rgba = run_to_completion(CpuRenderer().render_task(view)).rgba
+        rgba = (draw_picture(view)).rgba
         assert rgba.shape == (60, 80, 4)
         visible = rgba[..., 3] > 0
         assert not (
@@ -141,7 +141,7 @@ def test_lights_stay_fixed_while_the_camera_orbits():
     look = Look(length=8, shading=1.0, light="scene")
     sun = Light("sun", np.array([0.0, 1.0, 0.0]), np.ones(3), 1.0)
     dark, lit = (
-        run_to_completion(CpuRenderer().render_task(view)).rgba[20:44, 20:44, :3].mean()
+        (draw_picture(view)).rgba[20:44, 20:44, :3].mean()
         for view in turntable_views(instance, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
     )
     assert dark < 0.05 < 0.2 < lit

@@ -25,7 +25,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 from .page import ROOT

@@ -23,7 +23,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 
@@ -89,7 +89,7 @@ def render_view(
     """Return the (side, side, 4) linear RGBA of a field as users draw it, with its singularities."""
     instance = MeshInstance(surface, np.eye(4), field)
     view_input = ViewInput((instance,), view(surface, angles, (side, side), 1), look)
-    return run_to_completion(CpuRenderer().render_task(view_input)).rgba
+    return (draw_picture(view_input)).rgba
 
 
 def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:

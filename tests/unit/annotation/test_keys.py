@@ -31,7 +31,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 SCALE = ColorScale("Magnitude (1/m)", "viridis", 0.0, 0.874)
@@ -298,12 +298,12 @@ def largest_visible(view_input):
 def test_the_range_is_the_largest_visible_magnitude():
     look = Look(magnitude="colour", supersampling=1)
     view_input = view(look)
-    picture = run_to_completion(CpuRenderer().render_task(view_input))
+    picture = draw_picture(view_input)
     low, high = picture.color_range
     assert low == 0 and high == pytest.approx(largest_visible(view_input), rel=1e-6)
     # A look with this range gives the same picture.
     fixed = view(replace(look, magnitude_range=high))
-    again = run_to_completion(CpuRenderer().render_task(fixed))
+    again = draw_picture(fixed)
     np.testing.assert_array_equal(again.rgba, picture.rgba)
     assert again.color_range == (0.0, high)
     scale = picture_key(look, picture).color_scale
@@ -315,7 +315,7 @@ def test_the_range_does_not_reach_beyond_the_field():
     largest = view(Look()).instances[0].field.magnitude.max()
     for supersampling in (1, 2, 3):
         look = Look(magnitude="colour", supersampling=supersampling)
-        picture = run_to_completion(CpuRenderer().render_task(view(look)))
+        picture = draw_picture(view(look))
         assert 0.9 * largest < picture.color_range[1] <= largest * (1 + 1e-4)
 
 
@@ -328,14 +328,14 @@ def test_fields_with_ranges_of_their_own_have_no_common_one():
     camera = orthographic_camera(look_at((0.7, -5, 0), (0.7, 0, 0)), 160, 120, scale=4.0)
     for top, expected in ((0.0, None), (0.7, (0.0, 0.7))):
         look = Look(magnitude="colour", magnitude_range=top)
-        picture = run_to_completion(CpuRenderer().render_task(view(look, (first, other), camera)))
+        picture = draw_picture(view(look, (first, other), camera))
         assert picture.color_range == expected
         assert picture_key(look, picture).color_scale.high == (top or None)
 
 
 def test_the_legend_has_the_visible_singularities():
     look = Look(singularity_dots="all", singularity_size=7.0)
-    picture = run_to_completion(CpuRenderer().render_task(view(look)))
+    picture = draw_picture(view(look))
     key = picture_key(look, picture)
     marks = picture.marks
     assert key.color_scale is None and key.dot_size == 7.0
@@ -347,7 +347,7 @@ def test_the_legend_has_the_visible_singularities():
 
 
 def test_a_picture_without_dots_has_no_legend():
-    picture = run_to_completion(CpuRenderer().render_task(view(Look())))
+    picture = draw_picture(view(Look()))
     assert picture_key(Look(), picture) == PictureKey()
 
 
@@ -359,7 +359,7 @@ def test_the_range_of_numbers_as_colors(ends):
     colored = replace(instance, color_values=heights)
     look = Look(hue="values", values_low=ends[0], values_high=ends[1])
     view_input = view(look, (colored,))
-    picture = run_to_completion(CpuRenderer().render_task(view_input))
+    picture = draw_picture(view_input)
     expected = ends if any(ends) else (float(heights.min()), float(heights.max()))
     assert picture.color_range == expected == fixed_color_range(look, (colored,))
     assert fixed_color_range(look) == (ends if any(ends) else None)

@@ -23,7 +23,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 240, 200, fov=0.7)

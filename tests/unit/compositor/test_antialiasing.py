@@ -21,7 +21,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 SIZE = 240
@@ -40,7 +40,7 @@ def torus_instance(degree=4):
 
 
 def rendered(instance, look):
-    return run_to_completion(CpuRenderer().render_task(ViewInput((instance,), CAMERA, look))).rgba
+    return (draw_picture(ViewInput((instance,), CAMERA, look))).rgba
 
 
 def sampled(instance, look, samples):

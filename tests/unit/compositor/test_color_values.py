@@ -20,7 +20,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.surface_sampling import surface_values
 from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 #: Pixels along each side. The pictures show a square from -1.2 to 1.2.
@@ -52,9 +52,7 @@ def of_vertices(surface, values, **place):
 
 def drawn(instances, look):
     """The linear colors of a picture, and the x of its pixels."""
-    rgba = run_to_completion(
-        CpuRenderer().render_task(ViewInput(tuple(instances), camera(), look))
-    ).rgba
+    rgba = (draw_picture(ViewInput(tuple(instances), camera(), look))).rgba
     row, column = np.nonzero(rgba[..., 3])
     return rgba[row, column, :3], PIXEL_CENTERS[column]
 
@@ -161,7 +159,7 @@ def test_processes_draw_the_same_bytes():
     instance = replace(instance, field=axis_field(BALL, 11, (0, 0, 1)))
     look = replace(FLAT, gain=1.0, length=10)
     view = ViewInput((instance,), camera(320, 1216), look)
-    alone = run_to_completion(CpuRenderer().render_task(view)).rgba
+    alone = (draw_picture(view)).rgba
     with BandWorkers(2) as workers:
         assert len(divide_rows(look, view.camera, view.instances, 2)) == 2
         together = run_to_completion(CpuRenderer(workers=workers).render_task(view)).rgba

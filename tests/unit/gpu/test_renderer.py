@@ -39,7 +39,7 @@ from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_tone import SurfaceTone
-from rosy_addon.rendering.cpu import CpuRenderer
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 AXIS = (0.3, 0.2, 1.0)

@@ -81,12 +81,12 @@ def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]
     return low, 1 / difference
 
 
-def map_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
+def scaled_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
     """(P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
     return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
 
 
-def compute_map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
+def map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     """Find where the numbers of the surfaces are in the color map.
 
     Parameters
@@ -110,5 +110,5 @@ def compute_map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
     for block in pixel_blocks(len(positions)):
         report(block.start / len(positions), "finding colors")
-        positions[block] = map_positions(surface_values(gbuffer.part(block)), low, scale)
+        positions[block] = scaled_positions(surface_values(gbuffer.part(block)), low, scale)
     return positions

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,8 +13,7 @@ from ..color import map_colors, to_linear
 from ..progress import progress, report
 from ..projection.gbuffer import GBuffer, PixelCoverage
 from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
-from .band import Band
-from .color_values import compute_map_positions, value_ends, value_ranges
+from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
 from .even_lines import EvenLines, even_line_images, has_even_lines
@@ -31,7 +31,7 @@ from .hatching import (
 )
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
-from .lic import lic
+from .lic import lic, lic_lengths
 from .lic_images import LicImages, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_hatched
 from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
@@ -41,6 +41,8 @@ from .pixel_field import PixelField, planar_pixel_field
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
+from .strip_division import divide_into_strips
+from .strips import Strip, entries_of_rows, join_strips
 from .target_tone import ReferenceRender, target_tone
 
 #: Contrast of streaks in colored pictures, relative to gray pictures.
@@ -54,7 +56,7 @@ def compose(
     reference: ReferenceRender | None = None,
     cache: Cache | None = None,
     mesh_cache: Cache | None = None,
-    band: Band | None = None,
+    strips: Sequence[Strip] | None = None,
     draws_thresholds: bool = False,
 ) -> Picture:
     """Draw the fields of a G-buffer.
@@ -75,8 +77,9 @@ def compose(
         depend on the changed settings are reused.
     mesh_cache : Cache, optional
         Stores what does not depend on the camera, by default `cache`.
-    band : Band, optional
-        The rows that are drawn, if not all. The G-buffer has them and their context.
+    strips : sequence of Strip, optional
+        The rows that are drawn, from `divide_into_strips`; by default all. The G-buffer has them and their
+        context.
     draws_thresholds : bool
         Whether the picture has the thresholds of its ink (`ink_thresholds`), if the look has ink. They do
         not depend on the tone.
@@ -84,112 +87,190 @@ def compose(
     Returns
     -------
     Picture
-        Of these rows.
+        Of these rows and, if they are not the last ones, of those in which the last strip fades into the
+        one above.
 
     Raises
     ------
     RosyError
         If the source of the tone or of the colors does not exist; see `target_tone.check_tone` and
         `color_values.check_color_values`.
-
-    See Also
-    --------
-    compose : The same, run to its end.
     """
     camera = gbuffer.camera
     if gbuffer.coverage is not None:
         look = replace(look, supersampling=1)
+    if strips is None:
+        strips = divide_into_strips(look, camera, gbuffer.instances)
     look = with_cycle_distance(look_in_pixels(look, camera, gbuffer.instances))
     pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)
     draws_thresholds = draws_thresholds and is_hatched(look)
     if draws_thresholds:
         pixel_look = sharp_look(pixel_look)
-    spread = np.zeros((len(gbuffer.pixel) if draws_thresholds else 0, 1), dtype=np.float32)
-    color = np.zeros((len(gbuffer.pixel), 3), dtype=np.float32)
-    alpha = np.ones(len(gbuffer.pixel), dtype=np.float32)
     cache = Cache() if cache is None else cache
-    stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache, band)
+    stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache)
     with progress(0.0):
-        tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
-    map_position = None
-    if colors_values(look) and not draws_thresholds:
-        with progress(0.0):
-            map_position = compute_map_positions(gbuffer, look)
-    layers, color_tops = [], set()
-    visible_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
-    degrees = sorted({gbuffer.instance_degrees[instance_id] for instance_id in visible_ids})
-    for layer_index, degree in enumerate(degrees):
-        start, stop = layer_index / len(degrees), (layer_index + 1) / len(degrees)
-        report(start, "finding directions")
-        with progress(start):
-            field = stages.pixel_field(degree, pixel_look)
-        field_look = look_for_symmetry(pixel_look, field.symmetry)
-        even_lines = break_images = None
-        break_look = replace(field_look, length=break_steps(field_look))
-        if has_even_lines(field_look):
-            with progress(start, stop):
-                even_lines = stages.even_lines(field, field_look)
-            with progress(stop):
-                images = even_line_images(even_lines)
-            if has_breaks(look):
-                with progress(stop):
-                    (break_images,) = stages.lic(field, [break_look])
-        elif has_breaks(look):
-            with progress(start, stop):
-                images, break_images = stages.lic(field, [field_look, break_look])
-        else:
-            with progress(start, stop):
-                (images,) = stages.lic(field, [field_look])
-        part_look = (
-            with_magnitude_range(field_look, field) if colors_magnitude(look) else field_look
-        )
-        if colors_magnitude(look):
-            color_tops.add(part_look.magnitude_range)
-        tone = modulation = None
-        drawn = stages.drawn(field)
-        if is_hatched(look):
-            with progress(stop):
-                tone = _mean_tone(tone_rgb[field.gbuffer_index])
-                modulation = _line_modulation(
-                    stages, field, field_look, tone, break_images, even_lines
-                )
-            tone = tone[drawn]
-        field = field.part(drawn)
-        if map_position is not None:
-            field = replace(field, map_position=map_position[field.gbuffer_index])
-        with progress(stop):
-            layer = compute_layer(field, field_look, images)
-        for block in pixel_blocks(len(field.pixel)):
-            report(stop, "drawing the ink")
-            part, part_images = field.part(block), images.part(block)
-            entries = part.gbuffer_index
-            if modulation is None:
-                color[entries] = colorize(part, part_images, layer.tone[block], part_look)
-            elif draws_thresholds:
-                pixels = picture_thresholds(
-                    part, part_images, part_look, modulation.part(block), look.supersampling
-                )
-                color[entries], spread[entries] = pixels[:, :3], pixels[:, 3:]
-            else:
-                color[entries], alpha[entries] = render_hatching(
-                    part, part_images, part_look, tone[block], modulation.part(block)
-                )
-        layers.append(layer)
-    if not is_hatched(look):
-        color *= tone_rgb
-    rows = (0, camera.height) if band is None else (band.start, band.stop)
-    frame = camera.width, rows, look.supersampling, gbuffer.coverage
-    with progress(1.0):
-        rgba = _resolve_pixels(gbuffer.pixel, color, alpha, *frame)
-    color_range = common_color_range(color_tops)
-    if map_position is not None:
+        canvas = _Canvas(gbuffer, look, lights, reference, cache, draws_thresholds)
+        layers = [_prepared(stages, canvas, degree, pixel_look) for degree in canvas.degrees]
+    pictures, drawn = [], []
+    for number, strip in enumerate(strips):
+        with progress(number / len(strips), (number + 1) / len(strips)):
+            drawn = [_draw_layer(stages, canvas, layer, strip) for layer in layers]
+            pictures.append(canvas.picture(strip))
+    rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
+    color_range = common_color_range({layer.look.magnitude_range for layer in layers})
+    if not colors_magnitude(look):
+        color_range = None
+    if canvas.map_position is not None:
         color_range = value_ends(look, value_ranges(gbuffer.instances))
-    line_count = max((len(layer.images.members) for layer in layers), default=0)
-    if not draws_thresholds:
-        return Picture(rgba, tuple(layers), None, color_range, None, line_count)
+    return Picture(
+        rgba,
+        tuple(drawn) if len(strips) == 1 else (),
+        spread[..., 0] if draws_thresholds else None,
+        color_range,
+        line_count=max((layer.field.line_count for layer in layers), default=0),
+    )
+
+
+class _Canvas:
+    """The colors of the pixels of a G-buffer, which strips fill one after the other.
+
+    Attributes
+    ----------
+    look : Look
+        In pixels of the G-buffer.
+    degrees : list of int
+        Of the visible fields.
+    tone_rgb : (P, 3) or (P, 1) float32 ndarray
+    map_position : (P,) float32 ndarray or None
+        Where the numbers of pixels are in the color map, if they are drawn.
+    color : (P, 3) float32 ndarray
+        Linear, not premultiplied.
+    alpha : (P,) float32 ndarray
+    spread : (P, 1) float32 ndarray
+        The fourth channel of thresholds; 0 pixels without.
+    """
+
+    def __init__(
+        self,
+        gbuffer: GBuffer,
+        look: Look,
+        lights: Sequence[Light],
+        reference: ReferenceRender | None,
+        cache: Cache,
+        draws_thresholds: bool,
+    ) -> None:
+        count = len(gbuffer.pixel)
+        self._gbuffer = gbuffer
+        self.look, self.draws_thresholds = look, draws_thresholds
+        visible = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
+        self.degrees = sorted({gbuffer.instance_degrees[index] for index in visible})
+        self.tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
+        self.map_position = None
+        if colors_values(look) and not draws_thresholds:
+            self.map_position = map_positions(gbuffer, look)
+        self.color = np.zeros((count, 3), dtype=np.float32)
+        self.alpha = np.ones(count, dtype=np.float32)
+        self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
+
+    def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
+        """Return the picture of a strip, and that of the spread: the latter empty without thresholds."""
+        gbuffer = self._gbuffer
+        frame = gbuffer.camera.width, strip.drawn_rows, self.look.supersampling, gbuffer.coverage
+        rgba = _resolve_pixels(gbuffer.pixel, self.color, self.alpha, *frame)
+        if not self.draws_thresholds:
+            return rgba, rgba[:, :0]
+        return rgba, _resolve_pixels(gbuffer.pixel, self.spread, self.alpha, *frame)
+
+
+class _Layer(NamedTuple):
+    """What the strips of the fields of one degree share.
+
+    Attributes
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the G-buffer, for the symmetry of the field and the range of its magnitudes.
+    even_lines : EvenLines or None
+    tone : (P,) float32 ndarray or None
+        Of hatched looks.
+    paper_grain, outline, undirected
+        See `LineModulation`.
+    """
+
+    field: PixelField
+    look: Look
+    even_lines: EvenLines | None = None
+    tone: np.ndarray | None = None
+    paper_grain: np.ndarray | None = None
+    outline: np.ndarray | None = None
+    undirected: np.ndarray | None = None
+
+
+def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: Look) -> _Layer:
+    """Compute what the strips of the fields of one degree share."""
+    report(0.0, "finding directions")
+    field = stages.pixel_field(degree, pixel_look)
+    look = look_for_symmetry(pixel_look, field.symmetry)
+    even_lines = stages.even_lines(field, look) if has_even_lines(look) else None
+    if colors_magnitude(look):
+        look = with_magnitude_range(look, field)
+    if not is_hatched(look):
+        return _Layer(field, look, even_lines)
+    return _Layer(
+        field,
+        look,
+        even_lines,
+        _mean_tone(canvas.tone_rgb[field.gbuffer_index]),
+        _paper_grain(stages, field, look) if has_paper_grain(look) else None,
+        stages.outline(field, look) if has_outline(look) else None,
+        stages.undirected_texture(field, look),
+    )
+
+
+def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: Strip) -> DegreeLayer:
+    """Draw the fields of one degree in a strip, and return its images."""
+    field, look = layer.field, layer.look
+    rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
+    images, break_images = _line_images(stages, layer, strip)
+    modulation = None
+    if is_hatched(look):
+        modulation = _line_modulation(stages, layer, strip, break_images)
+    field = field.part(rows)
+    if canvas.map_position is not None:
+        field = replace(field, map_position=canvas.map_position[field.gbuffer_index])
     with progress(1.0):
-        spread_rgba = _resolve_pixels(gbuffer.pixel, spread, alpha, *frame)
-    return Picture(rgba, tuple(layers), spread_rgba[..., 0], color_range, None, line_count)
+        drawn = degree_layer(field, look, images)
+    for block in pixel_blocks(len(field.pixel)):
+        report(1.0, "drawing the ink")
+        part, part_images = field.part(block), images.part(block)
+        entries = part.gbuffer_index
+        if modulation is None:
+            canvas.color[entries] = colorize(part, part_images, drawn.tone[block], look)
+            canvas.color[entries] *= canvas.tone_rgb[entries]
+        elif canvas.draws_thresholds:
+            samples = canvas.look.supersampling
+            pixels = picture_thresholds(part, part_images, look, modulation.part(block), samples)
+            canvas.color[entries], canvas.spread[entries] = pixels[:, :3], pixels[:, 3:]
+        else:
+            canvas.color[entries], canvas.alpha[entries] = render_hatching(
+                part, part_images, look, layer.tone[rows][block], modulation.part(block)
+            )
+    return drawn
+
+
+def _line_images(
+    stages: ComposeStages, layer: _Layer, strip: Strip
+) -> tuple[LicImages, LicImages | None]:
+    """Return the images of the lines at the pixels of a strip, and those of their breaks if they have any."""
+    field, look = layer.field, layer.look
+    break_look = replace(look, length=break_steps(look))
+    if layer.even_lines is not None:
+        rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
+        images = even_line_images(layer.even_lines.part(rows))
+        return images, stages.lic(field, [break_look], strip)[0] if has_breaks(look) else None
+    looks = [look, break_look] if has_breaks(look) else [look]
+    images, *break_images = stages.lic(field, looks, strip)
+    return images, break_images[0] if break_images else None
 
 
 def compose_planar(
@@ -223,7 +304,7 @@ def compose_planar(
         noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
     look = look_for_symmetry(with_cycle_distance(replace(look, supersampling=1)), field.symmetry)
     images = lic(field, look, noise)
-    layer = compute_layer(field, look, images)
+    layer = degree_layer(field, look, images)
     color = colorize(field, layer.images, layer.tone, look)
     opaque = np.ones(len(field.pixel), dtype=np.float32)
     return Picture(
@@ -241,38 +322,24 @@ def _mean_tone(tone_rgb: np.ndarray) -> np.ndarray:
 
 
 def _line_modulation(
-    stages: ComposeStages,
-    field: PixelField,
-    look: Look,
-    tone: np.ndarray,
-    break_images: LicImages | None,
-    even_lines: EvenLines | None,
+    stages: ComposeStages, layer: _Layer, strip: Strip, break_images: LicImages | None
 ) -> LineModulation:
-    """Compute the parts of the `LineModulation` that a look uses, at the pixels that are drawn."""
-    undirected = stages.undirected_texture(field, look)
-    uses_streaks = even_lines is None or has_breaks(look) or has_paper_grain(look)
-    if uses_streaks or undirected is not None:
+    """Collect the parts of the `LineModulation` that a look uses, at the pixels of a strip."""
+    field, look = layer.field, layer.look
+    uses_streaks = layer.even_lines is None or has_breaks(look) or has_paper_grain(look)
+    if uses_streaks or layer.undirected is not None:
         look_streak_statistics(look)  # `line_coverage` finds them in their cache
-    paper_grain = line_tones = None
-    if has_paper_grain(look):
-        paper_grain = _paper_grain(stages, field, look)
-    if has_overshoot(look):
-        line_tones = _tone_along_lines(stages, field, look, tone)
-    outline = stages.outline(field, look) if has_outline(look) else None
-    drawn = stages.drawn(field)
-    return LineModulation(
-        break_images,
-        None if paper_grain is None else paper_grain[:, drawn],
-        line_tones,
-        None if outline is None else outline[drawn],
-        None if undirected is None else undirected[drawn],
-        even_lines,
+    rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
+    shared = LineModulation(
+        None, layer.paper_grain, None, layer.outline, layer.undirected, layer.even_lines
     )
+    line_tones = None
+    if has_overshoot(look):
+        line_tones = _tone_along_lines(field, look, layer.tone, strip)
+    return shared.part(rows)._replace(break_images=break_images, line_tones=line_tones)
 
 
-def _tone_along_lines(
-    stages: ComposeStages, field: PixelField, look: Look, tone: np.ndarray
-) -> np.ndarray:
+def _tone_along_lines(field: PixelField, look: Look, tone: np.ndarray, strip: Strip) -> np.ndarray:
     """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
     if isinstance(look, AntialiasedLook):
         look = look.without_antialiasing()
@@ -291,7 +358,7 @@ def _tone_along_lines(
     # or three channels.
     channels = np.ones((len(tone), 3), dtype=np.float32)
     channels[:, 0] = tone
-    images = stages.line_means(field, overshoot_look, channels)
+    (images,) = lic_lengths(field, [overshoot_look], channels, strip)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
     for block in pixel_blocks(means.shape[1]):
         report(1.0, "finding tones")
@@ -321,7 +388,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.nda
     return heights
 
 
-def compute_layer(field: PixelField, look: Look, images: LicImages) -> DegreeLayer:
+def degree_layer(field: PixelField, look: Look, images: LicImages) -> DegreeLayer:
     """Build the layer of one degree: its blend, with the contrast of one image times the gain."""
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     tone = np.empty_like(images.blend)

@@ -13,14 +13,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
 from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .band import BORDER_ROWS, Band, drawn_pixels
 from .contrast import normalize_variance
 from .covering import (
     ALL_NEIGHBORS,
@@ -34,11 +31,12 @@ from .covering import (
 from .filter_kernel import full_sample_count
 from .flow import blend_channels, streamline_reach
 from .image_noise import NOISE_MEAN
-from .lic_images import LicImages, compute_step_limits, lic_images
+from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow, is_hatched
 from .look_units import AntialiasedLook
 from .pixel_field import PixelField
 from .streamline_batch import StreamlineBatch
+from .strips import Strip, entries_of_rows, streamline_margin
 
 #: Label of most steps.
 STEP_LABEL = "tracing streamlines"
@@ -76,268 +74,85 @@ FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 
 #: deviation.
 CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
-#: Number of states in a strip of the picture, at least; larger pictures are divided. Bounds the
-#: memory.
-STRIP_STATES = 1 << 20
 
-#: Rows of a strip, at least, in margins of streamlines: the margins are no large part of the work.
-MIN_STRIP_MARGINS = 4
-
-#: Rows at the border of two strips in which their averages are blended, so that no seam is visible.
-OVERLAP_ROWS = 12
-
-
-def compute_fast_lic(
-    field: PixelField, look: Look, noise: np.ndarray, band: Band | None = None, name: str = ""
-) -> LicImages:
-    """Compute one LIC image for each of the M lines.
+def fast_lic(
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
+) -> list[LicImages]:
+    """Compute one LIC image for each of the M lines, for each of several lengths, with the same streamlines.
 
     Parameters
     ----------
     field : PixelField
-    look : Look
-        In pixels of the frame.
-    noise : (P, K) float32 ndarray
-    band : Band, optional
-        The rows of the images, if not all.
-    name : str
-        Of the images, in the exchange of the band.
-
-    Returns
-    -------
-    LicImages
-        At the `drawn_pixels` of the band.
-    """
-    (images,) = fast_lic_lengths(field, [look], noise, band, name)
-    return images
-
-
-def fast_lic_lengths(
-    field: PixelField,
-    looks: Sequence[Look],
-    noise: np.ndarray,
-    band: Band | None = None,
-    name: str = "",
-) -> list[LicImages]:
-    """Compute LIC images of several lengths, with the same streamlines.
-
-    Parameters
-    ----------
-    field, noise, band, name
-        As for `compute_fast_lic`.
     looks : sequence of Look
         In pixels of the frame. They differ in the `length` of streamlines. The first is the longest.
+    noise : (P, K) float32 ndarray
+    strip : Strip, optional
+        The rows of the images, if not all.
 
     Returns
     -------
     list of LicImages
-        Of each look.
+        Of each look, at the pixels in the `Strip.averaged_rows`.
     """
-    step_limits = []
-    for look in looks:
-        with progress(0.0):
-            step_limits.append(compute_step_limits(field, look))
-    drawn = drawn_pixels(band, field.pixel, field.width)
-    channels = 1 if has_flow(looks[0]) else noise.shape[1]
-    images = [_NewImages.empty(field, look, drawn, channels) for look in looks]
-    strips = _strips(field, looks[0], band)
-    # The first rows of the strip above, which are blended with the values of this one.
-    upper_head, upper_values = slice(0, 0), []
-    # From the top, because the band above needs the values of the uppermost strip.
-    for place, strip in enumerate(reversed(strips)):
-        start, stop = place / len(strips), (place + 1) / len(strips)
-        report(start, STEP_LABEL)
-        with progress(start, stop):
-            values = _strip_values(field, strip, looks, noise, step_limits)
-        if place:
-            row = field.pixel[upper_head] // np.int32(field.width) - np.int32(strip.stop_row)
-            _blend_rows(upper_values, _at(values, strip, upper_head), row)
-            with progress(stop):
-                _write(images, upper_head, upper_values)
-        elif strip.stop_row < field.height:
-            border = slice(strip.core.stop, drawn.stop)
-            with progress(stop):
-                _write(images, border, _at(values, strip, border))
-            for index, rows in enumerate(_at(values, strip, strip.tail)):
-                band.exchange.put((name, index, strip.stop_row), rows)
-        body = slice(strip.head.stop, strip.core.stop)
-        with progress(stop):
-            _write(images, body, _at(values, strip, body))
-        upper_head = strip.head
-        upper_values = [rows.copy() for rows in _at(values, strip, strip.head)]
-    if strips[0].start_row:
-        border = slice(drawn.start, strips[0].core.start)
-        below = []
-        for index, rows in enumerate(upper_values):
-            with progress(1.0):
-                lower = band.exchange.get((name, index, strips[0].start_row))
-            below.append(rows[:, :0] if lower is None else lower)
-        count = border.stop - border.start
-        row = field.pixel[upper_head] // np.int32(field.width) - np.int32(strips[0].start_row)
-        _blend_rows(upper_values, [part[:, count:] for part in below], row)
-        with progress(1):
-            _write(images, border, [part[:, :count] for part in below])
-    with progress(1.0):
-        _write(images, upper_head, upper_values)
-    blended = []
-    for out in images:
-        with progress(1.0):
-            blended.append(lic_images(out.members, out.effective_samples, out.slopes))
-    return blended
+    drawn = extent = slice(0, len(field.pixel))
+    if strip is not None:
+        start, stop = strip.averaged_rows
+        margin = streamline_margin(looks[0])
+        drawn = entries_of_rows(field.pixel, field.width, (start, stop))
+        rows = start - margin, min(stop + margin, strip.height)
+        extent = entries_of_rows(field.pixel, field.width, rows)
+    step_limits = [magnitude_step_limits(field, look) for look in looks]
+    values = _line_values(field, extent, drawn, looks, noise, step_limits)
+    images = []
+    for look, rows in zip(looks, values, strict=True):
+        channels = rows.shape[2] - 2 if has_slopes(look) else rows.shape[2] - 1
+        members = np.empty((*rows.shape[:2], channels), dtype=np.float32)
+        for line_values, member in zip(rows, members, strict=True):
+            report(0.9, STEP_LABEL)
+            _write_averages(line_values[:, : channels + 1], look, member)
+        effective_samples = rows[:, :, channels].mean(axis=0)
+        slopes = rows[:, :, -1].copy() if has_slopes(look) else None
+        with progress(0.95):
+            images.append(lic_images(members, effective_samples, slopes))
+    return images
 
 
-class _NewImages(NamedTuple):
-    """The parts of the `LicImages` of a look that are filled strip by strip.
-
-    They begin at the pixel `first` of the field.
-    """
-
-    look: Look
-    first: int
-    members: np.ndarray
-    effective_samples: np.ndarray
-    slopes: np.ndarray | None
-
-    @classmethod
-    def empty(cls, field: PixelField, look: Look, drawn: slice, channels: int) -> _NewImages:
-        """Return uninitialized images of a range of the pixels of a field."""
-        lines, count = field.line_count, drawn.stop - drawn.start
-        return cls(
-            look,
-            drawn.start,
-            np.empty((lines, count, channels), dtype=np.float32),
-            np.empty(count, dtype=np.float32),
-            np.empty((lines, count), dtype=np.float32) if has_slopes(look) else None,
-        )
-
-
-class _Strip(NamedTuple):
-    """A strip of rows of the picture. Slices are ranges of the pixels of the field.
-
-    Attributes
-    ----------
-    start_row, stop_row : int
-    extent : slice
-        The pixels that streamlines may pass.
-    core : slice
-        The pixels of the strip.
-    head : slice
-        Those of its pixels that are blended with the strip below.
-    tail : slice
-        The pixels that the strip above takes from this one: its last row, and those that are blended.
-    """
-
-    start_row: int
-    stop_row: int
-    extent: slice
-    core: slice
-    head: slice
-    tail: slice
-
-    @property
-    def averaged(self) -> slice:
-        """The pixels that get averages."""
-        return slice(self.core.start, self.tail.stop)
-
-
-def strip_count(width: int, height: int, lines: int, margin: int) -> int:
-    """Return into how many strips a picture is divided: a power of two.
-
-    Parameters
-    ----------
-    width, height : int
-        Of the picture, in pixels.
-    lines : int
-        Through each pixel.
-    margin : int
-        From `streamline_margin`.
-    """
-    rows = max(STRIP_STATES / (2 * lines * width), MIN_STRIP_MARGINS * margin, 2 * OVERLAP_ROWS)
-    return 1 << max(int(np.log2(height / rows)), 0)
-
-
-def streamline_margin(look: Look) -> int:
-    """Return how many rows streamlines may leave a strip."""
-    return int(streamline_reach(look) * look.step) + 2
-
-
-def _strips(field: PixelField, look: Look, band: Band | None) -> list[_Strip]:
-    """Divide a picture, or a band of it, into strips of rows, from the bottom.
-
-    Across seams, streamlines can reach all rows. The picture is then a single strip.
-    """
-    height, margin = field.height, streamline_margin(look)
-    count = 1
-    if field.seam_steps is None:
-        count = strip_count(field.width, height, field.line_count, margin)
-    borders = [height * number // count for number in range(count + 1)]
-    strips = []
-    for start, stop in pairwise(borders):
-        if band is not None and not band.start <= start < band.stop:
-            continue
-        below, above = OVERLAP_ROWS * (start > 0), OVERLAP_ROWS * (stop < height)
-        rows = [
-            start - margin,
-            start,
-            start + below,
-            stop - min(BORDER_ROWS, above),
-            stop,
-            stop + above,
-            stop + above + margin,
-        ]
-        first_pixels = np.clip(rows, 0, height) * field.width
-        pixels = np.searchsorted(field.pixel, first_pixels.astype(field.pixel.dtype))
-        first, core_start, head_stop, tail_start, core_stop, tail_stop, last = pixels.tolist()
-        strips.append(
-            _Strip(
-                start,
-                stop,
-                slice(first, last),
-                slice(core_start, core_stop),
-                slice(core_start, head_stop),
-                slice(tail_start, tail_stop),
-            )
-        )
-    return strips
-
-
-def _strip_values(
+def _line_values(
     field: PixelField,
-    strip: _Strip,
+    extent: slice,
+    drawn: slice,
     looks: Sequence[Look],
     noise: np.ndarray,
     step_limits: Sequence[np.ndarray | None],
 ) -> list[np.ndarray]:
-    """Compute the averages of the lines of a strip, for each look.
+    """Compute the averages of the lines at the pixels `drawn`, along streamlines in `extent`, for each look.
 
     Returns
     -------
     list of (M, n, K + 2) float32 ndarray
         The average of each noise channel times the effective samples, the effective samples, and the
-        slope (see `LicImages`) if it is needed. n is 0 for a strip without pixels.
+        slope (see `LicImages`) if it is needed.
     """
-    channels, extent, averaged = noise.shape[1], strip.extent, strip.averaged
     has_moving_kernel = has_flow(looks[0])
-    channels = 1 if has_moving_kernel else channels
-    is_empty = strip.core.start == strip.core.stop
-    shape = field.line_count, 0 if is_empty else averaged.stop - averaged.start
+    channels = 1 if has_moving_kernel else noise.shape[1]
+    shape = field.line_count, drawn.stop - drawn.start
     values = [
         np.empty((*shape, channels + 2 if has_slopes(look) else channels + 1), dtype=np.float32)
         for look in looks
     ]
-    if is_empty:
+    if drawn.start == drawn.stop:
         return values
-    strip_field = _crop_rows(field, extent)
-    strip_noise = noise[extent] - np.float32(NOISE_MEAN)
+    rows_field = _crop_rows(field, extent)
+    rows_noise = noise[extent] - np.float32(NOISE_MEAN)
     with progress(0.0, 0.1):
-        covering = build_covering(strip_field, looks[0], strip_noise)
-    cells = covering.cell_of_pixel[averaged.start - extent.start : averaged.stop - extent.start]
-    undefined = strip_field.representation == 0
+        covering = build_covering(rows_field, looks[0], rows_noise)
+    cells = covering.cell_of_pixel[drawn.start - extent.start : drawn.stop - extent.start]
+    undefined = rows_field.representation == 0
     tables = []
     for _ in looks:
         report(0.1, STEP_LABEL)
         tables.append(_LineAverages(covering, cells, channels))
-        own_noise = strip_noise[undefined]
+        own_noise = rows_noise[undefined]
         if has_moving_kernel:
             own_noise = blend_channels(own_noise, looks[0])
         tables[-1].init_undefined(covering.cell_of_pixel[undefined], own_noise)
@@ -355,47 +170,6 @@ def _strip_values(
         report(0.9, STEP_LABEL)
         table.gather(cells, line, rows[:, :, : channels + 1])
     return values
-
-
-def _at(values: Sequence[np.ndarray], strip: _Strip, pixels: slice) -> list[np.ndarray]:
-    """The values of a strip at a range of the pixels of the field."""
-    first = strip.averaged.start
-    return [rows[:, pixels.start - first : pixels.stop - first] for rows in values]
-
-
-def _blend_rows(upper: Sequence[np.ndarray], lower: Sequence[np.ndarray], row: np.ndarray) -> None:
-    """Blend the values of two strips at the first rows of the upper one, in place.
-
-    The first row is that of the lower strip. A lower strip without pixels has no values.
-
-    Parameters
-    ----------
-    upper, lower : sequence of (M, n, K) float32 ndarray
-    row : (n,) ndarray of int
-        Rows of the pixels, counted from the first one of the upper strip.
-    """
-    weight = (1 - row.astype(np.float32) / np.float32(OVERLAP_ROWS))[:, None]
-    for upper_values, lower_values in zip(upper, lower, strict=True):
-        if lower_values.shape[1]:
-            upper_values += weight * (lower_values - upper_values)
-
-
-def _write(images: Sequence[_NewImages], pixels: slice, values: Sequence[np.ndarray]) -> None:
-    """Write the values of strips at a range of the pixels of the field."""
-    for out, rows in zip(images, values, strict=True):
-        target = slice(pixels.start - out.first, pixels.stop - out.first)
-        channels = out.members.shape[2]
-        if not rows.shape[1]:
-            # A strip without pixels, whose neighbors are not drawn.
-            out.members[:, target], out.effective_samples[target] = NOISE_MEAN, 1
-            continue
-        for line_values, member in zip(rows, out.members, strict=True):
-            report(1.0, STEP_LABEL)
-            _write_averages(line_values[:, : channels + 1], out.look, member[target])
-        report(1.0, STEP_LABEL)
-        out.effective_samples[target] = rows[:, :, channels].mean(axis=0)
-        if out.slopes is not None:
-            out.slopes[:, target] = rows[:, :, channels + 1]
 
 
 def _pixels_to_cells(

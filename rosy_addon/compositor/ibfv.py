@@ -42,7 +42,7 @@ from .covering import SINK_CELL, Covering, build_covering, member_lines, unpack_
 from .filter_kernel import full_sample_count, kernel_of, kernel_weights
 from .flow import FLOW_CHANNELS, cycle_distance
 from .image_noise import NOISE_MEAN
-from .lic_images import LicImages, compute_step_limits, lic_images
+from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField
 
@@ -262,7 +262,7 @@ def sharpening_strength(decays: Sequence[float]) -> float:
 def _decay(field: PixelField, look: Look) -> np.ndarray:
     """(P,) or () float32 ratios q of the weights of successive steps."""
     two_sided = is_two_sided(field.symmetry, look)
-    limits = compute_step_limits(field, look)
+    limits = magnitude_step_limits(field, look)
     if limits is None:
         return full_decay(look, two_sided)
     length = np.arange(look.length + 1, dtype=np.float64)

@@ -100,22 +100,6 @@ def image_noise(
     density: float = 0.5,
     high_pass: float = 0.0,
 ) -> np.ndarray:
-    """Make noise that is anchored to the picture, without progress; see `compute_image_noise`."""
-    return compute_image_noise(
-        pixel, width, grain, seed, channels, density=density, high_pass=high_pass
-    )
-
-
-def compute_image_noise(
-    pixel: np.ndarray,
-    width: int,
-    grain: float,
-    seed: int,
-    channels: int,
-    *,
-    density: float = 0.5,
-    high_pass: float = 0.0,
-) -> np.ndarray:
     """Make noise that is anchored to the picture: random binary square cells, filtered to pixels.
 
     Parameters

@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..memory import raise_mmap_threshold
 from ..progress import progress
-from .band import Band
 from .brute_force import brute_force
-from .fast_lic import compute_fast_lic, fast_lic_lengths
+from .fast_lic import fast_lic
 from .flow import noise_channel_count
-from .ibfv import ibfv, ibfv_lengths
-from .image_noise import compute_image_noise
+from .ibfv import ibfv_lengths
+from .image_noise import image_noise
 from .lic_images import LicImages
 from .look import Look
 from .member_decomposition import member_decomposition
 from .pixel_field import PixelField
-
-#: LIC methods by the value of `Look.method`.
-METHODS: dict[str, Callable[[PixelField, Look, np.ndarray], LicImages]] = {
-    "members": member_decomposition,
-    "brute": brute_force,
-    "sheets": compute_fast_lic,
-    "ibfv": ibfv,
-}
+from .strips import Strip
 
 
 def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicImages:
@@ -44,39 +36,34 @@ def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicIm
     -------
     LicImages
     """
-    (images,) = lic_lengths(field, [look], noise)
+    (images,) = lic_lengths(field, [look], look_noise(field, look) if noise is None else noise)
     return images
 
 
 def lic_lengths(
-    field: PixelField,
-    looks: Sequence[Look],
-    noise: np.ndarray | None = None,
-    band: Band | None = None,
-    name: str = "",
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
 ) -> list[LicImages]:
     """Do the same as `lic` for looks that differ in the length of streamlines, longest first.
 
-    The images may be those of a band of the picture; see `compute_fast_lic`.
+    With a strip, the method "sheets" returns the images at its `averaged_rows`.
     """
     raise_mmap_threshold()
-    look = looks[0]
-    if noise is None:
-        with progress(0.0):
-            noise = look_noise(field, look)
-    if look.method == "sheets":
-        return fast_lic_lengths(field, looks, noise, band, name)
-    if look.method == "ibfv":
+    method = looks[0].method
+    if method == "sheets":
+        return fast_lic(field, looks, noise, strip)
+    if method == "ibfv":
         return ibfv_lengths(field, looks, noise)
+    convolve = member_decomposition if method == "members" else brute_force
     images = []
-    for each in looks:
-        images.append(METHODS[look.method](field, each, noise))
+    for number, look in enumerate(looks):
+        with progress(number / len(looks), (number + 1) / len(looks)):
+            images.append(convolve(field, look, noise))
     return images
 
 
 def look_noise(field: PixelField, look: Look) -> np.ndarray:
     """(P, K) float32 image-space noise of a look at the pixels of a field."""
-    return compute_image_noise(field.pixel, field.width, **noise_args(look))
+    return image_noise(field.pixel, field.width, **noise_args(look))
 
 
 def noise_args(look: Look) -> dict[str, Any]:

@@ -97,7 +97,7 @@ def convolve_members(
     """
     count, channels = noise.shape
     with progress(0.0):
-        step_limit = compute_step_limits(field, look)
+        step_limit = magnitude_step_limits(field, look)
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
@@ -131,7 +131,7 @@ def convolve_members(
         return lic_images(members, effective_samples)
 
 
-def compute_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
+def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
     """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
     if look.magnitude not in ("length", "both"):
         return None

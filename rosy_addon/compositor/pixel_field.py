@@ -226,13 +226,6 @@ def neighbor_table(field: PixelField) -> np.ndarray:
 def surface_pixel_field(
     gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
 ) -> PixelField:
-    """Return a pixel field, without progress reports; see `compute_surface_pixel_field`."""
-    return compute_surface_pixel_field(gbuffer, degree, crease_angle, cross_creases)
-
-
-def compute_surface_pixel_field(
-    gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
-) -> PixelField:
     """Extract the field of one degree from a G-buffer.
 
     Parameters

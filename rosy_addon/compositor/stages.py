@@ -13,18 +13,18 @@ from ..cache import Cache
 from ..progress import progress
 from ..projection.feature_curvatures import feature_curvatures
 from ..projection.gbuffer import GBuffer
-from .band import Band, drawn_pixels
 from .even_lines import EvenLines, even_lines
 from .flow import unconvolved_noise
-from .ibfv import StreakWaves, streak_waves, wave_images
+from .ibfv import streak_waves, wave_images
 from .lic import lic_lengths, look_noise, noise_args
 from .lic_images import LicImages
 from .look import Look, has_flow, lic_key
 from .look_units import cell_size_args
 from .outline import OUTLINE_SETTINGS, outline_coverage
 from .paper_grain import surface_paper_grain_args
-from .pixel_field import PixelField, compute_surface_pixel_field
-from .surface_noise import compute_surface_noise
+from .pixel_field import PixelField, surface_pixel_field
+from .strips import Strip
+from .surface_noise import surface_noise
 from .undirected import undirected_texture
 from .wobble import has_wobble, rotate_pixel_field, wobble_angle
 
@@ -45,86 +45,82 @@ class ComposeStages:
         May be shared with other G-buffers.
     mesh_cache : Cache
         Stores what does not depend on the camera.
-    band : Band, optional
-        The rows whose LIC images are computed, if not all.
     """
 
-    def __init__(
-        self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache, band: Band | None = None
-    ) -> None:
+    def __init__(self, gbuffer: GBuffer, cache: Cache, mesh_cache: Cache) -> None:
         self._gbuffer = gbuffer
         self._cache = cache
         self._mesh_cache = mesh_cache
-        self._band = band
-
-    def drawn(self, field: PixelField) -> slice:
-        """Return the range of the pixels of a field that its LIC images have."""
-        return drawn_pixels(self._band, field.pixel, field.width)
 
     def pixel_field(self, degree: int, look: Look) -> PixelField:
         """Pixel field of one degree, rotated by the wobble of the look."""
         settings = look.crease_angle, look.cross_creases
         field = self._cache.get_or_create(
             ("pixel field", self._gbuffer, degree, *settings),
-            partial(compute_surface_pixel_field, self._gbuffer, degree, *settings),
+            partial(surface_pixel_field, self._gbuffer, degree, *settings),
         )
         if not has_wobble(look):
             return field
         angle = self._wobble_angle(look)[field.gbuffer_index]
         return rotate_pixel_field(field, np.float32(look.wobble) * angle)
 
-    def lic(self, field: PixelField, looks: Sequence[Look]) -> list[LicImages]:
-        """Compute the LIC images of a field, or find them in the cache.
+    def noise(self, field: PixelField, look: Look) -> np.ndarray:
+        """(P, K) float32 noise of a look at the pixels of a field."""
+        if look.anchor == "surface":
+            args = noise_args(look) | cell_size_args(look)
+            if look.detail:
+                args["detail"] = look.detail
+            return self._surface_noise(field, args)
+        key = "picture noise", self._gbuffer, field.degree, *sorted(noise_args(look).items())
+        return self._cache.get_or_create(key, partial(look_noise, field, look))
 
-        The looks differ in the length of streamlines. The first is the longest.
+    def lic(
+        self, field: PixelField, looks: Sequence[Look], strip: Strip | None = None
+    ) -> list[LicImages]:
+        """Compute the LIC images of a field at the pixels of a strip, or find them in the cache.
+
+        The looks differ in the length of streamlines. The first is the longest. Methods other than "sheets"
+        have no strips.
         """
-
-        def compute_waves() -> list[StreakWaves]:
-            with progress(0.0, NOISE_SHARE):
-                noise = self._noise(field, looks[0])
-            if noise is None:
-                noise = look_noise(field, looks[0])
-            with progress(NOISE_SHARE, 1.0):
-                return streak_waves(field, looks, noise)
 
         def compute() -> list[LicImages]:
             if looks[0].method == "ibfv" and has_flow(looks[0]):
-                # They serve all frames.
-                still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
-                key = "streak waves", self._gbuffer, field.degree, *still
-                waves = self._cache.get_or_create(key, compute_waves)
-                return wave_images(waves, looks)
+                return wave_images(self._streak_waves(field, looks), looks)
             with progress(0.0, NOISE_SHARE):
-                noise = self._noise(field, looks[0])
+                noise = self.noise(field, looks[0])
             with progress(NOISE_SHARE, 1.0):
-                return lic_lengths(field, looks, noise, self._band, f"degree {field.degree}")
+                return lic_lengths(field, looks, noise, strip)
 
-        key = "LIC images", self._gbuffer, field.degree, *map(lic_key, looks)
+        key = "LIC images", self._gbuffer, field.degree, strip, *map(lic_key, looks)
         return self._cache.get_or_create(key, compute)
 
-    def line_means(self, field: PixelField, look: Look, values: np.ndarray) -> LicImages:
-        """Average (P, K) values along the lines of a field."""
-        (images,) = lic_lengths(field, [look], values, self._band, f"means, degree {field.degree}")
-        return images
+    def _streak_waves(self, field: PixelField, looks: Sequence[Look]) -> Any:
+        """The waves of the streaks of a flow, which serve all frames; see `ibfv`."""
+
+        def compute() -> Any:
+            with progress(0.0, NOISE_SHARE):
+                noise = self.noise(field, looks[0])
+            with progress(NOISE_SHARE, 1.0):
+                return streak_waves(field, looks, noise)
+
+        still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
+        return self._cache.get_or_create(
+            ("streak waves", self._gbuffer, field.degree, *still), compute
+        )
 
     def undirected_texture(self, field: PixelField, look: Look) -> np.ndarray | None:
         """Compute the texture where the field is undefined; see `undirected_texture`."""
         if field.representation.all():
             return None
-        noise = self._noise(field, look)
-        if noise is None:
-            noise = look_noise(field, look)
-        noise = unconvolved_noise(noise, look)
+        noise = unconvolved_noise(self.noise(field, look), look)
         return undirected_texture(field, noise, look.grain)
 
     def even_lines(self, field: PixelField, look: Look) -> EvenLines:
         """Compute the evenly spaced lines of a field, or find them in the cache."""
 
         def compute() -> EvenLines:
-            wobble_angle = None
-            if has_wobble(look):
-                wobble_angle = self._wobble_angle(look)[field.gbuffer_index]
-            return even_lines(self._gbuffer, field, look, wobble_angle, self._mesh_cache)
+            angle = self._wobble_angle(look)[field.gbuffer_index] if has_wobble(look) else None
+            return even_lines(self._gbuffer, field, look, angle, self._mesh_cache)
 
         key = "even lines", self._gbuffer, field.degree, lic_key(look)
         return self._cache.get_or_create(key, compute)
@@ -145,26 +141,17 @@ class ComposeStages:
         args = surface_paper_grain_args(look) | cell_size_args(look)
         return self._surface_noise(field, args)
 
-    def _noise(self, field: PixelField, look: Look) -> np.ndarray | None:
-        """(P, K) float32 noise anchored to the surface. None if the look uses image-space noise."""
-        if look.anchor == "picture":
-            return None
-        args = noise_args(look) | cell_size_args(look)
-        if look.detail:
-            args["detail"] = look.detail
-        return self._surface_noise(field, args)
-
     def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
-        """(P, K) float32 noise at the pixels of a field; see `compute_surface_noise`."""
+        """(P, K) float32 noise at the pixels of a field; see `surface_noise`."""
 
-        def compute_noise() -> np.ndarray:
+        def compute() -> np.ndarray:
             curvature = None
             if "detail" in args:
                 curvature = feature_curvatures(self._gbuffer, self._mesh_cache)
-            return compute_surface_noise(self._gbuffer, **args, curvature=curvature)
+            return surface_noise(self._gbuffer, **args, curvature=curvature)
 
         key = "surface noise", self._gbuffer, *sorted(args.items())
-        noise = self._cache.get_or_create(key, compute_noise)
+        noise = self._cache.get_or_create(key, compute)
         return noise[field.gbuffer_index]
 
     def _wobble_angle(self, look: Look) -> np.ndarray:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import zlib
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -60,12 +59,7 @@ MAX_CELL_BITS = 28
 OCTAVE_OFFSET = 64
 
 
-def surface_noise(gbuffer: GBuffer, *args: Any, **settings: Any) -> np.ndarray:
-    """Make noise, without progress reports; see `compute_surface_noise`."""
-    return compute_surface_noise(gbuffer, *args, **settings)
-
-
-def compute_surface_noise(
+def surface_noise(
     gbuffer: GBuffer,
     grain: float,
     seed: int,
@@ -335,7 +329,7 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
         row = gbuffer.pixel[block] // width - np.int32(bottom)
         index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
 
-    def compute_blurred(values: np.ndarray | None, part: int) -> np.ndarray:
+    def blurred_image(values: np.ndarray | None, part: int) -> np.ndarray:
         """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
         image = np.zeros((height, image_width), dtype=np.float32)
         for block in pixel_blocks(count):
@@ -346,10 +340,10 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
             image = gaussian_blur(image, sigma)
         return image.reshape(-1)
 
-    weight = compute_blurred(None, 0)
+    weight = blurred_image(None, 0)
     weight = np.maximum(weight.take(index), 1e-3)
     for part, channel in enumerate(channels, start=1):
-        blurred = compute_blurred(channel, part)
+        blurred = blurred_image(channel, part)
         for block in pixel_blocks(count):
             report((part + 1) / (len(channels) + 1), STEP_LABEL)
             channel[block] -= blurred.take(index[block]) / weight[block]

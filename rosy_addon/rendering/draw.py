@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from ..cache import BAKE_CACHE, Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.compose import compose
 from ..compositor.picture import Picture
+from ..compositor.picture_key import fixed_color_range
+from ..compositor.strip_division import context_rows, divide_into_strips, group_strips
+from ..compositor.strips import Strip, join_strips
 from ..compositor.target_tone import check_tone
-from ..errors import RosyError
+from ..errors import NothingInViewError, RosyError
 from ..progress import progress
-from ..projection.gbuffer import GBuffer
-from ..projection.project import cached_project, check_instances, project
+from ..projection.project import cached_project, check_instances, project, raise_nothing_in_view
+from ..worker.pool import POOL, core_count
 from .arrowheads import with_arrowheads
 from .picture_memory import check_picture_memory
 from .singularities import with_singularities
@@ -53,7 +59,7 @@ def draw_picture(
         If no mesh with a field is visible.
     """
     with progress(0.0, 0.97):
-        picture = _draw_fields(view, cache, cache if keep_gbuffers else None)
+        picture = _draw_fields(view, cache, cache if keep_gbuffers else None, workers)
     with progress(0.97, 0.99):
         picture = with_arrowheads(picture, view, cache)
     with progress(0.99, 1.0):
@@ -70,12 +76,20 @@ def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) 
     return replace(picture, layers=())
 
 
-def _draw_fields(view: ViewInput, cache: Cache | None, gbuffer_cache: Cache | None) -> Picture:
+def _draw_fields(
+    view: ViewInput, cache: Cache | None, gbuffer_cache: Cache | None, workers: int
+) -> Picture:
     """Draw the picture without arrowheads and singularities."""
     check_tone(view.look, [instance.tone for instance in view.instances], view.reference)
     if not view.draws_thresholds:
         check_color_values(view.look, view.instances)
     check_instances(view.instances, view.sample_camera, view.look.display)
+    look, camera, instances = view.look, view.shaded_camera, view.instances
+    workers = workers or core_count()
+    strips = divide_into_strips(look, camera, instances)
+    groups = [strips]
+    if not view.draws_thresholds:
+        groups = group_strips(strips, look, camera, instances, workers)
     try:
         check_picture_memory(view)
     except RosyError:
@@ -83,24 +97,67 @@ def _draw_fields(view: ViewInput, cache: Cache | None, gbuffer_cache: Cache | No
             raise
         cache.clear()
         check_picture_memory(view)
+    if len(groups) == 1:
+        return _draw_strips(view, strips, cache, gbuffer_cache)
+    pictures = POOL.map(draw_rows, [(view, group) for group in groups], workers)
+    if not any(picture.size for picture in pictures):
+        raise_nothing_in_view(instances, camera)
+    rgba = join_strips(pictures, [_whole(group) for group in groups])
+    return Picture(rgba, (), color_range=fixed_color_range(look, instances))
+
+
+def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray:
+    """Draw some neighboring strips of a picture.
+
+    Parameters
+    ----------
+    view : ViewInput
+    strips : sequence of Strip
+        A group of `group_strips`.
+
+    Returns
+    -------
+    (h, W, 4) float32 ndarray
+        The `drawn_rows` of the strips together. Linear RGBA, not premultiplied.
+    """
+    try:
+        picture = _draw_strips(view, strips, BAKE_CACHE, None)
+    except NothingInViewError:
+        start, stop = _whole(strips).drawn_rows
+        return np.zeros((stop - start, view.camera.width, 4), dtype=np.float32)
+    BAKE_CACHE.evict_over_limit()
+    return picture.rgba
+
+
+def _draw_strips(
+    view: ViewInput, strips: Sequence[Strip], cache: Cache | None, gbuffer_cache: Cache | None
+) -> Picture:
+    """Draw neighboring strips of a picture."""
+    camera, look = view.shaded_camera, view.look
+    arguments = view.instances, camera, look.display
+    whole = _whole(strips)
     with progress(0.0, PROJECTION_SHARE):
-        gbuffer = _gbuffer(view, cache, gbuffer_cache)
+        if (whole.start, whole.stop) != (0, camera.height):
+            context = context_rows(look, camera, view.instances)
+            rows = max(whole.start - context, 0), min(whole.stop + context, camera.height)
+            gbuffer = project(*arguments, cache, view.samples_per_side, rows)
+        elif gbuffer_cache is None:
+            gbuffer = project(*arguments, cache, view.samples_per_side)
+        else:
+            gbuffer = cached_project(*arguments, gbuffer_cache, view.samples_per_side)
     with progress(PROJECTION_SHARE, 1.0):
         return compose(
             gbuffer,
-            view.look,
+            look,
             view.lights,
             view.reference,
             gbuffer_cache,
             cache,
+            strips,
             draws_thresholds=view.draws_thresholds,
         )
 
 
-def _gbuffer(view: ViewInput, cache: Cache | None, gbuffer_cache: Cache | None) -> GBuffer:
-    """Return the G-buffer from the cache, or project the meshes."""
-    instances, camera, display = view.instances, view.shaded_camera, view.look.display
-    samples = view.samples_per_side
-    if gbuffer_cache is None:
-        return project(instances, camera, display, cache, samples)
-    return cached_project(instances, camera, display, gbuffer_cache, samples)
+def _whole(strips: Sequence[Strip]) -> Strip:
+    """Return neighboring strips as one."""
+    return Strip(strips[0].start, strips[-1].stop, strips[0].height)

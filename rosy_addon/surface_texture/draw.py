@@ -11,11 +11,11 @@ import numpy as np
 from ..cache import Cache
 from ..compositor.color_values import (
     check_color_values,
-    map_positions,
+    scaled_positions,
     value_range,
     value_scale,
 )
-from ..compositor.compose import colorize, compute_layer
+from ..compositor.compose import colorize, degree_layer
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import noise_channel_count, with_cycle_distance
 from ..compositor.lic import lic_lengths
@@ -298,14 +298,14 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
     with progress(0.95):
-        layer = compute_layer(field, look, images)
+        layer = degree_layer(field, look, images)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if colors_values(look):
         texels = on.texels
         values = values_in_triangles(on.instance, texels.triangle, texels.barycentric)
         low, scale = value_scale(look, [value_range(on.instance.color_values)])
-        field = replace(field, map_position=map_positions(values, low, scale))
+        field = replace(field, map_position=scaled_positions(values, low, scale))
     color = np.empty((len(field.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(color)):
         report(0.95 + 0.05 * block.start / len(color), "drawing the colors")

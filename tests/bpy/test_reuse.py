@@ -35,7 +35,7 @@ def run_stages(monkeypatch):
         monkeypatch.setattr(module, name, watched)
 
     watch(projection, "project")
-    watch(stages, "compute_surface_pixel_field")
+    watch(stages, "surface_pixel_field")
     watch(stages, "lic_lengths")
     return names
 
@@ -106,7 +106,7 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
     change(scene, monkey)
     run_stages.clear()
     after = draw(scene)
-    assert run_stages == ["project", "compute_surface_pixel_field", "lic_lengths"]
+    assert run_stages == ["project", "surface_pixel_field", "lic_lengths"]
     assert not np.array_equal(before, after)
     np.testing.assert_array_equal(after, draw_uncached(scene))
 
@@ -123,8 +123,8 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
         ("noise", "colour", ["lic_lengths"]),
         ("magnitude", "both", ["lic_lengths"]),
         ("method", "members", ["lic_lengths"]),
-        ("crease_angle", 0.05, ["compute_surface_pixel_field", "lic_lengths"]),
-        ("supersampling", 2, ["project", "compute_surface_pixel_field", "lic_lengths"]),
+        ("crease_angle", 0.05, ["surface_pixel_field", "lic_lengths"]),
+        ("supersampling", 2, ["project", "surface_pixel_field", "lic_lengths"]),
     ],
 )
 def test_a_setting_runs_the_stages_that_depend_on_it(

@@ -1,0 +1,139 @@
+"""Dividing a picture into strips, and the strips among processes; see `strips`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..field.symmetry import FieldSymmetry
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from .even_lines import has_even_lines
+from .hatching import (
+    has_breaks,
+    has_outline,
+    has_overshoot,
+    has_paper_grain,
+    overshoot_steps,
+)
+from .image_noise import MAX_MARGIN, high_pass_margin
+from .look import Look, colors_magnitude
+from .look_units import look_in_pixels
+from .outline import FULL_MARK_LENGTH
+from .paper_grain import surface_paper_grain_args
+from .streak_statistics import break_steps
+from .strips import OVERLAP_ROWS, Strip, streamline_margin
+from .undirected import disc_offsets
+
+#: Number of states of the covering in a strip, at least. Bounds the memory.
+STRIP_STATES = 1 << 20
+
+#: Rows of a strip, at least, in margins of streamlines: the margins are no large part of the work.
+MIN_STRIP_MARGINS = 4
+
+#: Rows by which the neighbors of a pixel, and theirs, can be away.
+NEIGHBOR_ROWS = 4
+
+#: Pixels of the strips that one process draws together, at most, if a picture can be divided so far. Bounds
+#: the memory.
+MAX_GROUP_PIXELS = 1 << 21
+
+
+def divide_into_strips(
+    look: Look, camera: Camera, instances: Sequence[MeshInstance]
+) -> list[Strip]:
+    """Divide the rows of a picture into strips, from the bottom.
+
+    Parameters
+    ----------
+    look : Look
+        Its lengths are in pixels of the picture or in Blender units.
+    camera : Camera
+        Of the picture.
+    instances : sequence of MeshInstance
+        Of the picture.
+
+    Returns
+    -------
+    list of Strip
+        A power of two. A single one if streamlines are traced by another method than "sheets".
+    """
+    height, count = camera.height, 1
+    if look.method == "sheets":
+        degrees = {field.degree for instance in instances if (field := instance.field) is not None}
+        lines = max((FieldSymmetry(degree, ()).line_count for degree in degrees), default=1)
+        margin = _longest_margin(look_in_pixels(replace(look, supersampling=1), camera, instances))
+        rows = max(
+            STRIP_STATES / (2 * lines * camera.width), MIN_STRIP_MARGINS * margin, 2 * OVERLAP_ROWS
+        )
+        count = 1 << max(int(np.log2(height / rows)), 0)
+    borders = [height * number // count for number in range(count + 1)]
+    return [Strip(start, stop, height) for start, stop in pairwise(borders)]
+
+
+def group_strips(
+    strips: Sequence[Strip],
+    look: Look,
+    camera: Camera,
+    instances: Sequence[MeshInstance],
+    workers: int,
+) -> list[Sequence[Strip]]:
+    """Group the strips of a picture, so that each group can be drawn by a process of its own.
+
+    Parameters
+    ----------
+    strips : sequence of Strip
+        From `divide_into_strips`, for these arguments.
+    look, camera, instances
+        Of the picture.
+    workers : int
+        Number of processes. The groups have at most `MAX_GROUP_PIXELS` pixels, if strips are not larger.
+
+    Returns
+    -------
+    list of sequence of Strip
+        From the bottom. A single group if something depends on all visible pixels, or takes a preparation
+        that only one process should make.
+    """
+    fields = [instance.field for instance in instances if instance.field is not None]
+    depends_on_all = colors_magnitude(look) or look.magnitude in ("length", "both")
+    if (
+        has_even_lines(look)
+        or (depends_on_all and not look.magnitude_range)
+        or high_pass_margin(look.high_pass) > MAX_MARGIN
+        or any(field.direction_ratios is not None or field.family_count > 1 for field in fields)
+    ):
+        return [strips]
+    per_worker = -(-camera.width * camera.height // (MAX_GROUP_PIXELS * workers))
+    count = min(workers * per_worker, len(strips))
+    borders = [len(strips) * group // count for group in range(count + 1)]
+    return [strips[start:stop] for start, stop in pairwise(borders)]
+
+
+def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> int:
+    """Return how many rows around a strip its pixels may depend on."""
+    look = look_in_pixels(replace(look, supersampling=1), camera, instances)
+    noise = 0
+    if look.anchor == "surface":
+        # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
+        noise = high_pass_margin(look.high_pass) + int(np.ceil(look.grain))
+    disc = int(np.abs(disc_offsets(look.grain)).max())
+    rows = max(_longest_margin(look) + OVERLAP_ROWS, disc) + noise
+    if has_paper_grain(look) and look.anchor == "surface":
+        rows = max(rows, high_pass_margin(surface_paper_grain_args(look)["high_pass"]))
+    if has_outline(look):
+        rows = max(rows, int(np.ceil(look.outline)) + 1 + FULL_MARK_LENGTH)
+    return rows + NEIGHBOR_ROWS
+
+
+def _longest_margin(look: Look) -> int:
+    """Return the largest `streamline_margin` of all images that a look takes."""
+    lengths = [look.length]
+    if has_breaks(look):
+        lengths.append(break_steps(look))
+    if has_overshoot(look):
+        lengths.append(overshoot_steps(look))
+    return streamline_margin(replace(look, length=max(lengths)))

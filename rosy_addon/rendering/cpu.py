@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 
 from ..cache import Cache
+from ..compositor.band_division import context_rows
 from ..compositor.color_values import check_color_values
 from ..compositor.compose import compose_task
+from ..compositor.flow import noise_channel_count
+from ..compositor.look import is_hatched
 from ..compositor.picture import Picture
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
 from ..errors import RosyError
+from ..field.symmetry import FieldSymmetry
+from ..memory import (
+    PIXEL_BYTES,
+    PROCESS_BYTES,
+    TRIANGLE_BYTES,
+    check_memory,
+    samples_memory,
+)
 from ..progress import Task, subtask
 from ..projection.gbuffer import GBuffer
 from ..projection.project import cached_project_task, check_instances, project_task
 from .arrowheads import with_arrowheads_task
 from .band_workers import BandWorkers
-from .picture_memory import check_picture_memory
 from .singularities import with_singularities_task
 from .view_input import ViewInput
 
@@ -108,3 +119,58 @@ class CpuRenderer:
         if self._gbuffer_cache is None:
             return project_task(instances, camera, display, self._cache, samples)
         return cached_project_task(instances, camera, display, self._gbuffer_cache, samples)
+
+
+def check_picture_memory(
+    view: ViewInput, rows: Sequence[tuple[int, int]] = (), together: int = 1
+) -> None:
+    """Check that a picture can take the memory that it needs; see `picture_memory`.
+
+    Raises
+    ------
+    RosyError
+        If it needs more than `memory.available_memory`.
+    """
+    camera, samples = view.camera, view.look.supersampling
+    each = f" with {samples} x {samples} samples each" if samples > 1 else ""
+    check_memory(
+        picture_memory(view, rows, together),
+        f"a picture of {camera.width} x {camera.height} pixels{each}",
+        "choose a smaller size" + (", or less supersampling" if samples > 1 else ""),
+    )
+
+
+def picture_memory(
+    view: ViewInput, rows: Sequence[tuple[int, int]] = (), together: int = 1
+) -> float:
+    """Return the bytes that a picture may take at its peak, beyond those that are taken before.
+
+    It is the finished picture, and in each process the samples of its piece and all triangles. The
+    surfaces are assumed to fill the picture.
+
+    Parameters
+    ----------
+    view : ViewInput
+    rows : sequence of (int, int)
+        Of the bands in which it is drawn, if there are several.
+    together : int
+        Bands that are drawn at a time, each in a process.
+    """
+    look, camera = view.look, view.shaded_camera
+    fields = [instance.field for instance in view.instances if instance.field is not None]
+    lines = [
+        FieldSymmetry(field.degree, ()).line_count
+        if field.direction_ratios is None
+        else field.degree
+        for field in fields
+    ]
+    many_images = is_hatched(look) or noise_channel_count(look) > 1 or look.method != "sheets"
+    height = camera.height
+    if len(rows) > 1:
+        context = context_rows(look, camera, view.instances)
+        height = min(max(stop - start for start, stop in rows) + 2 * context, height)
+    process = PROCESS_BYTES
+    process += samples_memory(camera.width * height, max(lines, default=1), many_images)
+    process += TRIANGLE_BYTES * sum(len(instance.surface.triangles) for instance in view.instances)
+    picture = PIXEL_BYTES * view.camera.width * view.camera.height
+    return picture + process * min(together, max(len(rows), 1))

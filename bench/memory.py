@@ -1,6 +1,6 @@
-"""Peak memory of pictures and meshes, each in its own process: relative to a limit, and estimated.
+"""Peak memory of pictures and meshes, each in its own process: relative to a limit, and to the bound.
 
-Estimates are compared with the resident memory that a picture takes beyond what the process holds
+The bound is compared with the resident memory that a picture takes beyond what the process holds
 when the drawing begins, up to the writing of the file.
 """
 
@@ -16,10 +16,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rosy_addon.image_io.png import write_png
-from rosy_addon.progress import run_to_completion
-from rosy_addon.rendering.draw import draw_picture
-from rosy_addon.rendering.picture_memory import picture_memory, view_coverage
+from rosy_addon.presets.store import load_preset
+from rosy_addon.rendering.draw import draw_picture, picture_groups
+from rosy_addon.rendering.picture_memory import picture_memory
 from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.worker.pool import POOL
 
 from . import cases
 from .timing import Case, main
@@ -40,56 +41,40 @@ CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),
 }
 
-#: Settings of lines on the surface.
-HATCHED = {"ink": "hatch", "supersampling": 2, "anchor": "surface", "detail": 0.5}
+#: Presets, each of which is drawn with 1920 x 1080 pixels, and with 512 x 512.
+PRESETS = (
+    *("default", "plaid", "magnitude-map", "paper", "charcoal", "pencil", "pen-and-ink"),
+    *("cross-hatch", "white-on-black", "woodcut", "print-300-dpi", "engraving"),
+)
 
-#: Triangles, N, size, enlargement of the ball in the frame, and settings of the look, of the
-#: pictures whose estimates are compared with what they take.
-ESTIMATED: dict[str, tuple[int, int, tuple[int, int], float, dict[str, object]]] = {
-    "256 x 256": (12_000, 4, (256, 256), 1, {}),
-    "512 x 512, 500 triangles": (500, 4, (512, 512), 1, {}),
-    "1024 x 1024, 300K triangles": (300_000, 4, (1024, 1024), 1, {}),
-    "512 x 512, 3M triangles": (3_000_000, 4, (512, 512), 1, {}),
-    "1024 x 1024, 2 x 2 samples a pixel": (12_000, 4, (1024, 1024), 1, {"supersampling": 2}),
-    "1024 x 1024, 300K triangles, 3 x 3 samples a pixel": (
-        300_000, 4, (1024, 1024), 1, {"supersampling": 3},
+#: Preset, triangles, N, size, other settings of the look and number of processes, of the pictures whose
+#: bound is compared with what they take.
+ESTIMATED: dict[str, tuple[str, int, int, tuple[int, int], dict[str, object], int]] = {
+    **{
+        f"{width} x {height}, {preset}": (preset, 12_000, 4, (width, height), {}, 1)
+        for preset in PRESETS
+        for width, height in ((512, 512), (1920, 1080))
+    },
+    "512 x 512, 300K triangles": ("default", 300_000, 4, (512, 512), {}, 1),
+    "1024 x 1024, 1K triangles": ("default", 1000, 4, (1024, 1024), {}, 1),
+    "1024 x 1024, 300K triangles": ("default", 300_000, 4, (1024, 1024), {}, 1),
+    "512 x 512, 3M triangles": ("default", 3_000_000, 4, (512, 512), {}, 1),
+    "1024 x 1024, N = 1": ("default", 12_000, 1, (1024, 1024), {}, 1),
+    "1024 x 1024, N = 2": ("default", 12_000, 2, (1024, 1024), {}, 1),
+    "1024 x 1024, N = 6": ("default", 12_000, 6, (1024, 1024), {}, 1),
+    "1024 x 1024, N = 7": ("default", 12_000, 7, (1024, 1024), {}, 1),
+    "1024 x 1024, brute": ("default", 12_000, 4, (1024, 1024), {"method": "brute", "length": 2}, 1),
+    "1024 x 1024, ibfv": ("default", 12_000, 4, (1024, 1024), {"method": "ibfv", "length": 4}, 1),
+    "1024 x 1024, drifting streaks": ("default", 12_000, 4, (1024, 1024), {"flow": 1.0}, 1),
+    "1024 x 1024, 2 x 2 samples": ("default", 12_000, 4, (1024, 1024), {"supersampling": 2}, 1),
+    "1024 x 1024, hatching of other streaks, 2 x 2 samples": (
+        "pen-and-ink", 12_000, 4, (1024, 1024), {"method": "members", "length": 2}, 1,
     ),
-    "2048 x 2048, 3M triangles, 2 x 2 samples a pixel": (
-        3_000_000, 4, (2048, 2048), 1, {"supersampling": 2},
-    ),
-    "1024 x 1024, hatching, 2 x 2 samples a pixel": (
-        12_000, 4, (1024, 1024), 1, {"ink": "hatch", "supersampling": 2},
-    ),
-    "2048 x 2048, pen and ink, 2 x 2 samples a pixel": (
-        12_000, 4, (2048, 2048), 1, {**HATCHED, "outline": 1.3, "breaks": 0.7, "overshoot": 8.0},
-    ),
-    "1400 x 1400, pencil, 2 x 2 samples a pixel": (
-        12_000, 4, (1400, 1400), 1, {**HATCHED, "breaks": 0.4, "wobble": 0.5, "paper_grain": 0.4},
-    ),
-    "2048 x 2048": (12_000, 4, (2048, 2048), 1, {}),
-    "2048 x 2048, the picture is filled": (12_000, 4, (2048, 2048), 4, {}),
-    "2048 x 2048, 2 x 2 samples a pixel": (12_000, 4, (2048, 2048), 1, {"supersampling": 2}),
-    "4096 x 4096": (12_000, 4, (4096, 4096), 1, {}),
-    "4096 x 4096, a small ball": (12_000, 4, (4096, 4096), 0.3, {}),
-    "6000 x 6000": (12_000, 4, (6000, 6000), 1, {}),
-    "6000 x 6000, a small ball": (12_000, 4, (6000, 6000), 0.2, {}),
-    "1400 x 1400, N = 2": (12_000, 2, (1400, 1400), 1, {}),
-    "2800 x 2800, N = 7": (12_000, 7, (2800, 2800), 1, {}),
-    "1400 x 1400, color noise": (12_000, 4, (1400, 1400), 1, {"noise": "colour"}),
-    "1400 x 1400, members, N = 7": (12_000, 7, (1400, 1400), 1, {"method": "members"}),
-    "2800 x 2800, members": (12_000, 4, (2800, 2800), 1, {"method": "members"}),
-    "1400 x 1400, brute, N = 2": (12_000, 2, (1400, 1400), 1, {"method": "brute"}),
-    "2800 x 2800, brute": (12_000, 4, (2800, 2800), 1, {"method": "brute"}),
-    "2800 x 2800, hatching": (12_000, 4, (2800, 2800), 1, {"ink": "hatch"}),
-    "1400 x 1400, hatching with overshoot": (
-        12_000, 4, (1400, 1400), 1, {"ink": "hatch", "overshoot": 5.0},
-    ),
-    "2800 x 2800, noise on the surface": (12_000, 4, (2800, 2800), 1, {"anchor": "surface"}),
-    "1400 x 1400, noise on the surface, Blender units": (
-        12_000, 4, (1400, 1400), 1, {"anchor": "surface", "unit": "world"},
-    ),
-    "1400 x 1400, shadows": (12_000, 4, (1400, 1400), 1, {"light": "lamp", "shadows": True}),
-    "1400 x 1400, magnitude": (12_000, 4, (1400, 1400), 1, {"magnitude": "both"}),
+    "3840 x 2160": ("default", 12_000, 4, WIDE, {}, 1),
+    "3840 x 2160, two processes": ("default", 12_000, 4, WIDE, {}, 2),
+    "3840 x 2160, pen-and-ink": ("pen-and-ink", 12_000, 4, WIDE, {}, 1),
+    "3840 x 2160, plaid": ("plaid", 12_000, 4, WIDE, {}, 1),
+    "3840 x 2160, paper": ("paper", 12_000, 4, WIDE, {}, 1),
 }  # fmt: skip
 
 
@@ -100,7 +85,7 @@ def measure(runs: int) -> Iterator[Case]:
         yield _case(f"peak memory / {ALLOWED:g} GB, {name}", (peak, ALLOWED), "GB", 1.0)
     for name in ESTIMATED if Path("/proc/self/clear_refs").exists() else ():
         estimate, peak = _run("--estimate", name)
-        yield _case(f"estimated / taken memory, {name}", (1000 * estimate, 1000 * peak), "MB", None)
+        yield _case(f"bound / taken memory, {name}", (1000 * estimate, 1000 * peak), "MB", None)
 
 
 def _case(name: str, amounts: tuple[float, float], unit: str, target: float | None) -> Case:
@@ -128,28 +113,23 @@ def _run(*options: str) -> list[float]:
 
 
 def estimate_and_draw(name: str) -> tuple[float, float]:
-    """Return the memory that a case takes, in gigabytes: estimated, and as measured on Linux."""
-    triangles, degree, size, zoom, settings = ESTIMATED[name]
-    camera = cases.camera(*size)
-    projection = camera.projection.copy()
-    projection[:2] *= zoom
-    # Short streamlines take as much memory as long ones with the slow methods.
-    look = replace(cases.LOOK, length=2 if settings.get("method") else 40, **settings)
-    view = ViewInput(
-        (cases.instance(triangles, degree),), replace(camera, projection=projection), look
-    )
-    estimate = picture_memory(view, view_coverage(view))
+    """Return the memory of a case on Linux, in gigabytes: the bound, and what all processes take."""
+    preset, triangles, degree, size, settings, processes = ESTIMATED[name]
+    look = replace(load_preset(preset).look, **settings)
+    view = ViewInput((cases.instance(triangles, degree),), cases.camera(*size), look)
     Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     held = _resident_bytes("VmRSS")
-    rgba = (draw_picture(view)).rgba
+    bound = picture_memory(view, picture_groups(view, processes), processes)
+    rgba = draw_picture(view, workers=processes).rgba
+    others = sum(_resident_bytes("VmHWM", helper.pid) for helper in POOL.helpers)
     with TemporaryDirectory() as folder:
         write_png(Path(folder) / "picture.png", rgba)
-    return estimate / 1e9, (_resident_bytes("VmHWM") - held) / 1e9
+    return bound / 1e9, (_resident_bytes("VmHWM") - held + others) / 1e9
 
 
-def _resident_bytes(kind: str) -> int:
-    """Return the resident memory of this process on Linux: now ("VmRSS") or its peak ("VmHWM")."""
-    lines = Path("/proc/self/status").read_text().splitlines()
+def _resident_bytes(kind: str, process: int | str = "self") -> int:
+    """Return the resident memory of a process on Linux: now ("VmRSS") or its peak ("VmHWM")."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(kind))
 
 

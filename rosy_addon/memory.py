@@ -1,4 +1,4 @@
-"""Memory: how much this process can still take, refusal of what needs more, and reuse of it."""
+"""Memory: a bound for pictures, what this process can still take, and refusal of what needs more."""
 
 from __future__ import annotations
 
@@ -12,6 +12,29 @@ from pathlib import Path
 import numpy as np
 
 from .errors import RosyError
+
+#: Bytes of a process that draws, without any sample: Python with numpy in other processes, the batch of
+#: streamlines of `compositor.fast_lic` (2 Mi steps of 24 bytes), and the noise from which
+#: `compositor.streak_statistics` takes its distributions.
+PROCESS_BYTES = 120_000_000
+
+#: Bytes of a pixel of the finished picture: four float32 numbers.
+PIXEL_BYTES = 16
+
+#: Bytes of a sample: 22 numbers of 4 bytes in the G-buffer (see `projection.gbuffer.GBuffer`), and 6 in
+#: the field in the picture (see `compositor.pixel_field.PixelField`).
+SAMPLE_BYTES = 28 * 4
+
+#: Bytes of each line through a sample, for each image that is kept of it: 6 numbers of 4 bytes. They are
+#: the next sample on the streamline, the noise, two running sums, their count and the image.
+LINE_BYTES = 6 * 4
+
+#: Images of a line if there are several: of the three channels of colored or drifting noise, of the
+#: strokes, breaks and overshoot of hatching, or of the whole picture instead of a strip of it.
+MANY_IMAGES = 3
+
+#: Bytes of a triangle: three corners in clip space, of four float64 numbers each.
+TRIANGLE_BYTES = 3 * 4 * 8
 
 #: Size in bytes of the array that raises the threshold. The GNU C library raises the threshold for
 #: freed blocks of up to 32 MiB only.
@@ -28,6 +51,20 @@ def raise_mmap_threshold() -> None:
     no effect with other C libraries.
     """
     np.empty(MMAP_THRESHOLD_BYTES, dtype=np.uint8)
+
+
+def samples_memory(samples: float, lines: int, many_images: bool) -> float:
+    """Return the bytes of samples on the surface, in a picture or a texture.
+
+    Parameters
+    ----------
+    samples : float
+    lines : int
+        Lines of the field through a point.
+    many_images : bool
+        Whether the look keeps `MANY_IMAGES` of each line.
+    """
+    return samples * (SAMPLE_BYTES + LINE_BYTES * lines * (MANY_IMAGES if many_images else 1))
 
 
 def check_memory(needed: float, subject: str, advice: str) -> None:
@@ -80,34 +117,16 @@ def available_memory() -> int | None:
 def _system_memory() -> Iterator[int]:
     """Yield the bytes that the operating system has left."""
     if sys.platform == "win32":
-        yield from _windows_memory()
+        # The structure MEMORYSTATUSEX: its size and the load, then seven amounts.
+        status = (ctypes.c_uint64 * 8)(64)
+        if ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
+            yield min(status[4], status[6])  # of memory with page files, and of the address space
     elif sys.platform == "darwin":
-        size, width = ctypes.c_uint64(), ctypes.c_size_t(8)
-        library = ctypes.CDLL(None)
-        if not library.sysctlbyname(
-            b"hw.memsize", ctypes.byref(size), ctypes.byref(width), None, ctypes.c_size_t(0)
-        ):
-            yield size.value
+        yield os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     else:
         lines = Path("/proc/meminfo").read_text().splitlines()
         kilobytes = {name: int(rest.split()[0]) for name, rest in (s.split(":") for s in lines)}
         yield (kilobytes["MemAvailable"] + kilobytes["SwapFree"]) * 1024
-
-
-def _windows_memory() -> Iterator[int]:
-    """Yield the bytes that Windows still commits to this process, in memory and page files."""
-
-    class MemoryStatus(ctypes.Structure):
-        _fields_ = [
-            ("size", ctypes.c_uint32),
-            ("load_percent", ctypes.c_uint32),
-            *((name, ctypes.c_uint64) for name in ("total", "free", "total_commit", "free_commit")),
-            *((name, ctypes.c_uint64) for name in ("total_space", "free_space", "extended")),
-        ]
-
-    status = MemoryStatus(size=ctypes.sizeof(MemoryStatus))
-    if ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
-        yield min(status.free_commit, status.free_space)
 
 
 def _control_group_memory(root: Path = Path("/")) -> Iterator[int]:

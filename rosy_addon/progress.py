@@ -41,7 +41,7 @@ def report(fraction: float, label: str) -> None:
     part = _current.get()
     if part is not None:
         fraction = part.start + (part.stop - part.start) * fraction
-        part.listener(fraction, label if part.label is None else part.label)
+        part.listener(float(fraction), label if part.label is None else part.label)
 
 
 class _Scope:

@@ -14,6 +14,7 @@ from ..cache import Cache
 from ..errors import RosyError
 from ..field.directional_field import field_symmetry
 from ..field.frames import dot
+from ..memory import check_memory
 from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -40,7 +41,6 @@ from .spacing import (
     weight_by_tone,
     with_vertices_of_fans,
 )
-from .stroke_memory import check_stroke_memory
 from .stroke_set import POINT_COLUMNS, Strokes
 from .style import StrokeStyle
 from .svg import Pen, simplify_mask
@@ -65,6 +65,10 @@ OFFSCREEN_DISTANCE_RATIO = 0.1
 #: Smallest distance between strokes in a picture, in pixels. Runs of visible points shorter than a few pixels
 #: are artifacts, and finer strokes are hardly longer.
 MIN_SPACING_PIXELS = 0.5
+
+#: Bytes that tracing takes at least, and of a square of the surface as wide as the spacing, for each family:
+#: the piece of a stroke that crosses it has about 12 points of 16 float64 numbers.
+TRACING_BYTES, SQUARE_BYTES = 40_000_000, 1500
 
 #: Largest distance in pixels between a removed point and the simplified stroke, and the number of
 #: pixels that a difference of the full width counts as.
@@ -245,7 +249,11 @@ def _trace_instance(
         if not part.mesh.z[kept].any():
             return None
         part, spacing = part.take(kept), spacing.take(kept)
-    check_stroke_memory(part.mesh, spacing.values, camera, clipped, instance.surface.name)
+    check_memory(
+        stroke_memory(part.mesh, spacing.values),
+        f"{instance.surface.name}: a drawing of strokes with this spacing",
+        "increase the spacing, or choose a smaller size",
+    )
     with progress(0.1, 0.9):
         strokes = part.on_whole_mesh(
             trace_on_mesh(part.mesh, spacing, surface_name=instance.surface.name)
@@ -348,6 +356,19 @@ def _check_distance(mesh: TangentMesh, camera: Camera, distance: float, surface_
             f"{surface_name}: strokes would be {pixels:.1g} pixels apart: increase their distance or "
             "the size of the picture"
         )
+
+
+def stroke_memory(mesh: TangentMesh, spacing: np.ndarray) -> float:
+    """Return about how many bytes the strokes of a mesh take at the peak.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    spacing : (T, 3) float64 ndarray
+        Spacing at the corners, in world space.
+    """
+    squares = float((mesh.area / spacing.mean(axis=1) ** 2).sum())
+    return TRACING_BYTES + SQUARE_BYTES * squares * mesh.family_count
 
 
 def _corner_spacing(

@@ -84,26 +84,35 @@ def _draw_fields(
     if not view.draws_thresholds:
         check_color_values(view.look, view.instances)
     check_instances(view.instances, view.sample_camera, view.look.display)
-    look, camera, instances = view.look, view.shaded_camera, view.instances
     workers = workers or core_count()
-    strips = divide_into_strips(look, camera, instances)
-    groups = [strips]
-    if not view.draws_thresholds:
-        groups = group_strips(strips, look, camera, instances, workers)
+    groups = picture_groups(view, workers)
+    while workers > 1:  # fewer processes need less memory
+        try:
+            check_picture_memory(view, groups, workers)
+            break
+        except RosyError:
+            workers -= 1
     try:
-        check_picture_memory(view)
+        check_picture_memory(view, groups, workers)
     except RosyError:
         if not cache:
             raise
         cache.clear()
-        check_picture_memory(view)
+        check_picture_memory(view, groups, workers)
     if len(groups) == 1:
-        return _draw_strips(view, strips, cache, gbuffer_cache)
+        return _draw_strips(view, groups[0], cache, gbuffer_cache)
     pictures = POOL.map(draw_rows, [(view, group) for group in groups], workers)
     if not any(picture.size for picture in pictures):
-        raise_nothing_in_view(instances, camera)
+        raise_nothing_in_view(view.instances, view.shaded_camera)
     rgba = join_strips(pictures, [_whole(group) for group in groups])
-    return Picture(rgba, (), color_range=fixed_color_range(look, instances))
+    return Picture(rgba, (), color_range=fixed_color_range(view.look, view.instances))
+
+
+def picture_groups(view: ViewInput, workers: int) -> list[Sequence[Strip]]:
+    """Return the strips of a picture, in the groups that are drawn together; see `group_strips`."""
+    scene = view.look, view.shaded_camera, view.instances
+    strips = divide_into_strips(*scene)
+    return [strips] if view.draws_thresholds else group_strips(strips, *scene, workers)
 
 
 def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray:

@@ -26,7 +26,14 @@ from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
 from ..errors import RosyError
 from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
-from ..memory import check_memory, raise_mmap_threshold
+from ..memory import (
+    PIXEL_BYTES,
+    PROCESS_BYTES,
+    TRIANGLE_BYTES,
+    check_memory,
+    raise_mmap_threshold,
+    samples_memory,
+)
 from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
@@ -90,13 +97,6 @@ DIRECTION_SETTINGS = ("display", "cross_creases", "crease_angle", "guiding_angle
 
 #: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
-
-#: Bytes of a texel of the frame, of each line there, and of the same with colored noise; of a texel of a
-#: chart, and of each line there for each channel of the noise; and further ones of a texel of a chart and
-#: of each line there with hatching. Fitted to measurements.
-TEXEL_BYTES, LINE_BYTES, COLORED_LINE_BYTES = 14, 24, 48
-CHART_TEXEL_BYTES, CHART_LINE_BYTES = 64, 8
-HATCHING_TEXEL_BYTES, HATCHING_LINE_BYTES = 32, 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,11 +267,9 @@ def _check_texture_memory(
     """Check that there is memory for a texture; see `memory.check_memory`."""
     texels = frame.width * frame.height
     used = min(float((mesh.area * np.abs(charts.density)).sum()) * frame.size**2, texels)
-    lines, is_colored = mesh.family_count, noise_channel_count(look) > 1
-    needed = texels * (TEXEL_BYTES + lines * (COLORED_LINE_BYTES if is_colored else LINE_BYTES))
-    needed += used * (CHART_TEXEL_BYTES + lines * CHART_LINE_BYTES * (3 if is_colored else 1))
-    if is_hatched(look):
-        needed += used * (HATCHING_TEXEL_BYTES + lines * HATCHING_LINE_BYTES)
+    many_images = is_hatched(look) or noise_channel_count(look) > 1
+    needed = PROCESS_BYTES + PIXEL_BYTES * texels + TRIANGLE_BYTES * len(mesh.area)
+    needed += samples_memory(used, mesh.family_count, many_images)
     tiles = f"{len(frame.tiles)} tiles of " if frame.is_udim and len(frame.tiles) > 1 else ""
     check_memory(
         needed,

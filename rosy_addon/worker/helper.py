@@ -108,6 +108,11 @@ class Helper:
         """What becomes readable when the process has something to say, or ends."""
         return None if self._channel is None else self._channel.connection
 
+    @property
+    def pid(self) -> int | None:
+        """Of the process, if it runs."""
+        return None if self._process is None else self._process.pid
+
     def _is_prepared(self) -> bool:
         """Return whether the process is ready for a call."""
         if not self._is_ready and self._channel.poll():

@@ -26,10 +26,15 @@ def core_count() -> int:
 
 
 class Pool:
-    """Helpers of this process. They are started when they are first needed, and stay for the next call."""
+    """Helpers of this process. They are started when they are first needed, and stay for the next call.
+
+    Attributes
+    ----------
+    helpers : list of Helper
+    """
 
     def __init__(self) -> None:
-        self._helpers: list[Helper] = []
+        self.helpers: list[Helper] = []
 
     def map(
         self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]], count: int = 0
@@ -56,14 +61,14 @@ class Pool:
         busy: dict[Helper, tuple[int, Handle]] = {}
         lost: set[Helper] = set()
         helper_count = min(count or core_count(), len(arguments)) - 1
-        while len(self._helpers) < helper_count:
-            self._helpers.append(Helper(ENVIRONMENT))
+        while len(self.helpers) < helper_count:
+            self.helpers.append(Helper(ENVIRONMENT))
 
         report_here = current_report()
 
         def collect() -> None:
             """Take what helpers have done, and give them what is waiting."""
-            for helper in self._helpers[: max(helper_count, 0)]:
+            for helper in self.helpers[: max(helper_count, 0)]:
                 if helper in lost:
                     continue
                 try:
@@ -105,9 +110,9 @@ class Pool:
 
     def close(self) -> None:
         """End all helpers."""
-        for helper in self._helpers:
+        for helper in self.helpers:
             helper.close()
-        self._helpers.clear()
+        self.helpers.clear()
 
 
 #: The helpers of this process.

@@ -151,17 +151,13 @@ def test_errors_of_export(with_field, tmp_path):
 )
 def test_lack_of_memory_is_reported(with_field, monkeypatch, free, message):
     """Whether it is known before, or noticed when the memory is taken."""
-    modules = {
-        name: sys.modules[f"bl_ext.user_default.rosy.rosy_addon.{name}"]
-        for name in ("memory", "rendering.picture_memory")
-    }
+    memory = sys.modules["bl_ext.user_default.rosy.rosy_addon.memory"]
 
     def fail(*_):
         raise MemoryError
 
     before = contents()
-    for module in modules.values():
-        monkeypatch.setattr(module, "available_memory", (lambda: free) if free else fail)
+    monkeypatch.setattr(memory, "available_memory", (lambda: free) if free else fail)
     for operator, settings in (
         (bpy.ops.rosy.bake, {}),
         (bpy.ops.rosy.field_generate, {"kind": "smoothest"}),

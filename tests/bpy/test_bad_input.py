@@ -11,7 +11,6 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
-from rosy.rosy_addon.rendering import picture_memory
 from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
 from rosy.rosy_addon.scene.face_values import read_face_scalars
 from rosy.rosy_addon.scene.guides import (
@@ -64,7 +63,6 @@ def test_no_field(scene, camera):
 
 
 def test_more_memory_than_there_is(scene, camera, monkey, monkeypatch):
-    monkeypatch.setattr(picture_memory, "available_memory", lambda: 10**9)
     monkeypatch.setattr(memory, "available_memory", lambda: 10**9)
     assert_refused("a picture of 9000 x 9000 pixels", "1.0 GB are free", size=(9000, 9000))
 

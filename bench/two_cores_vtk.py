@@ -11,10 +11,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from rosy_addon.rendering.band_workers import BandWorkers
 
 from rosy_addon.progress import run_to_completion
-from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases

@@ -121,12 +121,12 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
         # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
         noise = high_pass_margin(look.high_pass) + int(np.ceil(look.grain))
     disc = int(np.abs(disc_offsets(look.grain)).max())
-    rows = max(_longest_margin(look) + OVERLAP_ROWS, disc) + noise
+    rows = max(_longest_margin(look), disc) + noise
     if has_paper_grain(look) and look.anchor == "surface":
         rows = max(rows, high_pass_margin(surface_paper_grain_args(look)["high_pass"]))
     if has_outline(look):
         rows = max(rows, int(np.ceil(look.outline)) + 1 + FULL_MARK_LENGTH)
-    return rows + NEIGHBOR_ROWS
+    return OVERLAP_ROWS + rows + NEIGHBOR_ROWS
 
 
 def _longest_margin(look: Look) -> int:

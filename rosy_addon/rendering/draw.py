@@ -102,9 +102,13 @@ def _draw_fields(
     if len(groups) == 1:
         return _draw_strips(view, groups[0], cache, gbuffer_cache)
     pictures = POOL.map(draw_rows, [(view, group) for group in groups], workers)
-    if not any(picture.size for picture in pictures):
+    if all(picture is None for picture in pictures):
         raise_nothing_in_view(view.instances, view.shaded_camera)
-    rgba = join_strips(pictures, [_whole(group) for group in groups])
+    parts = [_whole(group) for group in groups]
+    for index, (start, stop) in enumerate(part.drawn_rows for part in parts):
+        if pictures[index] is None:
+            pictures[index] = np.zeros((stop - start, view.camera.width, 4), dtype=np.float32)
+    rgba = join_strips(pictures, parts)
     return Picture(rgba, (), color_range=fixed_color_range(view.look, view.instances))
 
 
@@ -115,7 +119,7 @@ def picture_groups(view: ViewInput, workers: int) -> list[Sequence[Strip]]:
     return [strips] if view.draws_thresholds else group_strips(strips, *scene, workers)
 
 
-def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray:
+def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray | None:
     """Draw some neighboring strips of a picture.
 
     Parameters
@@ -126,14 +130,13 @@ def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray:
 
     Returns
     -------
-    (h, W, 4) float32 ndarray
-        The `drawn_rows` of the strips together. Linear RGBA, not premultiplied.
+    (h, W, 4) float32 ndarray or None
+        The `drawn_rows` of the strips together. Linear RGBA, not premultiplied. None if nothing is visible.
     """
     try:
         picture = _draw_strips(view, strips, BAKE_CACHE, None)
     except NothingInViewError:
-        start, stop = _whole(strips).drawn_rows
-        return np.zeros((stop - start, view.camera.width, 4), dtype=np.float32)
+        return None
     BAKE_CACHE.evict_over_limit()
     return picture.rgba
 

@@ -1,0 +1,145 @@
+"""Pictures that several processes draw together."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT, long
+from shapes import torus
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.errors import NothingInViewError
+from rosy_addon.field.generate import axis_field
+from rosy_addon.progress import listening
+from rosy_addon.projection.camera import look_at, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.draw import draw_picture, picture_groups
+from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.worker import helper as helper_module
+from rosy_addon.worker.pool import POOL
+
+sys.path.append(str(Path(__file__).parent))
+from test_helper import has_ended
+
+#: Fields with many lines need many strips.
+DEGREE, WIDTH, HEIGHT = 11, 320, 1216
+
+
+def view_from(eye, **look) -> ViewInput:
+    ring = torus(24, 12)
+    instance = MeshInstance(ring, np.eye(4), axis_field(ring, DEGREE, (0, 0, 1)))
+    camera = perspective_camera(look_at(eye, (0, 0, 0)), WIDTH, HEIGHT, fov=0.9)
+    return ViewInput((instance,), camera, Look(length=10, **look))
+
+
+VIEW = view_from((0.0, -1.5, 5.0), supersampling=2)
+
+
+def drawn(view: ViewInput, workers: int = 1) -> bytes:
+    return draw_picture(view, workers=workers).rgba.tobytes()
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return drawn(VIEW)
+
+
+@pytest.fixture(autouse=True)
+def _no_helpers_stay():
+    yield
+    POOL.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [3, *long(2, 8)])
+def test_the_number_of_processes_changes_nothing(count, expected):
+    assert len(picture_groups(VIEW, count)) == count
+    assert drawn(VIEW, count) == expected
+    assert len(POOL.helpers) == count - 1
+
+
+@pytest.mark.slow
+def test_helpers_draw_one_picture_after_the_other(expected):
+    other = replace(view_from((1.0, -2.0, 4.0), ink="hatch", outline=2.0), instances=VIEW.instances)
+    drawn(VIEW, 2)
+    pid = POOL.helpers[0].pid
+    assert drawn(other, 2) == drawn(other)
+    assert drawn(VIEW, 2) == expected
+    assert POOL.helpers[0].pid == pid
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed_at", [0.0, 0.3])
+def test_what_a_killed_helper_has_not_drawn_is_drawn_here(killed_at, expected):
+    killed = []
+
+    def kill(fraction: float, _label: str) -> None:
+        if fraction >= killed_at and not killed and all(helper.pid for helper in POOL.helpers):
+            killed.extend(helper.pid for helper in POOL.helpers)
+            for pid in killed:
+                os.kill(pid, signal.SIGKILL)
+
+    with listening(kill):
+        assert drawn(VIEW, 3) == expected
+    assert len(killed) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", ["/no/such/program", "/bin/false"])
+def test_without_helpers_all_is_drawn_here(program, expected, monkeypatch):
+    monkeypatch.setattr(helper_module.sys, "executable", program)
+    assert drawn(VIEW, 2) == expected
+
+
+@pytest.mark.slow
+def test_a_picture_that_is_stopped_ends_busy_helpers():
+    pids = []
+
+    def stop(fraction: float, _label: str) -> None:
+        pids[:] = [helper.pid for helper in POOL.helpers]
+        if fraction > 0.1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), listening(stop):
+        drawn(VIEW, 2)
+    assert all(has_ended(pid, 0.2) for pid in pids if pid)
+
+
+def test_a_picture_with_nothing_in_view_is_refused():
+    away = perspective_camera(look_at((0.0, -9.0, 0.0), (0, -90, 0)), WIDTH, HEIGHT, fov=0.9)
+    with pytest.raises(NothingInViewError, match="outside the frame"):
+        drawn(replace(VIEW, camera=away), 2)
+
+
+def test_small_pictures_start_no_process():
+    drawn(replace(VIEW, camera=VIEW.camera.resized(100, 100)), 8)
+    assert not POOL.helpers
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the list of processes")
+def test_helpers_end_if_the_process_that_draws_is_killed():
+    program = f"""
+import sys
+sys.path[:0] = ["tests/unit", "tests/unit/worker"]
+import test_pool as t
+while True:
+    t.drawn(t.VIEW, 3)
+    print(*(helper.pid for helper in t.POOL.helpers), flush=True)
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", program], cwd=ROOT, stdout=subprocess.PIPE
+    ) as process:
+        pids = [int(pid) for pid in process.stdout.readline().split()]
+        time.sleep(0.3)
+        process.kill()
+        process.wait()
+        assert len(pids) == 2 and all(has_ended(pid, 2.0) for pid in pids)

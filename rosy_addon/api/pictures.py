@@ -17,7 +17,7 @@ from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..image_io.png import png_task, read_png, to_srgb_uint8, write_png
-from ..presets.store import default_user_folder, load_preset, preset_files, read_preset
+from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..progress import run_to_completion
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion

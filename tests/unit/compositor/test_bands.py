@@ -15,7 +15,7 @@ from rosy_addon.compositor.band_division import context_rows, divide_rows
 from rosy_addon.compositor.compose import compose, compose_task
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.progress import Progress, run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance

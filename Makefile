@@ -87,7 +87,7 @@ smoke-bpy45 smoke-bpy50: smoke-bpy%: .venv-bpy%/ready
 	.venv-bpy$*/$(BIN)/python $(PYTEST) --numprocesses 0 tests/bpy/test_smoke.py
 
 # The rooms that need only numpy, on systems without Blender's module.
-NUMERIC_ROOMS = field projection compositor line_drawing surface_texture image_io presets
+NUMERIC_ROOMS = field projection compositor line_drawing surface_texture image_io preset_files
 test-numeric: .venv/ready
 	$(UNIT) $(PYTEST) -m "not slow and not long" $(NUMERIC_ROOMS:%=tests/unit/%)
 

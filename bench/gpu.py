@@ -24,7 +24,7 @@ from rosy_addon.compositor.flow import flow_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
-from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.view_input import ViewInput
 

@@ -11,7 +11,7 @@ from rosy_addon.rendering.band_workers import BandWorkers
 
 from rosy_addon.cache import Cache
 from rosy_addon.compositor.look import is_hatched
-from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.view_input import ViewInput
 

@@ -8,7 +8,7 @@ import bpy
 from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.presets.store import load_preset, write_preset
+from ..rosy_addon.preset_files.store import load_preset, write_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
 from .preset_shared import PRESET_ARGUMENTS, target_preset

@@ -6,7 +6,7 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.presets.store import read_preset, save_preset
+from ..rosy_addon.preset_files.store import read_preset, save_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.viewport.view3d import redraw
 from .reports import report_error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.presets.store import MAX_NAME_LENGTH, rename_preset
+from ..rosy_addon.preset_files.store import MAX_NAME_LENGTH, rename_preset
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
 from ..rosy_addon.viewport.view3d import redraw

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.presets.store import MAX_NAME_LENGTH, Preset, preset_key, save_preset
+from ..rosy_addon.preset_files.store import MAX_NAME_LENGTH, Preset, preset_key, save_preset
 from ..rosy_addon.scene.look_properties import read_look
 from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library

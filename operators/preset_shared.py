@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.presets.store import MAX_DESCRIPTION_LENGTH
+from ..rosy_addon.preset_files.store import MAX_DESCRIPTION_LENGTH
 from ..rosy_addon.ui import preset_library
 
 #: Arguments of the property that selects a preset.

@@ -7,13 +7,15 @@
 OLD and NEW are git revisions. NEW is the working tree if it is not given. Each revision is copied
 to a temporary folder, and every case runs there in a child process that imports that copy alone.
 Outputs of commits are cached in build/compare/SHA/DIGEST, where DIGEST stands for this tool, its
-inputs and the versions of Python and numpy. The exit status is 0 only if all cases ran and
-gave the same files. A revision takes 2 to 3 minutes on two processor cores.
+inputs and the versions of Python and numpy. Another checkout with the same tool can use a copy of
+that folder, or a link to it. The exit status is 0 only if all cases ran and gave the same files. A
+revision takes 3 to 4 minutes on two processor cores.
 
-Cases use only interfaces that users have: the command line, operators and properties. They run in
-three lanes: `numpy` (plain Python), `bpy` (Blender's Python module, if this Python has it) and
-`card` (a full Blender that draws on the graphics card, only with --blender; COMMAND starts it
-without a window when arguments are appended, such as "blender -b").
+Cases use only interfaces that users have, so that they run with all revisions: the command line,
+the Python package, operators and properties. They run in three lanes: `numpy` (plain Python),
+`bpy` (Blender's Python module, if this Python has it) and `card` (a full Blender that draws on the
+graphics card, only with --blender; COMMAND starts it without a window when arguments are appended,
+such as "blender -b").
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ import importlib.util
 import io
 import itertools
 import json
+import math
 import os
 import platform
 import re
@@ -38,7 +41,6 @@ import tarfile
 import tempfile
 import time
 import traceback
-import typing
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -99,15 +101,22 @@ HATCH = "ink=hatch light=lamp shading=0.9 grain=2.5 length=30"
 
 #: Arguments of `render`, to which an output and `SIZE` are added.
 RENDERS = {
-    **{f"degree-{n}": f"@torus.obj --degree {n} --generate smoothest" for n in (*range(1, 8), 12)},
+    **{f"degree-{n}": f"@torus.obj --degree {n} --generate smoothest" for n in (7, 12)},
     **{f"preset-{name}": f"@suzanne.obj --preset {name}" for name in PRESETS},
+    **{
+        f"preset-{name}-{n}": f"@torus.obj --degree {n} --generate smoothest --preset {name}"
+        for name, n in itertools.product(PRESETS, range(1, 7))
+    },
+    **{
+        f"{method}-{n}": f"@torus.obj --degree {n} --generate smoothest method={method}"
+        for method, n in itertools.product(("members", "brute", "ibfv"), (1, 2, 3, 4, 6))
+    },
     "members-cosine": "@bumpy.ply method=members",
     "members-binary": "@bumpy.ply method=members weights=binary",
     "members-none": "@bumpy.ply method=members weights=none guiding_angle=0.4",
     "members-view-plane": "@torus.obj --degree 3 method=members view_plane=off --ortho",
     "members-5-colour": "@torus.obj --degree 5 method=members noise=colour high_pass=0 density=.5",
     "members-magnitude": "@bumpy.ply method=members magnitude=both",
-    "brute-1": "@torus.obj --degree 1 method=brute",
     "brute-4-taper": "@bumpy.ply method=brute taper=on length=25",
     "brute-6-colour": "@torus.obj --degree 6 method=brute noise=colour",
     "ibfv-1-oriented": "@torus.obj --degree 1 method=ibfv oriented=on",
@@ -127,6 +136,12 @@ RENDERS = {
     "noise-settings": "@bumpy.ply step=0.5 grain=3 density=0.4 high_pass=5 seed=7 gain=4 taper=on",
     "long-streamlines": "@bumpy.ply length=300 supersampling=1",
     "foreshorten": "@torus.obj foreshorten=on --view 10,15",
+    "detail": "@suzanne.obj detail=0.7",
+    "arrows": "@torus.obj --degree 1 --generate smoothest arrows=20 arrow_size=9",
+    "singularities": "@suzanne.obj singularity_dots=visible singularity_labels=on",
+    "singularities-all": "@torus.obj --degree 3 singularity_dots=all singularity_size=12",
+    "even-lines": f"@suzanne.obj {HATCH} lines=even",
+    "even-lines-3": f"@torus.obj --degree 3 {HATCH} lines=even anchor=surface outline=1",
     "creases": "@cube.off --generate features",
     "cross-creases": "@cube.off --generate smoothest cross_creases=on",
     "crease-angle": "@cube.off --generate smoothest crease_angle=2.5 noise=colour",
@@ -200,24 +215,52 @@ STROKES = {
     "gaps": "@bumpy.ply --gaps 0.5 --taper 2 --colours #aa0000,#0000aa --no-paper",
     "curvature": "@suzanne.obj --curvature 0.8 --spacing 12",
     "distance": "@wave.obj --distance 0.12 --up z --view -30,40 --ortho",
+    "engraving": "@suzanne.obj --tone --swell 1 --light lamp --layering 0.4",
+    "arrows": "@torus.obj --degree 1 --generate smoothest --spacing 12 --arrows 6",
+    "singularities": "@suzanne.obj --spacing 12 --singularity-dots all --singularity-labels",
+    "singularities-visible": "@torus.obj --degree 3 --spacing 14 --singularity-dots visible "
+    "--singularity-size 14",
+    "tone-plotter": "@wave.obj --tone --plotter --mm 120 --outline",
+    "tone-degree-1": "@bumpy.ply --degree 1 --tone --light lamp --gaps 0.4",
+    "tone-degree-6": "@bumpy.ply --degree 6 --tone --layering 0.1 --taper 0.3",
     "free": "@torus.obj @free.rawfield --spacing 12",
     "tensors": "@torus.obj @tensors.txt --spacing 12 --taper 0",
     "real-vase-7": "@vase.off @vase-7.rawfield --spacing 14",
     "real-conjugate": "@cheburashka.off @cheburashka-cf.rawfield --spacing 14 --outline",
 }
 
+#: Arguments of `texture`, to which an output and a size are added.
+TEXTURES = {
+    **{f"preset-{name}": f"@wave.obj --preset {name}" for name in PRESETS},
+    **{f"degree-{n}": f"@wave.obj --degree {n} --generate smoothest" for n in range(1, 7)},
+    "light": f"@wave.obj {HATCH} --light-direction 1,2,0.5",
+    "anisotropy": "@wave.obj --content anisotropy",
+    "flow": "@wave.obj --degree 1 --generate smoothest --content flow --margin 3",
+    "colour": "@wave.obj --generate uv noise=colour magnitude=both",
+    "tensors": "@wave.obj --generate features --sharp-angle 20 hue=families anchor=surface",
+    "real-spot": "@spot.obj --preset pen-and-ink",
+}
+TEXTURE_SIZE = 128
+
 #: Arguments of `field`; the first word is the file to write.
 FIELDS = {
-    "smoothest-1": "out.rosy @bumpy.ply --degree 1 --generate smoothest",
-    "smoothest-6": "out.rawfield @suzanne.obj --degree 6 --generate smoothest",
+    **{
+        f"{kind}-degree-{n}": f"out.rawfield {mesh} --degree {n} --generate {kind}"
+        for (kind, mesh), n in itertools.product(
+            (("form", "@suzanne.obj"), ("smoothest", "@bumpy.ply"), ("features", "@wave.obj --sharp-angle 20")),
+            range(1, 7),
+        )
+    },
+    "form-noisy": "out.rosy @bumpy.ply --magnitude confidence",
+    "cancel-pairs": "out.rosy @suzanne.obj --cancel-pairs 0.2",
     "smoothest-open": "out.sings @wave.obj --degree 5 --generate smoothest",
     "curvature": "out.rosy @suzanne.obj --generate curvature",
     "curvature-reach": "out.npy @suzanne.obj --degree 2 --reach 0.1",
     "features": "out.txt @cube.off --generate features",
-    "features-open": "out.rawfield @wave.obj --degree 3 --generate features --sharp-angle 15",
     "guided-strokes": "out.rosy @torus.obj --strokes @strokes.txt",
     "guided-reach": "out.rosy @torus.obj --strokes @strokes.txt --reach 0.05 --degree 6",
     "guided-field": "out.npy @torus.obj --guides @guides.npy --degree 2",
+    "guided-firmness": "out.rosy @torus.obj --guides @guides.npy --firmness --degree 4",
     "guided-uv": "out.rosy @wave.obj --generate guided --uv --reach 0.1",
     "axis": "out.obj @bumpy.ply --generate axis --axis 1,-0.5,0.2 --degree 3",
     "uv": "out.txt @wave.obj --generate uv --degree 4",
@@ -257,10 +300,34 @@ COMMANDS = {
         "field @bumpy.ply -o fieldgen.obj --degree 4",
         "field @bumpy.ply fieldgen.obj -o out.rosy",
     ),
-    "turntable": ("turntable @torus.obj -o out.gif --pictures 5 --size 96x72 --degree 6",),
-    "turntable-preset": (
-        "turntable @suzanne.obj -o out.gif --pictures 3 --size 96x96 --preset woodcut --ortho",
+    "field-prescribed": (
+        "field @torus.obj -o out.sings --degree 4 --generate form",
+        "field @torus.obj -o out.rosy --degree 4 --singularities out.sings",
     ),
+    "field-prescribed-more": (
+        "field @bumpy.ply -o out.rosy --degree 2 --singularities @one.sings --add-missing",
+    ),
+    **{
+        f"strokes-{end}": (f"strokes @suzanne.obj -o out.{end} --size {SIZE} --spacing 12",)
+        for end in ("ply", "obj", "csv")
+    },
+    **{
+        f"turntable-{name}": (
+            f"turntable @suzanne.obj -o out.gif --pictures 3 --size 96x96 --preset {name} --ortho",
+        )
+        for name in PRESETS
+    },
+    "turntable-degree-6": ("turntable @torus.obj -o out.gif --pictures 5 --size 96x72 --degree 6",),
+    "turntable-flow": (
+        "turntable @torus.obj -o out.gif --pictures 4 --size 96x72 --degree 1 --still --flow 2",
+    ),
+    # Large enough for several bands, with one process as well.
+    **{
+        f"bands-{name}-{count}": (
+            f"render @suzanne.obj -o out.png --size 1920x1200 --preset {name} --workers {count}",
+        )
+        for name, count in itertools.product(("default", "pen-and-ink", "cross-hatch"), (1, 2))
+    },
     "presets": ("presets --json",),
 }
 
@@ -278,15 +345,52 @@ REFUSALS = {
     "bad-verb": "paint @torus.obj",
 }
 
+#: Code with the Python package `rf`. `ring` is a surface, `save` writes named arrays.
+API = {
+    "film": "film = [rf.smoothest(ring, 3).rotated(0.1 * k) for k in range(3)]; "
+    "rf.film(film, 'out.gif', between=1, size=(96, 72), workers=1)",
+    "film-loop": "film = [rf.form(ring, n) for n in (4, 4, 4)]; film[1] = film[1].rotated(0.3); "
+    "rf.film(film, 'out.gif', loop=True, size=(96, 72), preset='pen-and-ink', workers=1)",
+    "film-auto": "film = [rf.smoothest(ring, 1), rf.smoothest(ring, 1).rotated(0.2)]; "
+    "rf.film(film, 'out.gif', between=None, size=(64, 48), flow=1.5, workers=1)",
+    "render": "save(rgba=rf.render(ring, size=(96, 72), workers=1).rgba)",
+    "render-hatch": "save(rgba=rf.render(ring, size=(96, 72), preset='charcoal', workers=1).rgba)",
+    "texture": "wave = rf.Surface('@wave.obj'); "
+    "save(rgba=rf.texture(wave, size=96, preset='plaid').tiles[1001].rgba)",
+    "occlusion": "save(tone=rf.ambient_occlusion(ring, directions=16))",
+    "strokes": "drawing = rf.strokes(ring, spacing=12); "
+    "save(**{str(k): line for k, line in enumerate(drawing.polylines)})",
+    "compare": "fields = {'a': rf.form(ring), 'b': rf.smoothest(ring)}; "
+    "save(text=rf.compare(fields).to_json(), table=rf.compare(fields).to_latex())",
+    "difference": "difference = rf.form(ring).difference(rf.curvature(ring)); "
+    "save(angle=difference.angle, mean=difference.mean, p95=difference.p95)",
+    "singularities": "field = rf.read_field('@member.rosy', ring); "
+    "save(**field.singularities._asdict(), energy=field.energy)",
+    "field": "field = rf.smoothest(ring, 6).to_degree(3).rotated(0.4).smoothed(0.03); "
+    "save(directions=field.directions, angles=field.angles, z=field.representation)",
+    "moved-singularity": "field = rf.form(rf.Surface('@suzanne.obj')); "
+    "vertex, index = field.singularities; "
+    "moved = field.with_moved_singularity(int(vertex[0]), int(vertex[1]), reach=0.3); "
+    "save(vectors=moved.vectors)",
+    "guided": "strokes = [ring.vertices[:200:20]]; "
+    "save(vectors=rf.guided(ring, 2, strokes=strokes, reach=0.05).vectors)",
+    "tensors": "tensors = np.loadtxt('@tensors.txt').reshape(-1, 3, 3); "
+    "save(directions=rf.from_tensors(ring, tensors).directions)",
+}
+
 #: Arguments of `bake` for the scene that `build_scene` makes.
 BAKES = {
     "camera": "--camera Camera",
     "all-cameras": "--all-cameras --size 120x120",
     "frames": "--frames 1-3 --size 96x72",
     "frames-surface": "--frames 2-6:4 --size 96x72 --preset pen-and-ink",
-    "frames-jobs": "--frames 1-2 --jobs 2 --size 64x48 length=10",
-    "cross-hatch": "--preset cross-hatch",
-    "charcoal": "--preset charcoal --camera Ortho",
+    "workers": "--workers 2 --size 1920x1200 --object Suzanne",
+    "flow": "--frames 1-2 --flow 3 --size 96x72 --object Ring",
+    **{f"preset-{name}": f"--preset {name}" for name in PRESETS},
+    **{
+        f"ortho-{name}": f"--preset {name} --camera Ortho"
+        for name in ("charcoal", "engraving", "plaid")
+    },
     "object": "--object Suzanne Ring --preset paper",
     "scene-light": "light=scene shadows=on shading=1",
     "scene-light-hatch": f"{HATCH} light=scene shadows=on outline=1.5 overshoot=6",
@@ -299,11 +403,20 @@ SELECT_RING = (
     "bpy.context.view_layer.objects.active = ring; "
 )
 
+#: A stroke of the comb along the torus, in the space of the object.
+COMB_STROKE = (
+    "[{'name': '', 'location': (1.25 * cos(k / 9), 1.25 * sin(k / 9), 0), 'pressure': 1.0, "
+    "'is_start': False} for k in range(12)]"
+)
+
 #: Code with operators, and `strokes` of the scene.
 OPERATORS = {
     **{
         f"field-{kind}-{n}": f"ops.field_generate(kind='{kind}', degree={n}); dump_attributes()"
-        for kind, n in (("smoothest", 3), ("features", 4), ("uv", 2), ("axis", 5))
+        for kind, n in (
+            *(("form", n) for n in range(1, 7)),
+            *(("smoothest", 3), ("features", 4), ("uv", 2), ("axis", 5)),
+        )
     },
     "field-guided": "ops.field_generate(kind='guided', guides={'EDGES', 'UV'}, reach=0.1); "
     "dump_attributes()",
@@ -318,6 +431,16 @@ OPERATORS = {
     "field-seams": SELECT_RING + "edges = ring.data.edges; "
     "edges.foreach_set('use_seam', [k % 30 == 0 for k in range(len(edges))]); "
     "ops.field_generate(kind='features', edges='SEAM', degree=6); dump_attributes()",
+    "field-compare": SELECT_RING
+    + "ops.field_generate(kind='features', degree=6, attribute='second'); "
+    "ops.field_compare(); ops.bake(); dump_attributes(); dump_images()",
+    "field-comb": SELECT_RING + f"ops.field_comb(stroke={COMB_STROKE}, radius=0.4); "
+    "dump_attributes()",
+    "field-comb-exact": SELECT_RING
+    + f"ops.field_comb(stroke={COMB_STROKE}, radius=0.3, exact=True, mirror=(True, False, False)); "
+    "dump_attributes()",
+    "field-singularities": SELECT_RING
+    + "ops.field_singularities(source=3, target=40, index=1, reach=0.3); dump_attributes()",
     "field-values": SELECT_RING
     + "ops.field_convert(magnitude='values', values='shade'); dump_attributes()",
     "field-angles": "ops.field_store(form='ANGLE'); ring.data.rosy.attribute = 'rosy_angle'; "
@@ -333,6 +456,19 @@ OPERATORS = {
     "bake-float": "rosy.image_format = 'FLOAT'; rosy.percentage = 70; rosy.look.ink = 'hatch'; "
     "rosy.look.light = 'scene'; ops.bake(); dump_images()",
     "bake-preset": "ops.preset_apply(preset='woodcut'); ops.bake(); dump_images()",
+    **{
+        f"texture-{name}": "rosy.texture_size = 128; "
+        f"ops.preset_apply(preset='{name}'); ops.bake_texture(unwrap=True); dump_images()"
+        for name in PRESETS
+    },
+    **{
+        f"texture-content-{content.lower()}": f"rosy.texture_content = '{content}'; "
+        + SELECT_RING
+        + "rosy.texture_size = 128; ops.bake_texture(unwrap=True); dump_images()"
+        for content in ("ANISOTROPY", "FLOW")
+    },
+    "texture-lights": "rosy.texture_bake_light = True; rosy.texture_size = 128; "
+    "ops.preset_apply(preset='pen-and-ink'); ops.bake_texture(unwrap=True); dump_images()",
     "bake-tone-attribute": "rosy.look.tone = 'attribute'; rosy.look.ink = 'hatch'; ops.bake(); "
     "dump_images()",
     "bake-values": "rosy.look.hue = 'values'; rosy.color_attribute = 'shade'; ops.bake(); "
@@ -356,9 +492,9 @@ OPERATORS = {
     "singularities": "ops.singularities(show='POINTS'); dump_attributes(); dump_names()",
     "turntable": "ops.turntable(filepath='out.gif', film='.gif', pictures=3, width=80, height=60)",
     "strokes-svg": "strokes.spacing = 9; strokes.outline = True; "
-    "ops.strokes(kind='SVG', filepath='out.svg')",
+    "ops.strokes(kind='FILE', filepath='out.svg')",
     "strokes-svg-lights": "strokes.tone = True; strokes.light = 'scene'; "
-    "strokes.inks = 'FAMILIES'; ops.strokes(kind='SVG', filepath='out.svg')",
+    "strokes.inks = 'FAMILIES'; ops.strokes(kind='FILE', filepath='out.svg')",
     "strokes-pencil": "strokes.spacing = 12; strokes.outline = True; ops.strokes(kind='PENCIL'); "
     "dump_pencil()",
     "strokes-curves": "strokes.spacing = 10; strokes.gaps = 0.3; ops.strokes(kind='CURVES'); "
@@ -387,9 +523,13 @@ CARD = {
 
 def all_cases() -> Iterator[Case]:
     """Yield the cases of all lanes."""
-    for verb, table, output in (("render", RENDERS, "out.png"), ("strokes", STROKES, "out.svg")):
+    for verb, table, output, size in (
+        ("render", RENDERS, "out.png", SIZE),
+        ("strokes", STROKES, "out.svg", SIZE),
+        ("texture", TEXTURES, "out.png", TEXTURE_SIZE),
+    ):
         for name, words in table.items():
-            code = f"cli('{verb} {words} -o {output} --size {SIZE}')"
+            code = f"cli('{verb} {words} -o {output} --size {size}')"
             yield Case(f"{verb}-{name}", "numpy", code)
     for name, words in FIELDS.items():
         yield Case(f"field-{name}", "numpy", f"cli('field -o {words}')")
@@ -397,6 +537,9 @@ def all_cases() -> Iterator[Case]:
         yield Case(name, "numpy", "; ".join(f"cli('{line}')" for line in lines))
     for name, line in REFUSALS.items():
         yield Case(f"refused-{name}", "numpy", f"cli('{line}')", REFUSED)
+    for name, code in API.items():
+        prepare = "import rosy_addon as rf; ring = rf.Surface('@torus.obj'); "
+        yield Case(f"api-{name}", "numpy", prepare + code)
     bake = "bake scene.blend --out ."
     for name, words in BAKES.items():
         yield Case(f"bake-{name}", "bpy", f"cli('{bake} {words}')")
@@ -405,6 +548,25 @@ def all_cases() -> Iterator[Case]:
         yield Case(f"operator-{name}", "bpy", code)
     for name, words in CARD.items():
         yield Case(f"card-{name}", "card", f"cli('{bake} --device gpu {words}')")
+
+
+#: Names of the tables of cases.
+TABLES = (
+    *("PRESETS", "RENDERS", "STROKES", "TEXTURES", "FIELDS", "COMMANDS", "REFUSALS", "API"),
+    *("BAKES", "OPERATORS", "CARD"),
+)
+
+
+def check_cases() -> None:
+    """End the program with one line if a table or a lane has no cases.
+
+    A table may be derived from files, such as those of the presets, that are not where they were.
+    """
+    empty = [name for name in TABLES if not globals()[name]]
+    lanes = {case.lane for case in all_cases()}
+    empty += [f"the lane {lane}" for lane in LANES if lane not in lanes]
+    if empty:
+        sys.exit(f"compare_outputs: no cases in {', '.join(empty)}")
 
 
 # --- Input files -----------------------------------------------------------------------------
@@ -582,10 +744,10 @@ def png_file(gray: np.ndarray) -> bytes:
     )
 
 
-def write_inputs(folder: Path, data: Path | None) -> None:
+def write_inputs(folder: Path, data: Path) -> None:
     """Write the meshes, fields and images that cases name with `@`.
 
-    Files in the subfolders of `data`, if it is given, are copied.
+    Files in the subfolders of `data`, if it exists, are copied.
     """
     ring, pair = torus(), two_parts()
     texts = {
@@ -619,6 +781,7 @@ def write_inputs(folder: Path, data: Path | None) -> None:
         "free.rawfield": [f"4 {len(faces)}", *rows_of(free)],
         "vertices.txt": rows_of(tangents(unit(sums))[1]),
         "tensors.txt": rows_of(tensors),
+        "one.sings": ["2 1", "7 1"],
         "strokes.txt": [*rows_of(ring.vertices[:300:19]), "", *rows_of(corners[40])],
     }
     texts |= {name: "\n".join([*lines, ""]) for name, lines in rows.items()}
@@ -633,7 +796,7 @@ def write_inputs(folder: Path, data: Path | None) -> None:
     (folder / "bumpy.ply").write_bytes(ply_file(bumpy_sphere()))
     (folder / "star.ply").write_bytes(ply_file(star(), binary=True))
     (folder / "pair-binary.stl").write_bytes(stl_bytes(pair))
-    for path in sorted(data.glob("*/*")) if data is not None else []:
+    for path in sorted(data.glob("*/*")):
         shutil.copy(path, folder)
 
 
@@ -685,8 +848,6 @@ def load_extension(tree: Path) -> Any:
     """Load a tree's root as the package `rosy`, as Blender loads an extension, and register it."""
     import bpy  # noqa: F401
 
-    if sys.version_info < (3, 12):
-        typing.get_type_hints = type_hints
     spec = importlib.util.spec_from_file_location(
         "rosy", tree / "__init__.py", submodule_search_locations=[str(tree)]
     )
@@ -695,21 +856,6 @@ def load_extension(tree: Path) -> Any:
     spec.loader.exec_module(module)
     module.register()
     return module
-
-
-def type_hints(cls: type, *_: Any, **__: Any) -> dict[str, Any]:
-    """Return the evaluated annotations of a class.
-
-    Blender registers properties by `typing.get_type_hints`. Before Python 3.12 that does not find
-    names of the module inside comprehensions, and a class that uses one registers without
-    properties. Cases are to compare such classes too.
-    """
-    hints = {}
-    for base in reversed(cls.__mro__):
-        scope = vars(sys.modules[base.__module__])
-        for name, value in vars(base).get("__annotations__", {}).items():
-            hints[name] = eval(value, scope, dict(vars(base))) if isinstance(value, str) else value
-    return hints
 
 
 def run_case(case: Case, main: Callable[..., int]) -> int:
@@ -729,7 +875,16 @@ def run_case(case: Case, main: Callable[..., int]) -> int:
                 file.write(printed.getvalue())
         print(printed.getvalue())
 
-    names: dict[str, Any] = {"cli": cli, "os": os}
+    def save(**arrays: Any) -> None:
+        """Write arrays as .npy files, and texts and numbers as text."""
+        for key, value in arrays.items():
+            if isinstance(value, np.ndarray):
+                np.save(f"{key}.npy", value)
+            else:
+                Path(f"{key}.txt").write_text(f"{value}")
+
+    names: dict[str, Any] = {"cli": cli, "save": save, "np": np, "os": os}
+    names |= {"cos": math.cos, "sin": math.sin}
     if case.lane != "numpy":
         import bpy
 
@@ -1128,8 +1283,10 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument(
         "--data",
         type=Path,
+        default=ROOT.parent / "shared" / "data",
         metavar="DIR",
-        help="folder with the meshes and fields of others, for the cases that use them",
+        help="folder with the meshes and fields of others, for the cases that use them "
+        "(../shared/data)",
     )
     parser.add_argument("--list", action="store_true", help="list the cases and end")
     parser.add_argument(
@@ -1148,12 +1305,16 @@ def parse_arguments() -> argparse.Namespace:
 def main() -> int:
     """Compare two revisions and return the exit status."""
     options = parse_arguments()
+    check_cases()
     cases = [case for case in all_cases() if options.only in case.name]
     if options.list:
         print(*(f"{case.lane:5}  {case.name}" for case in cases), sep="\n")
         return 0
+    if not cases:
+        sys.exit(f"compare_outputs: no case has {options.only!r} in its name")
     is_available = {"numpy": True, "bpy": HAS_BLENDER, "card": bool(options.blender)}
     cases = [case for case in cases if is_available[case.lane]]
+    print("lanes:", *(lane for lane in LANES if is_available[lane]))
     CACHE.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=CACHE, prefix="work-") as work_name:
         work = Path(work_name)

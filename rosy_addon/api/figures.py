@@ -30,7 +30,6 @@ from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.visible_vertices import project_vertices
 from ..rendering.band_workers import BandWorkers
-from ..rendering.draw import draw_picture
 from ..rendering.view_input import ViewInput
 from .comparison import Comparison, compare, titled_fields
 from .field import Field

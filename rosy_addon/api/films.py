@@ -25,7 +25,6 @@ from ..field.surface import Surface as PolygonMesh
 from ..field.surface import face_area_vectors, have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.band_workers import BandWorkers
-from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
 from ..turntable_video import Encoder, check_video_path, turntable

@@ -17,7 +17,7 @@ from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..image_io.png import compute_png, read_png, to_srgb_uint8, write_png
-from ..presets.store import default_user_folder, load_preset, preset_files, read_preset
+from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..progress import run_to_completion
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
@@ -25,7 +25,6 @@ from ..projection.camera import check_size
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from ..rendering.band_workers import BandWorkers
-from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.view_input import ViewInput
 from ..turntable_video import (

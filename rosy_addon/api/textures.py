@@ -15,7 +15,7 @@ from ..compositor.look import Look, is_hatched
 from ..compositor.shading import Light
 from ..errors import RosyError
 from ..field.frames import unit_direction
-from ..presets.store import default_user_folder, load_preset
+from ..preset_files.store import default_user_folder, load_preset
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
     CONTENTS,

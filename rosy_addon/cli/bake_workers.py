@@ -10,7 +10,7 @@ from pathlib import Path
 from ..errors import RosyError
 from ..file_io import check_readable
 from ..frame_workers import parse_frames, run_local
-from ..presets.store import SHIPPED_FOLDER, find_preset_file
+from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
 from .presets import user_presets_folder
 from .streams import print_line
 

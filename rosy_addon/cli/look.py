@@ -9,7 +9,7 @@ from typing import Any
 from ..api.pictures import VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..presets.store import find_preset_file, preset_keys, read_preset
+from ..preset_files.store import find_preset_file, preset_keys, read_preset
 from ..settings import settings_of, stored_key
 from .presets import user_presets_folder
 from .view import requested_size

@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
-from ..presets.store import default_user_folder, merge_preset_files, read_preset, user_preset_files
+from ..preset_files.store import (
+    default_user_folder,
+    merge_preset_files,
+    read_preset,
+    user_preset_files,
+)
 from .options import add_subcommand, print_note
 from .streams import print_line
 

@@ -13,7 +13,6 @@ from ..errors import NothingInViewError
 from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..rendering.draw import draw_picture
 from ..rendering.view_input import Background, ViewInput
 from .background import draw_background
 from .device import Device

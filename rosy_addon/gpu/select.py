@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..compositor.look import Look
-from ..errors import DeviceError
 from ..compositor.picture import Picture
+from ..errors import DeviceError
 from ..progress import subtask
 from ..rendering.draw import bake_picture
 from ..rendering.renderer import ViewportRenderer

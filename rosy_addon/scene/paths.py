@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ..presets.store import default_user_folder
+from ..preset_files.store import default_user_folder
 
 #: Package name of the extension in Blender. This file is two packages below it.
 EXTENSION_ID = __package__.rsplit(".", 2)[0]

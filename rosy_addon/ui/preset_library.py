@@ -10,7 +10,7 @@ import bpy
 import bpy.utils.previews
 
 from ..errors import RosyError
-from ..presets.store import (
+from ..preset_files.store import (
     SHIPPED_FOLDER,
     Preset,
     find_preset_file,

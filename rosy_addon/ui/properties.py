@@ -12,7 +12,7 @@ from ..compositor.look import Look
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
-from ..presets.store import DEFAULT_KEY
+from ..preset_files.store import DEFAULT_KEY
 from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME

@@ -181,7 +181,7 @@ def test_reasons_of_disabled_buttons(scene):
 
 
 def test_presets(scene):
-    from bl_ext.user_default.rosy.rosy_addon.presets.store import preset_keys
+    from bl_ext.user_default.rosy.rosy_addon.preset_files.store import preset_keys
 
     for name in preset_keys():
         assert bpy.ops.rosy.preset_apply(preset=name) == {"FINISHED"}

@@ -14,10 +14,11 @@ TOP_LEVEL = {
     "__init__.py",
     "blender_manifest.toml",
     "operators",
+    "presets",
     "rosy_addon",
 }
 #: The folder of the presets.
-PRESETS = "rosy_addon/presets/shipped/"
+PRESETS = "presets/"
 
 SUFFIXES = {"py", "toml", "json", "glsl", "png", "txt", "dat"}
 
@@ -43,7 +44,7 @@ QUESTIONED_MODULES = {
 #: Files that look for others beside themselves, to read or to run them.
 FILES_WITH_PATHS = {
     "gpu/passes.py": "shaders",
-    "presets/store.py": "presets",
+    "preset_files/store.py": "presets",
     "rendering/band_workers.py": "the code of the workers",
     "scene/video.py": "the script that encodes videos",
     "ui/comb_brush.py": "the icon of the tool",

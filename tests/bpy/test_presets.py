@@ -6,8 +6,8 @@ import bpy
 import pytest
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.presets import store
-from rosy.rosy_addon.presets.store import Preset, default_user_folder, preset_keys, save_preset
+from rosy.rosy_addon.preset_files import store
+from rosy.rosy_addon.preset_files.store import Preset, default_user_folder, preset_keys, save_preset
 from rosy.rosy_addon.scene.look_properties import read_look
 from rosy.rosy_addon.scene.paths import user_presets_folder
 from rosy.rosy_addon.ui import preset_library

@@ -17,7 +17,7 @@ from rosy.rosy_addon.cache import BAKE_CACHE
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.gpu.select import automatic_device
 from rosy.rosy_addon.image_io.png import write_png
-from rosy.rosy_addon.presets.store import load_preset
+from rosy.rosy_addon.preset_files.store import load_preset
 from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness
 from rosy.rosy_addon.scene.bake_records import list_bakes

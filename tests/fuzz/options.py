@@ -9,7 +9,7 @@ from numpy.random import Generator
 
 from rosy_addon.cli.parser import _build_parser
 from rosy_addon.compositor.look import Look
-from rosy_addon.presets.store import preset_keys
+from rosy_addon.preset_files.store import preset_keys
 from rosy_addon.settings import settings_of
 
 from .damage import WORDS

@@ -25,7 +25,7 @@ with atheris.instrument_imports(include=["rosy_addon"]):
     from rosy_addon.field.mesh_io import READERS, read_mesh
     from rosy_addon.field.surface import build_surface
     from rosy_addon.image_io.png import read_png
-    from rosy_addon.presets.store import read_preset
+    from rosy_addon.preset_files.store import read_preset
 
 from .field_files import field_bytes, guide_bytes
 from .mesh_files import WRITERS, mesh_bytes

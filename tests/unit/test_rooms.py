@@ -46,7 +46,7 @@ MAY_IMPORT = {
     "surface_texture": BASE_ROOMS | {"field", "projection", "compositor", "line_drawing"},
     "image_io": BASE_ROOMS,
     "rendering": BASE_ROOMS | {"field", "projection", "annotation", "compositor", "cache"},
-    "presets": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
+    "preset_files": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
     "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "cache"},
     "scene": BASE_ROOMS
     | {
@@ -59,7 +59,7 @@ MAY_IMPORT = {
         "rendering",
         "cache",
         "image_io",
-        "presets",
+        "preset_files",
     },
     "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
     "comb_field": BASE_ROOMS | {"field", "scene", "cache"},
@@ -73,7 +73,7 @@ MAY_IMPORT = {
     "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
     "ui": BASE_ROOMS
     | {
-        "presets",
+        "preset_files",
         "field",
         "projection",
         "compositor",
@@ -95,7 +95,7 @@ MAY_IMPORT = {
         "surface_texture",
         "rendering",
         "image_io",
-        "presets",
+        "preset_files",
         "turntable_video",
         "external",
     },
@@ -117,7 +117,7 @@ MAY_IMPORT = {
         "surface_texture",
         "draw_strokes",
         "image_io",
-        "presets",
+        "preset_files",
     },
     "extras": BASE_ROOMS
     | {
@@ -141,7 +141,7 @@ NUMPY_ROOMS = (
     "line_drawing",
     "surface_texture",
     "image_io",
-    "presets",
+    "preset_files",
     "rendering",
 )
 

@@ -17,7 +17,7 @@ from rosy_addon.compositor.compose import compose, compose_planar
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.image_io.png import to_srgb_uint8
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

@@ -106,8 +106,8 @@ def test_star_import():
 
 def test_files_of_the_package():
     assert (PACKAGE / "py.typed").is_file()
-    presets = {path.name for path in (PACKAGE / "presets" / "shipped").iterdir()}
-    in_tree = {path.name for path in TREE.glob("rosy_addon/presets/shipped/*.json")}
+    presets = {path.name for path in (PACKAGE / "presets").iterdir()}
+    in_tree = {path.name for path in TREE.glob("presets/*.json")}
     assert presets == in_tree and "engraving.json" in presets
     shaders = {path.name for path in (TREE / "rosy_addon" / "gpu" / "glsl").iterdir()}
     assert {path.name for path in (PACKAGE / "gpu" / "glsl").iterdir()} == shaders

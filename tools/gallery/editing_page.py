@@ -18,7 +18,7 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.singularity_moves import move_index
 from rosy_addon.field.surface import Surface
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.visible_vertices import project_vertices
 

@@ -12,7 +12,7 @@ from PIL import Image
 from rosy_addon import api
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 
 from .page import ROOT
 from .shapes import sphere, suzanne

@@ -18,7 +18,7 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .looks_page import IMAGES

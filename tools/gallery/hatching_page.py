@@ -14,7 +14,7 @@ from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.field.surface import Surface
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance

@@ -12,7 +12,7 @@ from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

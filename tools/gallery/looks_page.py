@@ -11,7 +11,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
-from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.settings import Choice, Color, Number, Setting, Switch, settings_of
@@ -82,7 +82,7 @@ OWN = (
 ```""",
     "The buttons are operators: `preset_apply`, `preset_save`, `preset_rename`, `preset_remove`, "
     "`preset_import` and `preset_export`. They call functions of the module "
-    "`rosy_addon.presets.store`: `load_preset`, `save_preset`, `rename_preset`, `remove_preset`, "
+    "`rosy_addon.preset_files.store`: `load_preset`, `save_preset`, `rename_preset`, `remove_preset`, "
     "`read_preset` and `write_preset`.",
 )
 

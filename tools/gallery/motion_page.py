@@ -10,7 +10,6 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import evicting, turntable, turntable_views
 
 from .page import ROOT

@@ -5,8 +5,8 @@ from __future__ import annotations
 from PIL import Image
 
 from rosy_addon.compositor.look import Look, colors_magnitude
-from rosy_addon.presets.preview import draw_preview
-from rosy_addon.presets.store import preset_files, preview_path, read_preset
+from rosy_addon.preset_files.preview import draw_preview
+from rosy_addon.preset_files.store import preset_files, preview_path, read_preset
 
 from .sheet import display
 

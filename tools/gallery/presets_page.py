@@ -19,7 +19,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import Surface
-from rosy_addon.presets.store import Preset, load_preset, preset_keys
+from rosy_addon.preset_files.store import Preset, load_preset, preset_keys
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

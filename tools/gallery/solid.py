@@ -19,7 +19,6 @@ from rosy_addon.field.representation import (
 )
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project

@@ -14,7 +14,7 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.image_io.png import compute_png
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_basis, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project

@@ -7,7 +7,6 @@ import numpy as np
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import turntable, turntable_views
 
 from .page import ROOT

@@ -12,7 +12,7 @@ from pymdownx.slugs import slugify
 from repository_pages import ROOT, repository_file
 
 PAGE = "docs/presets.md"
-FOLDER = "rosy_addon/presets/shipped"
+FOLDER = "presets"
 
 _slug = slugify(case="lower")
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rosy_addon.rendering.band_workers import BandWorkers
 from shapes import globe, icosphere, torus
 
 from rosy_addon.annotation.arrow_marks import (
@@ -33,8 +34,6 @@ from rosy_addon.projection.camera import (
     perspective_camera,
 )
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 480, 400, fov=0.7)

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 from conftest import long
+from rosy_addon.rendering.band_workers import BandWorkers
 from shapes import globe, icosphere, torus
 
 from rosy_addon.annotation.draw_marks import draw_marks
@@ -22,8 +23,6 @@ from rosy_addon.line_drawing.svg import svg_text
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.band_workers import BandWorkers
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 240, 200, fov=0.7)

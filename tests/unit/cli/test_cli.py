@@ -22,7 +22,7 @@ from rosy_addon.color import to_linear
 from rosy_addon.extras.command_line import main
 from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png
-from rosy_addon.presets.store import preset_files
+from rosy_addon.preset_files.store import preset_files
 
 
 def rosy(*arguments) -> subprocess.CompletedProcess:

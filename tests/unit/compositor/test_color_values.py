@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rosy_addon.compositor.band_division import divide_rows
+from rosy_addon.rendering.band_workers import BandWorkers
 from shapes import icosphere, plane
 
 from rosy_addon.color import color_stops, map_colors, to_linear
-from rosy_addon.compositor.band_division import divide_rows
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
@@ -19,7 +20,6 @@ from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.surface_sampling import surface_values
-from rosy_addon.rendering.band_workers import BandWorkers
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 

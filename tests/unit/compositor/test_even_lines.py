@@ -27,7 +27,7 @@ from rosy_addon.compositor.look_units import instance_line_spacing, supersampled
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

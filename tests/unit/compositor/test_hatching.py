@@ -41,7 +41,7 @@ from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field, wobble_
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

@@ -12,11 +12,10 @@ from shapes import plane
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import axis_field
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.pixel_blocks import BLOCK_PIXELS
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 #: Labels of the steps of all pictures, and of those of hatching.

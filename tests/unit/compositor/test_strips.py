@@ -14,7 +14,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.strip_division import divide_into_strips, group_strips
 from rosy_addon.compositor.strips import FADE_ROWS, Strip, join_strips
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture

@@ -17,7 +17,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.compositor.target_tone import ReferenceRender, apply_tone_curve, target_tone
 from rosy_addon.field.generate import axis_field
-from rosy_addon.presets.store import load_preset, preset_keys
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

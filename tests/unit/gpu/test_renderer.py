@@ -34,12 +34,11 @@ from rosy_addon.gpu.field_kind import field_kinds
 from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, mesh_buffers_task, split_matrix
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.screen_box import is_empty, screen_box, union_box
-from rosy_addon.presets.store import load_preset
+from rosy_addon.preset_files.store import load_preset
 from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_tone import SurfaceTone
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 AXIS = (0.3, 0.2, 1.0)

@@ -9,7 +9,6 @@ from rosy_addon.gpu import select
 from rosy_addon.gpu.cpu_viewport import CpuViewportRenderer
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.progress import run_to_completion
-from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 REFUSED = {"members": "brute", "ibfv": "sheets"}

@@ -127,7 +127,7 @@ def test_small_pictures_start_no_process():
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the list of processes")
 def test_helpers_end_if_the_process_that_draws_is_killed():
-    program = f"""
+    program = """
 import sys
 sys.path[:0] = ["tests/unit", "tests/unit/worker"]
 import test_pool as t

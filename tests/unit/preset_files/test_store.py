@@ -19,9 +19,9 @@ from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.image_io.png import to_srgb_uint8
-from rosy_addon.presets import store
-from rosy_addon.presets.preview import PREVIEW_SIZE, draw_preview
-from rosy_addon.presets.store import (
+from rosy_addon.preset_files import store
+from rosy_addon.preset_files.preview import PREVIEW_SIZE, draw_preview
+from rosy_addon.preset_files.store import (
     MAX_DESCRIPTION_LENGTH,
     MAX_FILE_BYTES,
     MAX_NAME_LENGTH,

@@ -24,11 +24,17 @@ from ..image_io.png import write_png
 from ..settings import settings_of
 from .preview import draw_preview
 
-#: Folder of the shipped presets.
-SHIPPED_FOLDER = Path(__file__).resolve().with_name("shipped")
-
 #: Key of the preset with the default look.
 DEFAULT_KEY = "default"
+
+_PRESET_FOLDERS = [folder / "presets" for folder in Path(__file__).resolve().parents[1:3]]
+
+#: Folder of the shipped presets: inside the package where pip installed it, and beside the package
+#: in the extension and in the repository.
+SHIPPED_FOLDER = next(
+    (folder for folder in _PRESET_FOLDERS if (folder / f"{DEFAULT_KEY}.json").is_file()),
+    _PRESET_FOLDERS[0],
+)
 
 #: Maximum numbers of characters of a name and of a description, and of bytes of a preset file.
 MAX_NAME_LENGTH, MAX_DESCRIPTION_LENGTH, MAX_FILE_BYTES = 48, 200, 1 << 16

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.presets.store import SHIPPED_FOLDER, load_preset, preset_keys
+from rosy_addon.preset_files.store import SHIPPED_FOLDER, load_preset, preset_keys
 
 
 def test_shipped_presets_load():

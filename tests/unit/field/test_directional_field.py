@@ -208,7 +208,7 @@ def test_streaks_run_along_free_directions(method, angles):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", mainly(["sheets"], METHODS))
+@pytest.mark.parametrize("method", mainly(["sheets"], ["sheets", "members", "brute", "ibfv"]))
 def test_a_conjugate_field_of_another_library(method, shared_data):
     surface = read_mesh(shared_data / "meshes" / "cheburashka.off")
     field = read_field(shared_data / "fields" / "cheburashka-cf.rawfield", surface)

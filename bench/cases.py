@@ -14,7 +14,6 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, planar_pixel_field
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -39,7 +38,7 @@ def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:
     """Run the LIC stage: from a planar field and noise to the images of its members."""
     field, noise = plane(degree, size)
-    run_to_completion(METHODS[method](field, look, noise))
+    METHODS[method](field, look, noise)
 
 
 @lru_cache(maxsize=8)

@@ -25,7 +25,6 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
@@ -104,7 +103,7 @@ def _seen_field(path: Path, degree: int) -> PixelField:
 def _direction_errors(field: PixelField, method: str) -> np.ndarray:
     """(n,) angles in degrees between streaks and the members of a field, by the structure tensor."""
     look = Look(method=method)
-    images = run_to_completion(METHODS[method](field, look, look_noise(field, look)))
+    images = METHODS[method](field, look, look_noise(field, look))
     is_open = _frame(field.neighbor_mask == 0b111_111_111, field)
     inside = ndimage.binary_erosion(is_open, iterations=BORDER)
     first, errors = nearest_member(field, 0.0), []

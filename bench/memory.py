@@ -16,7 +16,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rosy_addon.image_io.png import write_png
-from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.picture_memory import picture_memory, view_coverage
 from rosy_addon.rendering.view_input import ViewInput
@@ -141,7 +140,7 @@ def estimate_and_draw(name: str) -> tuple[float, float]:
     estimate = picture_memory(view, view_coverage(view))
     Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     held = _resident_bytes("VmRSS")
-    rgba = (draw_picture(view)).rgba
+    rgba = draw_picture(view).rgba
     with TemporaryDirectory() as folder:
         write_png(Path(folder) / "picture.png", rgba)
     return estimate / 1e9, (_resident_bytes("VmHWM") - held) / 1e9

@@ -31,7 +31,6 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -114,9 +113,7 @@ def _measure_fields(fields: Sequence[PixelField], look: Look) -> Measurements:
     measurements = []
     for seed, field in zip(SEEDS, fields * len(SEEDS) if len(fields) == 1 else fields, strict=True):
         noise = look_noise(field, replace(look, seed=seed))
-        measurements.append(
-            _measure_images(field, run_to_completion(METHODS[look.method](field, look, noise)))
-        )
+        measurements.append(_measure_images(field, METHODS[look.method](field, look, noise)))
     return Measurements(
         *(
             np.mean([getattr(measured, name) for measured in measurements], axis=0)

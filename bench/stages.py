@@ -12,7 +12,6 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import METHODS, look_noise
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.corner_field import compute_corner_field
 from rosy_addon.projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from rosy_addon.projection.project import project
@@ -59,9 +58,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
         ),
         "  of which directions on screen": lambda: screen_jacobians(gbuffer),
         "  of which noise": lambda: look_noise(field, look),
-        "  of which streamlines": lambda: run_to_completion(
-            METHODS[look.method](field, look, noise)
-        ),
+        "  of which streamlines": lambda: METHODS[look.method](field, look, noise),
         "  of which shading": lambda: diffuse(gbuffer, look, ()),
     }
 

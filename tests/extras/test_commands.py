@@ -24,7 +24,6 @@ from rosy_addon.external.simulation_files import (
 )
 from rosy_addon.extras.film import SimulationFields
 from rosy_addon.field.array_field import SurfaceArrays, array_field
-from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
 

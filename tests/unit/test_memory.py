@@ -22,7 +22,6 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.progress import as_task, run_to_completion
 from rosy_addon.projection.camera import Camera
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.picture_memory import (
@@ -212,11 +211,11 @@ def test_the_cache_gives_its_memory_back(monkeypatch):
     view, cache = ball_view(), Cache()
     cache.put("an earlier picture", np.zeros(3))
     limit_memory(monkeypatch, 1e12)
-    run_to_completion(CpuRenderer(cache, keep_gbuffers=False).render_task(view))
+    draw_picture(view, cache, keep_gbuffers=False)
     assert cache.get("an earlier picture") is not None
     limit_memory(monkeypatch, 1e6)
     with pytest.raises(RosyError):
-        run_to_completion(CpuRenderer(cache).render_task(view))
+        draw_picture(view, cache)
     assert not len(cache)
 
 
@@ -251,10 +250,8 @@ def test_a_gif_is_refused_before_its_first_picture(tmp_path, monkeypatch, error_
     limit_memory(monkeypatch, 2e9)
     ball = cases.instance(1000, 4)
     views = turntable_views(ball, Look(), 500, (1000, 1000), (0, 0))
-    task = as_task(turntable, CpuRenderer(), views, 500, tmp_path / "a.gif", 24)
-    assert "a .gif of 500 pictures of 1000 x 1000 pixels needs about 2.2 GB" in error_of(
-        run_to_completion, task
-    )
+    message = error_of(turntable, draw_picture, views, 500, tmp_path / "a.gif", 24)
+    assert "a .gif of 500 pictures of 1000 x 1000 pixels needs about 2.2 GB" in message
     assert not list(tmp_path.iterdir())
 
 

@@ -19,7 +19,6 @@ from rosy_addon.field.representation import (
 )
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
@@ -89,7 +88,7 @@ def render_view(
     """Return the (side, side, 4) linear RGBA of a field as users draw it, with its singularities."""
     instance = MeshInstance(surface, np.eye(4), field)
     view_input = ViewInput((instance,), view(surface, angles, (side, side), 1), look)
-    return (draw_picture(view_input)).rgba
+    return draw_picture(view_input).rgba
 
 
 def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:

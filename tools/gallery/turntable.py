@@ -22,4 +22,4 @@ def write() -> None:
     instance = MeshInstance(monkey, np.eye(4), generate(monkey, "smoothest", 4))
     views = turntable_views(instance, LOOK, 24, (240, 240), (-26.0, 10.0))
     path = ROOT / "docs" / "images" / "turntable.gif"
-    turntable(CpuRenderer(), views, 24, path, 10)
+    turntable(draw_picture, views, 24, path, 10)

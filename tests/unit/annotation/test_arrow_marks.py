@@ -25,7 +25,6 @@ from rosy_addon.field.directional_field import field_directions, field_from_dire
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import (
     look_at,
     orbit_camera,
@@ -33,7 +32,6 @@ from rosy_addon.projection.camera import (
     perspective_camera,
 )
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.band_workers import BandWorkers
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -248,15 +246,14 @@ def test_an_arrowhead_has_its_shape_and_its_outline():
 
 
 def rendered(view, **options):
-    return run_to_completion(CpuRenderer(**options).render_task(view)).rgba
+    return draw_picture(view, **options).rgba
 
 
 def test_processes_and_supersampling_draw_the_same_arrowheads():
     instance = instance_of(globe(48, 96), 3)
     looks = [Look(length=8, arrows=40.0, supersampling=samples) for samples in (1, 2)]
     views = [ViewInput((instance,), CAMERA, look) for look in looks]
-    with BandWorkers(2) as workers:
-        np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=workers))
+    np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=2))
     changed = []
     for view in views:
         plain = replace(view, look=replace(view.look, arrows=0.0))

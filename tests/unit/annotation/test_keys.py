@@ -27,7 +27,6 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture_key import fixed_color_range, picture_key
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

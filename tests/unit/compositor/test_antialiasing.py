@@ -17,7 +17,6 @@ from rosy_addon.compositor.look_units import antialiased_look, supersampled_look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.presets.store import load_preset
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project

@@ -12,7 +12,7 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import METHODS, look_noise
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
-from rosy_addon.projection.corner_field import compute_corner_field
+from rosy_addon.projection.corner_field import field_at_corners
 from rosy_addon.projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from rosy_addon.projection.project import project
 from rosy_addon.projection.rasterizer import rasterize
@@ -47,7 +47,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     clip = points @ (camera.projection @ camera.view).T
     triangle = instance.surface.triangle_vertex
     return {
-        "average the field at the corners, once per mesh": lambda: compute_corner_field(
+        "average the field at the corners, once per mesh": lambda: field_at_corners(
             instance.surface, instance.matrix, instance.field, look.display
         ),
         "project": lambda: project([instance], camera, look.display, cache),

@@ -17,7 +17,7 @@ from ..cache import Cache
 from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..image_io.png import compute_png, read_png, to_srgb_uint8, write_png
+from ..image_io.png import png_bytes, read_png, to_srgb_uint8, write_png
 from ..presets.store import default_user_folder, load_preset, preset_files, read_preset
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
@@ -95,7 +95,7 @@ class Picture:
         return array if dtype is None else array.astype(dtype)
 
     def _repr_png_(self) -> bytes:
-        return compute_png(self.rgba)
+        return png_bytes(self.rgba)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an 8-bit ``.png`` file.

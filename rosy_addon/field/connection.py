@@ -100,7 +100,6 @@ def build_connection(surface: Surface) -> Connection:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     twin[a], twin[b] = b, a
 
-    report(0.3, label)
     with progress(0.3, 0.5, label):
         corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
     # In counter-clockwise order around a vertex, the previous corner lies across the edge that

@@ -10,7 +10,7 @@ from ..errors import RosyError
 from ..progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .connection import build_connection, laplacian
-from .curvature import compute_magnitude
+from .curvature import face_magnitude
 from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
@@ -75,7 +75,7 @@ def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyF
         field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        magnitude = compute_magnitude(surface, magnitude)
+        magnitude = face_magnitude(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 
 
@@ -213,7 +213,6 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     rhs = complex_bincount(
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
-    report(0.15, "smoothing the field")
     with progress(0.15, 0.2):
         matrix = laplacian(connection, degree)
     report(0.2, "smoothing the field")

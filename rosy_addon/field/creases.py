@@ -63,7 +63,7 @@ class Creases(NamedTuple):
     chain: np.ndarray
 
 
-def compute_creases(surface: Surface, crease_angle: float) -> Creases:
+def find_creases(surface: Surface, crease_angle: float) -> Creases:
     """Find the creases of a mesh.
 
     An edge is strong if the angle between the normals of its faces is at least the crease angle, and
@@ -94,7 +94,6 @@ def compute_creases(surface: Surface, crease_angle: float) -> Creases:
     if angle.max(initial=0.0) < crease_angle:
         return none
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
-    report(0.4, STEP_LABEL)
     with progress(0.4, 0.8, STEP_LABEL):
         normals, noise_angle = filtered_normals(surface, edges, region)
     ends = edges.ends[edges.interior]

@@ -117,7 +117,6 @@ def face_graph(
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
-    report(0.8, LABEL)
     with progress(0.8, 0.9):
         corner_angle = signed_corner_angles(surface, x, y)
     report(0.9, LABEL)

@@ -63,7 +63,6 @@ def feature_curvature(surface: Surface) -> np.ndarray:
             surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
         )
     x, y = face_frames(surface)
-    report(0.45, "measuring features")
     with progress(0.45, 0.55, "measuring features"):
         mean, deviator = bounded_curvature(surface, fans, x, y)
     noisy = replace(surface, vertices=surface.vertices + noise)

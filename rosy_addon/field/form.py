@@ -98,7 +98,6 @@ def form(surface: Surface, degree: int) -> RosyField:
     weight = (confidence / REACH) ** 2
     report(0.5, "finding guides")
     edge_guides = guides_from_edges(surface, ends, degree)
-    report(0.5, "finding guides")
     at_edge = edge_guides.any(axis=1)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     if not guides.any():
@@ -132,7 +131,6 @@ def _curvature_guides(
         From 0 to 1.
     """
     x, y = face_frames(surface)
-    report(0.02, "computing principal directions")
     with progress(0.02, 0.1):
         fans = smooth_fans(
             surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
@@ -149,7 +147,6 @@ def _curvature_guides(
         connection = build_connection(surface)
     report(0.38, "averaging curvature")
     averages = SurfaceAverages(surface, connection, x, y)
-    report(0.38, "averaging curvature")
     with progress(0.38, 0.4):
         matrix = laplacian(connection, 2)
     with progress(0.4, 0.42):

@@ -28,8 +28,8 @@ DIRECT_SOLVE_SIZE = 400
 #: Rows processed at once, so that their entries fit in the cache of a core.
 BLOCK_ROWS = 1 << 12
 
-#: Blocks of rows of a new matrix that are assembled at once.
-BLOCKS_PER_STEP = 4
+#: Blocks of rows of a new matrix that are assembled between two reports.
+BLOCKS_PER_REPORT = 4
 
 #: Entries below this fraction of the largest off-diagonal entry of both rows are weak: they do not
 #: connect unknowns to an aggregate.
@@ -198,7 +198,7 @@ def _assemble_by_rows(
     bits = int(column_count).bit_length()
     row_counts, index_blocks, value_blocks = [], [], []
     for first in range(0, len(matrix), BLOCK_ROWS):
-        if first % (BLOCKS_PER_STEP * BLOCK_ROWS) == 0:
+        if first % (BLOCKS_PER_REPORT * BLOCK_ROWS) == 0:
             report(first / len(matrix), "building multigrid levels")
         last = min(first + BLOCK_ROWS, len(matrix))
         row, column, value = entries(slice(matrix.indptr[first], matrix.indptr[last]))

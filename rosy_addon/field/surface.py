@@ -246,12 +246,10 @@ def smooth_fans(
     Without a sharp angle, the result does not depend on the vertex positions.
     """
     label = "finding smooth edges"
-    report(0.0, label)
     with progress(0.0, 0.5, label):
         pairs = _smooth_corner_pairs(
             vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
         )
-    report(0.5, label)
     with progress(0.5, 1.0, label):
         return connected_components(len(corner_vertex), pairs)
 

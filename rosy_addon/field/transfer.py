@@ -48,7 +48,6 @@ def transfer_field(
     RosyError
         If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
     """
-    report(0.0, "transferring the field")
     with progress(0.0, 0.1):
         points = _face_points(target)
     with progress(0.1, 0.9):

@@ -18,7 +18,7 @@ CHUNK_SIZE = 512
 LABEL = "triangulating the mesh"
 
 #: Faces whose corners are compared in a step.
-FACES_PER_STEP = 1 << 14
+FACES_PER_BLOCK = 1 << 14
 
 
 def triangulate(
@@ -106,7 +106,7 @@ def _fan_apexes(
     needs_ears = np.zeros(len(faces), dtype=bool)
     for count in np.unique(size):
         same_size = np.flatnonzero(size == count)
-        block_size = max(FACES_PER_STEP * 4 // int(count), 1)
+        block_size = max(FACES_PER_BLOCK * 4 // int(count), 1)
         for start in range(0, len(same_size), block_size):
             report(0.7 * start / len(same_size), LABEL)
             group = same_size[start : start + block_size]

@@ -170,7 +170,6 @@ def least_angles(
     present: np.ndarray | float,
 ) -> np.ndarray:
     """(I,) angles of least squares, divided by the conductances; see `turning_angles`."""
-    report(0.0, LABEL)
     with progress(0.0, 0.5):
         solver = _potential_solver(graph)
     share = 0.5 / (len(loops) + 1)

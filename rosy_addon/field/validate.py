@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import RosyError, counted
 from ..progress import progress, report
 from .blocks import by_rows, row_blocks
-from .corner_fans import compute_corner_rotations, corner_angles
+from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
     closest_rosy,
     detect_families,
@@ -109,7 +109,6 @@ def validated_field(
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
-    report(0.0, LABEL)
     with progress(0.0, 0.4, LABEL):
         normal = tangent_normals(surface, domain)
     if domain == "face":
@@ -218,13 +217,11 @@ def _average_directions_to_faces(
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
     w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-    report(0.0, LABEL)
     with progress(0.0, 0.2):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
     face_x, face_y = face_frames(surface)
-    report(0.3, LABEL)
     with progress(0.3, 0.5):
-        rotation = compute_corner_rotations(
+        rotation = corner_rotations(
             surface.face_normal, face_x, surface.corner_face, normal[surface.corner_vertex], LABEL
         )
 
@@ -413,7 +410,7 @@ def _average_to_faces(
     report(0.2, LABEL)
     corner_normal = normal[surface.corner_vertex]
     with progress(0.2, 0.8):
-        rotation = compute_corner_rotations(
+        rotation = corner_rotations(
             surface.face_normal, x, surface.corner_face, corner_normal, LABEL
         )
     mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.creases import compute_creases
+from ..field.creases import find_creases
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
 from ..progress import progress, report
@@ -72,7 +72,7 @@ def outline(
         pixels. Without a camera there are no silhouettes.
     crease_angle : float
         Smallest angle in radians between the normals of the two faces at a crease; see
-        `field.creases.compute_creases`.
+        `field.creases.find_creases`.
 
     Returns
     -------
@@ -90,9 +90,8 @@ def outline(
     vertex = surface.triangle_vertex.ravel()
     edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    report(0.3, label)
     with progress(0.3, 0.7, label):
-        is_crease = _are_pairs(vertex, a, compute_creases(surface, crease_angle).ends)
+        is_crease = _are_pairs(vertex, a, find_creases(surface, crease_angle).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])

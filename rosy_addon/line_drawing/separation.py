@@ -68,7 +68,6 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
         Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
     """
     label = "separating strokes"
-    report(0.0, label)
     with progress(0.0, 0.3, label):
         suspect = _suspect_points(mesh, strokes)
     if not suspect.any():
@@ -80,7 +79,6 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     )
     report(0.3, label)
     refined, source = _refine(strokes.select(candidates), np.isin(point, near_suspect))
-    report(0.4, label)
     with progress(0.4, 0.8, label):
         too_close = _too_close(mesh, refined, suspect[point][source], strokes.length[candidates])
     if not too_close.any():

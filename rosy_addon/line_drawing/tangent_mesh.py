@@ -307,7 +307,6 @@ def build_tangent_mesh(
             harmonics.append((channel[1], values))
         else:
             family_z = values.sum(axis=1)
-    report(0.6, label)
     with progress(0.6, 1.0):
         neighbor, neighbor_edge, edge_transport = _adjacency(
             surface,

@@ -240,7 +240,6 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
     flat_corners = corners.reshape(-1, 3)
     clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
     indices = np.arange(len(flat_corners), dtype=np.int32).reshape(-1, 3)
-    report(0.2, label)
     with progress(0.2, 0.8, label):
         fragments = rasterize(clip, indices, camera.width, camera.height)
     triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)

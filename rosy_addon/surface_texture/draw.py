@@ -34,11 +34,11 @@ from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
 from .direction_maps import direction_map
 from .hatching import hatching
-from .margin import compute_margin
+from .margin import fill_margin
 from .texel_field import texel_field
 from .texel_noise import texel_noise
 from .texel_surface import TexelSurface
-from .texels import Texels, TextureFrame, compute_texels, texture_frame
+from .texels import Texels, TextureFrame, rasterize_charts, texture_frame
 
 #: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
 #: mesh fills has lines of about the same width.
@@ -210,7 +210,7 @@ def draw_texture(
     frame = texture_frame(charts, size, name, is_udim)
     _check_texture_memory(frame, charts, mesh, look)
     with progress(0.1, 0.15):
-        texels = compute_texels(charts, frame, name)
+        texels = rasterize_charts(charts, frame, name)
     step = step_length(mesh, charts, texels)
     crease_angle = None if look.cross_creases else look.crease_angle
     with progress(0.15, 0.3):
@@ -220,17 +220,17 @@ def draw_texture(
     surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"
     if is_direction:
-        pixels_task, is_data = partial(direction_map, on, content, look.guiding_angle), True
+        draw, is_data = partial(direction_map, on, content, look.guiding_angle), True
     elif is_hatched(look):
-        pixels_task = partial(hatching, on, field, surface_look, look.guiding_angle, lights, cache)
+        draw = partial(hatching, on, field, surface_look, look.guiding_angle, lights, cache)
         is_data = lights is None
     else:
-        pixels_task, is_data = partial(_colors, on, field, surface_look), False
+        draw, is_data = partial(_colors, on, field, surface_look), False
     with progress(0.3, 0.95):
-        pixels = pixels_task()
+        pixels = draw()
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
-        image = compute_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
+        image = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
     if image.shape[2] == 4:
         return Texture(frame, image, texels.overlap, is_data, mesh.family_count)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)

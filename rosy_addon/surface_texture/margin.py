@@ -17,7 +17,7 @@ from .texels import TextureFrame
 STEP_LABEL = "filling the margin"
 
 
-def compute_margin(
+def fill_margin(
     frame: TextureFrame,
     field: PixelField,
     color: np.ndarray,

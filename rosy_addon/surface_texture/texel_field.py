@@ -89,7 +89,7 @@ def texel_field(
     with progress(0.3, 0.7):
         mask = _neighbor_masks(mesh, charts, texels, z != 0, crease_angle)
     with progress(0.7, 1.0):
-        seam_steps = _compute_seam_steps(mesh, charts, texels, mask, z != 0)
+        seam_steps = _find_seam_steps(mesh, charts, texels, mask, z != 0)
     return PixelField(
         degree=degree,
         width=texels.frame.width,
@@ -178,7 +178,7 @@ def _neighbor_masks(
     return masks
 
 
-def _compute_seam_steps(
+def _find_seam_steps(
     mesh: TangentMesh, charts: UvCharts, texels: Texels, mask: np.ndarray, defined: np.ndarray
 ) -> SeamSteps:
     """Trace the steps that `mask` does not have along the surface."""

@@ -150,7 +150,7 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
     )
 
 
-def compute_texels(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
+def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
     """Find the texels whose centers are on the surface.
 
     Where charts overlap, a texel shows the triangle with the smallest index of the first tile.

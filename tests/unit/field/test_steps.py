@@ -24,8 +24,8 @@ def mesh():
 @pytest.fixture
 def small_blocks(monkeypatch):
     for module in (blocks, text_rows, plain, obj, fieldgen):
-        monkeypatch.setattr(module, "ROWS_PER_STEP", BLOCK)
-    monkeypatch.setattr(text_rows, "WORDS_PER_STEP", BLOCK)
+        monkeypatch.setattr(module, "ROWS_PER_BLOCK", BLOCK)
+    monkeypatch.setattr(text_rows, "WORDS_PER_BLOCK", BLOCK)
     monkeypatch.setattr(surface, "BLOCK_ELEMENTS", BLOCK)
 
 

@@ -92,9 +92,7 @@ class _TriangleGrid:
 
     def fill(self) -> None:
         """Find the cells of the triangles. Call this first."""
-        label = "finding the closest faces"
         low, high = self._low, self._high
-        report(0.0, label)
         first = self._cells_of(low)
         last = self._cells_of(high)
         is_large = (last - first).max(axis=1) >= MAX_CELLS_PER_AXIS

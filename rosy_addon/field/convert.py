@@ -64,18 +64,21 @@ def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyF
     """
     report(0.0, "converting the field")
     if conversion.degree is not None:
-        field = change_degree(surface, field, conversion.degree)
-        report(0.0, "converting the field")
+        with progress(0.0, 0.1):
+            field = change_degree(surface, field, conversion.degree)
     if conversion.rotation:
         field = rotate_field(surface, field, conversion.rotation)
     if conversion.smoothing_length >= MIN_SMOOTHING_LENGTH:
         time = (conversion.smoothing_length * surface.extent) ** 2
-        field = diffuse_field(surface, field, max(time, np.finfo(np.float64).tiny))
+        with progress(0.1, 0.5):
+            field = diffuse_field(surface, field, max(time, np.finfo(np.float64).tiny))
     if conversion.pair_distance > 0:
-        field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
+        with progress(0.5, 0.8):
+            field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        magnitude = face_magnitude(surface, magnitude)
+        with progress(0.8, 1.0):
+            magnitude = face_magnitude(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 
 

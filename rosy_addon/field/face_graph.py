@@ -203,7 +203,6 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     front, done = roots, 0
     while len(front):
         done += len(front)
-        report(done / node_count, LABEL)
         counts = start[front + 1] - start[front]
         entry = concatenated_ranges(start[front], counts)
         entry = entry[~is_reached[neighbor[entry]]]

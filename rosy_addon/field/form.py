@@ -158,8 +158,9 @@ def _curvature_guides(
     for index, scale in enumerate(SCALES):
         area = scale**2
         start = 0.45 + 0.1 * index
-        with progress(start):
+        with progress(start, start + 0.05):
             z = averages.smooth(matrix, area, deviators[0], z)
+        with progress(start + 0.05, start + 0.1):
             z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
         # The angle of a cross is a quarter of that of the square of a deviator.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
@@ -167,10 +168,10 @@ def _curvature_guides(
         clear = averages.mass * modulus / (modulus + 1)
         if weighted_median(turn, clear) <= MAX_TURN:
             break
-    with progress(0.85):
+    with progress(0.85, 0.9):
         mean = averages.smooth(flat_matrix, area, averages.node_sums(mean, 0))
     power = averages.mass * np.abs(z_noise) ** 2
-    with progress(0.9):
+    with progress(0.9, 0.95):
         power = averages.smooth(flat_matrix, 4 * area, power)
     report(0.95, "averaging curvature")
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2

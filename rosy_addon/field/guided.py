@@ -90,11 +90,11 @@ def guided_or_smoothest(
     """
     if weight is None:
         weight, hard = 0.0, guides.any(axis=1)
-    with progress(0.0, 0.6):
+    with progress(0.0, 0.8):
         field = guided_field(surface, degree, guides, weight, hard, tolerance)
     unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
     if not unguided.any():
         return field
-    with progress(0.6, 1.0):
+    with progress(0.8, 1.0):
         smoothest = smoothest_field(surface, degree)
     return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))

@@ -417,31 +417,27 @@ def _graph(
     report(0.5, STEP_LABEL)
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
-    with progress(0.5, 1.0):
-        return _graph_of_entries(
-            covering.node_count,
-            np.concatenate([head_node, tail_node]),
-            np.concatenate([tail_node, head_node]),
-            np.concatenate([a, a.conj()]),
-            np.concatenate([b, b]),
-        )
+    return _graph_of_entries(
+        covering.node_count,
+        np.concatenate([head_node, tail_node]),
+        np.concatenate([tail_node, head_node]),
+        np.concatenate([a, a.conj()]),
+        np.concatenate([b, b]),
+    )
 
 
 def _graph_of_entries(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> _Graph:
     """A graph of entries in any order; those between the same nodes add up."""
-    report(0.0, STEP_LABEL)
     entry = np.flatnonzero(row != column)
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)
-    report(0.4, STEP_LABEL)
     entry = entry[order]
     first = _run_starts(key)
     if len(first):
         a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
     row, column = np.divmod(key[first], max(node_count, 1))
-    report(1.0, STEP_LABEL)
     return _Graph(node_count, row, column, a[: len(row)], b[: len(row)])
 
 
@@ -450,12 +446,10 @@ def _smoothest(graph: _Graph) -> np.ndarray:
     levels = [graph]
     clusterings: list[_Clustering] = []
     while graph.node_count > MIN_LEVEL_NODES and len(graph.row):
-        with progress(0.2):
-            clustering = _clustering(graph)
+        clustering = _clustering(graph)
         if clustering.count * MIN_COARSENING > graph.node_count:
             break
-        with progress(0.2):
-            graph = _coarse_graph(graph, clustering)
+        graph = _coarse_graph(graph, clustering)
         clusterings.append(clustering)
         levels.append(graph)
     z = np.ones(graph.node_count, dtype=np.complex128)
@@ -512,7 +506,6 @@ class _Clustering(NamedTuple):
 
 def _clustering(graph: _Graph) -> _Clustering:
     """Group nodes into pairs and triples along their strongest edges."""
-    report(0.0, STEP_LABEL)
     count = graph.node_count
     # A hash makes the strengths distinct, so that many nodes find a partner at once.
     low, high = np.minimum(graph.row, graph.column), np.maximum(graph.row, graph.column)
@@ -522,7 +515,6 @@ def _clustering(graph: _Graph) -> _Clustering:
     nodes = np.arange(count)
     entry = np.arange(len(graph.row))
     for _ in range(MATCHING_ROUNDS):
-        report(0.2, STEP_LABEL)
         free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
         entry = entry[free]
         if not len(entry):
@@ -534,7 +526,6 @@ def _clustering(graph: _Graph) -> _Clustering:
         mutual = choice[choice[chooser]] == chooser
         partner[chooser[mutual]] = choice[chooser[mutual]]
         link[chooser[mutual]] = chosen[mutual]
-    report(0.8, STEP_LABEL)
     # The first node of a pair is the root; the other and single neighbors of the root follow it.
     is_root = (partner < 0) | (partner > nodes)
     root = np.where(is_root, nodes, partner)
@@ -567,7 +558,6 @@ def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) 
 
 def _coarse_graph(graph: _Graph, clustering: _Clustering) -> _Graph:
     """The graph of clusters: the entries in terms of their values."""
-    report(0.0, STEP_LABEL)
     cluster, p, q, count = clustering
     row, column = cluster[graph.row], cluster[graph.column]
     entry = np.flatnonzero(row != column)
@@ -575,8 +565,6 @@ def _coarse_graph(graph: _Graph, clustering: _Clustering) -> _Graph:
     a, b = graph.a[entry], graph.b[entry]
     # After the map of the column.
     a, b = a * p[tail] + b * q[tail].conj(), a * q[tail] + b * p[tail].conj()
-    report(0.3, STEP_LABEL)
     # Before the inverse map of the row: that of p is its conjugate, that of q is the map itself.
     a, b = p[head].conj() * a + q[head] * b.conj(), p[head].conj() * b + q[head] * a.conj()
-    with progress(0.5, 1.0):
-        return _graph_of_entries(count, row[entry], column[entry], a, b)
+    return _graph_of_entries(count, row[entry], column[entry], a, b)

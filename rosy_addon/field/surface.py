@@ -520,7 +520,6 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
     root = np.arange(count, dtype=np.int32)
     a, b = pairs[:, 0], pairs[:, 1]
     while len(a):
-        report(1 - len(a) / len(pairs), "finding connected parts")
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
         _lower(root, high, low)
         while True:

@@ -80,7 +80,6 @@ def outline(
         World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
     label = "finding outlines"
-    report(0.0, label)
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     points = instance.world_points()[surface.triangle_vertex]
@@ -88,7 +87,8 @@ def outline(
     flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
     corners = _Corners(points, normals[surface.triangles], flat)
     vertex = surface.triangle_vertex.ravel()
-    edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
+    with progress(0.0, 0.3, label):
+        edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.3, 0.7, label):
         is_crease = _are_pairs(vertex, a, find_creases(surface, crease_angle).ends)

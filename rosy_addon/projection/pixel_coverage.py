@@ -102,7 +102,6 @@ def other_samples(
     count = len(sampled.other_entry)
     x, y, depth = np.empty((3, count), dtype=np.float32)
     for block in pixel_blocks(count):
-        report(block.start / count, STEP_LABEL)
         index = sampled.other_sample[block]
         x[block], y[block] = _centers(index, frame.width, samples)
         z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])

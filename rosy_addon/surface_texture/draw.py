@@ -297,7 +297,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
         noise = texel_noise(on, look)
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
-    with progress(0.95):
+    with progress(0.95, 0.97):
         layer = compute_layer(field, look, images)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
@@ -308,6 +308,6 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
         field = replace(field, map_position=map_positions(values, low, scale))
     color = np.empty((len(field.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(color)):
-        report(0.95 + 0.05 * block.start / len(color), "drawing the colors")
+        report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
         color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
     return color

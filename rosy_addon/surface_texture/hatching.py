@@ -94,9 +94,9 @@ def thresholds(
         order = line_order(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
     wobble_angle = None
     if has_wobble(look):
-        with progress(0.1, 0.15):
+        with progress(0.1, 0.13):
             wobble_angle = _wobble_angle(on, look)
-        with progress(0.15):
+        with progress(0.13, 0.15):
             field = rotate_pixel_field(field, np.float32(look.wobble) * wobble_angle)
     with progress(0.15, 0.85):
         images, modulation = _lines(on, field, look, wobble_angle, cache)
@@ -219,7 +219,8 @@ def _lines(
     else:
         with progress(0.3, 0.8):
             (images,) = lic_lengths(field, [look], noise)
-    look_streak_statistics(look)
+    with progress(0.8, 0.9):
+        look_streak_statistics(look)
     if undefined:
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
@@ -229,7 +230,7 @@ def _lines(
         seen_noise = unconvolved_noise(noise, look)
         undirected = undirected_texture(field, seen_noise, grain)
     if has_paper_grain(look):
-        with progress(0.8, 1.0):
+        with progress(0.9, 1.0):
             paper_grain = _paper_grain(on, field, look)
     return images, LineModulation(
         break_images=break_images,

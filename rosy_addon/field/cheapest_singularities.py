@@ -196,5 +196,4 @@ def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarr
     row = np.concatenate([target, source, faces]).astype(np.intp)
     column = np.concatenate([source, target, faces]).astype(np.intp)
     value = np.concatenate([-weight * transport, -weight * transport.conj(), diagonal])
-    with progress(0.0, 1.0):
-        return from_coo(row, column, value, count, count)
+    return from_coo(row, column, value, count, count)

@@ -74,8 +74,7 @@ class Combing:
         """Solve the whole system. Without any guide, the field stays."""
         if not self.guides.any():
             return
-        with progress(0.0, 0.1):
-            self._node_guides = self._guides_at_nodes()
+        self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
             self._z = self.system.solve(self._node_guides, self._z, tolerance)
         report(0.95, "averaging the field on the faces")

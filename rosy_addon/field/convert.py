@@ -216,8 +216,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     rhs = complex_bincount(
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
-    with progress(0.15, 0.2):
-        matrix = laplacian(connection, degree)
+    matrix = laplacian(connection, degree)
     report(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)

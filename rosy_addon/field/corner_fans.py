@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import report
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
 from .representation import complex_bincount, power
@@ -94,8 +93,7 @@ def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndar
     """
     points = surface.vertices if points is None else points
     angles = np.empty(len(surface.corner_vertex))
-    for faces, corners, starts in face_blocks(surface.face_start):
-        report(faces.start / surface.face_count, "measuring angles")
+    for _, corners, starts in face_blocks(surface.face_start):
         positions, following = points[surface.corner_vertex[corners]], next_corners(starts)
         to_next = positions[following] - positions
         to_previous = np.empty_like(to_next)

@@ -126,8 +126,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
             smooth_surface.corner_normal,
             label,
         )
-    with progress(0.68, 0.7, label):
-        weights = corner_angles(smooth_surface)
+    weights = corner_angles(smooth_surface)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         report(0.7 + 0.1 * index, label)
         z = smooth_face_values(smooth_surface, z, rotation, degree, weights)

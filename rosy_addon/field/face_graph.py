@@ -117,8 +117,7 @@ def face_graph(
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
-    with progress(0.8, 0.9):
-        corner_angle = signed_corner_angles(surface, x, y)
+    corner_angle = signed_corner_angles(surface, x, y)
     report(0.9, LABEL)
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
     node_component = np.zeros(len(is_interior), dtype=component.dtype)

@@ -54,10 +54,8 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         edges = build_edges(surface.corner_vertex, surface.face_start)
     with progress(0.1, 0.25):
         normals, noise_angle = filtered_normals(surface, edges)
-    with progress(0.25, 0.3):
-        ends = salient_edges(surface, edges, normals, noise_angle)
-    with progress(0.3, 0.35):
-        noise = noise_sample(surface, edges, noise_angle)
+    ends = salient_edges(surface, edges, normals, noise_angle)
+    noise = noise_sample(surface, edges, noise_angle)
     with progress(0.35, 0.45):
         fans = smooth_fans(
             surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
@@ -76,11 +74,9 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     with progress(0.65, 0.75, "measuring features"):
         connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, x, y)
-    with progress(0.75, 0.76):
-        scalar = laplacian(connection, 0)
+    scalar = laplacian(connection, 0)
     scalar = scalar.with_values(scalar.data.real.astype(np.float32))
-    with progress(0.76, 0.8):
-        line = laplacian(connection, 2)
+    line = laplacian(connection, 2)
     line = line.with_values(line.data.astype(np.complex64))
     area = SCALE**2
     results = []

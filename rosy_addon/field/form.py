@@ -89,10 +89,8 @@ def form(surface: Surface, degree: int) -> RosyField:
         edges = build_edges(surface.corner_vertex, surface.face_start)
     with progress(0.04, 0.1):
         normals, noise_angle = filtered_normals(surface, edges)
-    with progress(0.1, 0.12, "finding sharp edges"):
-        ends = salient_edges(surface, edges, normals, noise_angle)
-    with progress(0.12, 0.15):
-        noise = noise_sample(surface, edges, noise_angle)
+    ends = salient_edges(surface, edges, normals, noise_angle)
+    noise = noise_sample(surface, edges, noise_angle)
     with progress(0.15, 0.5):
         guides, confidence = _curvature_guides(surface, degree, ends, noise)
     weight = (confidence / REACH) ** 2
@@ -147,10 +145,8 @@ def _curvature_guides(
         connection = build_connection(surface)
     report(0.38, "averaging curvature")
     averages = SurfaceAverages(surface, connection, x, y)
-    with progress(0.38, 0.4):
-        matrix = laplacian(connection, 2)
-    with progress(0.4, 0.42):
-        flat_matrix = laplacian(connection, 0)
+    matrix = laplacian(connection, 2)
+    flat_matrix = laplacian(connection, 0)
     matrix = matrix.with_values(matrix.data.astype(np.complex64))
     flat_matrix = flat_matrix.with_values(flat_matrix.data.real.astype(np.float32))
     deviators = averages.node_sums(deviator, 2), averages.node_sums(deviator_noise - deviator, 2)

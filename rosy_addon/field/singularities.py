@@ -66,8 +66,7 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     # around its tail from b to a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
-    with progress(0.8, 0.9, label):
-        corner_angles = signed_corner_angles(surface, x, y)
+    corner_angles = signed_corner_angles(surface, x, y)
     angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
     report(0.9, label)
     angle_sum = angle_sum + angle_defect
@@ -119,8 +118,7 @@ def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularit
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))
-    for faces, corners, starts in face_blocks(surface.face_start):
-        report(faces.start / surface.face_count, "measuring angles")
+    for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
         edge = points[following] - points
         face = surface.corner_face[corners]

@@ -82,8 +82,7 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
     report(0.0, "building the connection Laplacian")
     mass = connection.positive_mass
     shift = spectral_shift(mass)
-    with progress(0.05, 0.1):
-        matrix = laplacian(connection, degree, shift)
+    matrix = laplacian(connection, degree, shift)
     with progress(0.1, 1.0):
         z, energy = eigenproblem(matrix, mass, connection.component)
     return z, energy - shift

@@ -108,7 +108,6 @@ def _fan_apexes(
         same_size = np.flatnonzero(size == count)
         block_size = max(FACES_PER_BLOCK * 4 // int(count), 1)
         for start in range(0, len(same_size), block_size):
-            report(0.7 * start / len(same_size), LABEL)
             group = same_size[start : start + block_size]
             corners = face_start[faces[group]][:, None] + np.arange(count)
             sine = _corner_sines(vertices[corner_vertex[corners]])

@@ -109,8 +109,7 @@ def validated_field(
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
-    with progress(0.0, 0.4, LABEL):
-        normal = tangent_normals(surface, domain)
+    normal = tangent_normals(surface, domain)
     if domain == "face":
         with progress(0.4, 1.0):
             return RosyField(
@@ -168,8 +167,7 @@ def validated_directions(
     count_matches = domain is not None and count == _element_count(surface, domain)
     are_rosys = True
     if count_matches:
-        with progress(0.1, 0.2, LABEL):
-            normal = tangent_normals(surface, domain)
+        normal = tangent_normals(surface, domain)
         for rows in row_blocks(count):
             report(0.2 + 0.1 * rows.start / count, LABEL)
             x, y = tangent_frame(normal[rows])
@@ -268,7 +266,6 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
         on vertices without a face.
     """
     surface = surface.in_rest_shape()
-    report(0.0, "computing normals")
     if domain == "face":
         return surface.face_normal
     return vertex_normals(surface)
@@ -285,13 +282,9 @@ def vertex_normals(surface: Surface) -> np.ndarray:
         Unit normals; zero on vertices without a face.
     """
     count = len(surface.vertices)
-    label = "computing normals"
-    with progress(0.0, 0.5, label):
-        angles = corner_angles(surface)
+    angles = corner_angles(surface)
     face_normal = surface.face_normal
-    report(0.7, label)
     weighted = face_normal[surface.corner_face] * angles[:, None]
-    report(0.8, label)
     columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
     return normalize(np.stack(columns, axis=1))
 

@@ -256,17 +256,14 @@ def _aligned(
     """
     averages = refined.averages
     connection = averages.connection
-    with progress(0.0, 0.1):
-        laplacian_result = laplacian(connection, degree)
-    laplacian_result = laplacian_result.with_values(laplacian_result.data.astype(np.complex64))
+    matrix = laplacian(connection, degree)
+    matrix = matrix.with_values(matrix.data.astype(np.complex64))
     nodes = None
     for number, length in enumerate(lengths):
-        done = 0.1 + 0.9 * number / len(lengths)
-        report(done, STEP_LABEL)
         snapped = power(nearest_member(_unit_root(first, degree), z, z_degree), degree)
         sums = averages.node_sums(snapped, degree)
-        with progress(done, label=STEP_LABEL):
-            nodes = averages.smooth(laplacian_result, length**2, sums, nodes)
+        with progress(number / len(lengths), (number + 1) / len(lengths), STEP_LABEL):
+            nodes = averages.smooth(matrix, length**2, sums, nodes)
         first = averages.face_means(nodes, degree)
     angle = averages.frame_angle.reshape(-1, 3)
     corners = nodes[connection.corner_node].reshape(-1, 3) * np.exp(1j * degree * angle)

@@ -102,11 +102,9 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     """
     label = "averaging the field at the vertices"
     count = len(surface.vertices)
-    with progress(0.0, 0.2, label):
-        angle = corner_angles(surface)
+    angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
-    with progress(0.2, 0.5, label):
-        normal = vertex_normals(surface)
+    normal = vertex_normals(surface)
     report(0.5, label)
     face_x, face_y = face_frames(surface)
     report(0.6, label)

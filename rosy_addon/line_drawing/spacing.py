@@ -42,10 +42,14 @@ class LightSource(Protocol):
         Radiance of a white surface that faces the light; for a point light, at distance 1.
     """
 
-    kind: str
-    vector: np.ndarray
-    colour: np.ndarray
-    strength: float
+    @property
+    def kind(self) -> str: ...
+    @property
+    def vector(self) -> np.ndarray: ...
+    @property
+    def colour(self) -> np.ndarray: ...
+    @property
+    def strength(self) -> float: ...
 
 
 def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:

@@ -16,7 +16,7 @@ from .surface import Surface, build_edges, connected_components, next_corners
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4
 
-#: Label of all steps.
+#: Label of the progress.
 LABEL = "placing the singularities"
 
 

@@ -33,7 +33,7 @@ MAX_ROUNDS = 12
 #: defined.
 REGULARIZATION = 1e-9
 
-#: Label of all steps.
+#: Label of the progress.
 LABEL = "turning the field to the guides"
 
 

@@ -12,7 +12,7 @@ from .surface import Surface
 #: Singularities match if they are nearer than this fraction of the longest side of the mesh.
 DEFAULT_REACH = 0.05
 
-#: Distances that are computed in a step.
+#: Distances that are computed at once.
 DISTANCES_PER_BLOCK = 2_000_000
 
 

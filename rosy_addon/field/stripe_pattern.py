@@ -29,8 +29,8 @@ from ..progress import progress, report
 from .blocks import row_blocks
 from .surface import build_edges, next_corners, sorted_with_order
 
-#: Label of all steps.
-STEP_LABEL = "spacing lines"
+#: Label of the progress.
+LABEL = "spacing lines"
 
 #: Bounds of the cotangent weights of edges. The lower one also connects obtuse triangles.
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0
@@ -180,7 +180,7 @@ def stripe_pattern(
     -------
     StripePattern
     """
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     change = directions.phase_changes(spacing)
     with progress(0.0, 0.1):
         gluing = _gluing(triangle_vertex, directions)
@@ -195,7 +195,7 @@ def stripe_pattern(
     phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
     index = np.empty(phase.shape[:2], dtype=np.float32)
     for block in row_blocks(len(phase)):
-        report(0.95, STEP_LABEL)
+        report(0.95, LABEL)
         corner = z[covering.node[block]]
         np.conjugate(corner, out=corner, where=covering.conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
@@ -233,15 +233,15 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     """Match the directions of neighboring triangles, unfolded into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    with progress(0.0, 0.6, STEP_LABEL):
+    with progress(0.0, 0.6, LABEL):
         edges = build_edges(corner_vertex, start)
-    report(0.6, STEP_LABEL)
+    report(0.6, LABEL)
     a, b = edges.halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
     angle = (0.5 * (directions.angle + np.roll(directions.angle, -1, axis=1))).reshape(-1)
-    report(0.8, STEP_LABEL)
+    report(0.8, LABEL)
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
@@ -261,7 +261,7 @@ def _shared_changes(
     glued = np.flatnonzero(gluing.twin >= 0)
     twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
-        report(family / families, STEP_LABEL)
+        report(family / families, LABEL)
         direction = (family + shift) % directions.degree
         neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
         np.negative(neighbor, out=neighbor, where=direction < families)
@@ -302,19 +302,19 @@ def _covering(
     previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
     first, pointer = corner, previous
     for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
-        report(0.2, STEP_LABEL)
+        report(0.2, LABEL)
         first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
     # A closed fan begins at its first corner, an open one at the corner without a previous one.
     is_closed = has_previous[pointer]
     start = np.where(is_closed & (first == corner), corner, previous)
     shift = np.where(start != corner, gluing.shift, 0)
     while True:
-        report(0.6, STEP_LABEL)
+        report(0.6, LABEL)
         following = start[start]
         if np.array_equal(following, start):
             break
         shift, start = (shift + shift[start]) % degree, following
-    report(0.8, STEP_LABEL)
+    report(0.8, LABEL)
     closes = has_previous & (start == corner)
     turn = (gluing.shift + shift[previous]) % degree
     is_singular = (closes & (turn != 0))[start]
@@ -326,7 +326,7 @@ def _covering(
     node = np.empty((len(corner), families), dtype=np.int32)
     conjugated = np.empty(node.shape, dtype=bool)
     for family in range(families):
-        report(0.9, STEP_LABEL)
+        report(0.9, LABEL)
         direction = (family + shift) % degree
         node[:, family] = number * families + direction % families
         conjugated[:, family] = direction >= families
@@ -392,7 +392,7 @@ def _graph(
     covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
 ) -> _Graph:
     """The graph of the edges of all triangles on the covering."""
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))
     has_twin = gluing.twin >= 0
@@ -407,14 +407,14 @@ def _graph(
         covering.node.reshape(-1, families),
         covering.conjugated.reshape(-1, families),
     )
-    report(0.2, STEP_LABEL)
+    report(0.2, LABEL)
     tail_flipped, head_flipped = conjugated[tail], conjugated[head]
     turn = change.reshape(-1, families)[tail]
     np.negative(turn, out=turn, where=head_flipped)
     value = np.exp((2j * np.pi) * turn)
     value *= weight[tail, None]
     flips = tail_flipped != head_flipped
-    report(0.5, STEP_LABEL)
+    report(0.5, LABEL)
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
     return _graph_of_entries(
@@ -461,7 +461,7 @@ def _smoothest(graph: _Graph) -> np.ndarray:
             inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
         steps = SMOOTHING_STEPS * STEP_GROWTH ** len(clusterings)
         for _ in range(int(min(steps, MAX_SMOOTHING_STEPS))):
-            report(1 - 0.7 * len(clusterings) / len(levels), STEP_LABEL)
+            report(1 - 0.7 * len(clusterings) / len(levels), LABEL)
             z = _smoothed(graph, z, inertia)
         if not clusterings:
             return z

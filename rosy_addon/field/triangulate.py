@@ -14,10 +14,10 @@ COLLINEAR_SINE = 1e-6
 #: Corners that are compared with a triangle at once.
 CHUNK_SIZE = 512
 
-#: The label of the steps.
+#: Label of the progress.
 LABEL = "triangulating the mesh"
 
-#: Faces whose corners are compared in a step.
+#: Faces whose corners are compared at once.
 FACES_PER_BLOCK = 1 << 14
 
 

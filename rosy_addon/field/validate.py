@@ -49,7 +49,7 @@ MAX_COMPONENT = 1e30
 #: Vectors whose components are all smaller count as zero, because products would underflow.
 MIN_COMPONENT = 1e-30
 
-#: The label of the steps in which vectors are checked.
+#: Label of the progress of checking vectors.
 LABEL = "checking the field"
 
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the

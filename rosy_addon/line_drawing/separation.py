@@ -40,7 +40,7 @@ MAX_TURN = np.radians(18)
 #: The same for the normals of the surface: along strokes, and at their ends.
 FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
-#: Points that are examined at once, to bound memory and the length of a step.
+#: Points that are examined at once, to bound memory.
 BLOCK_POINTS = 1 << 14
 
 #: Radius around such points in which strokes are sampled finely, in spacings.

@@ -19,7 +19,7 @@ from .stroke_set import Strokes, arc_lengths
 #: Largest distance between the points of strokes at which visibility is tested, in pixels.
 SAMPLE_STEP_PX = 1.0
 
-#: Points of strokes that are clipped at once, to bound memory and the length of a step.
+#: Points of strokes that are clipped at once, to bound memory.
 BLOCK_POINTS = 1 << 16
 
 #: Pixels whose depth is computed at once.

@@ -29,8 +29,8 @@ MAX_BAND_PIXELS = 1 << 22
 #: Sum of barycentric coordinates that is not due to rounding: the pixel center is outside.
 MAX_WEIGHT_SUM = 1 + 1e-4
 
-#: Label of all steps.
-STEP_LABEL = "finding visible pixels"
+#: Label of the progress.
+LABEL = "finding visible pixels"
 
 
 class Fragments(NamedTuple):
@@ -434,7 +434,7 @@ def _rasterize_rows(
         for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
             spans.start[:] -= row_start * width
             for span_block in blocks_by_count(spans.count, BLOCK_SIZE):
-                report(start / len(clipped.triangle), STEP_LABEL)
+                report(start / len(clipped.triangle), LABEL)
                 _depth_test(
                     _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
                 )
@@ -672,7 +672,7 @@ def barycentrics(
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
     for start in range(0, len(pixel), BLOCK_SIZE):
-        report(start / len(pixel), STEP_LABEL)
+        report(start / len(pixel), LABEL)
         block = slice(start, start + BLOCK_SIZE)
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5

@@ -59,8 +59,8 @@ TRIANGLES_PER_TEXEL = 16
 #: Least number of spots along the side of a texture where a field has no direction.
 MIN_SPOTS = 8
 
-#: Label of all steps.
-STEP_LABEL = "drawing hatching"
+#: Label of the progress.
+LABEL = "drawing hatching"
 
 
 def thresholds(
@@ -103,7 +103,7 @@ def thresholds(
     members = all_members(field, look.guiding_angle)[: field.line_count]
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(pixels)):
-        report(0.85 + 0.15 * block.start / len(pixels), STEP_LABEL)
+        report(0.85 + 0.15 * block.start / len(pixels), LABEL)
         part_images = None if images is None else images.part(block)
         part = modulation.part(block)
         thresholds = np.stack(
@@ -174,7 +174,7 @@ def lit_ink(
     """
     colors = np.ones_like(pixels)
     for block in pixel_blocks(len(pixels)):
-        report(block.start / len(pixels), STEP_LABEL)
+        report(block.start / len(pixels), LABEL)
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
         position = on.mesh.points_at(triangle, weights)
         normal = on.mesh.shading_normals_at(triangle, weights)
@@ -292,7 +292,7 @@ def _even_lines(
     jacobian = field.screen_jacobian
     area = np.abs((jacobian[:, 0].conj() * jacobian[:, 1]).imag)
     for block in pixel_blocks(len(texels)):
-        report(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
+        report(0.8 + 0.2 * block.start / len(texels), LABEL)
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         leaf, in_leaf = lines.tree.locate(triangle, weights)
         first, second = lines.heading.take(leaf, axis=1)

@@ -13,10 +13,10 @@ from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ...progress import report
 
-#: Rows and words of a text file that are parsed or written in a step.
+#: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
 
-#: The label of the steps in which a file is read.
+#: Label of the progress of reading a file.
 LABEL = "reading the file"
 
 

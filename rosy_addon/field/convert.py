@@ -73,11 +73,11 @@ def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyF
         with progress(0.1, 0.5):
             field = diffuse_field(surface, field, max(time, np.finfo(np.float64).tiny))
     if conversion.pair_distance > 0:
-        with progress(0.5, 0.8):
+        with progress(0.5, 0.9):
             field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        with progress(0.8, 1.0):
+        with progress(0.9, 1.0):
             magnitude = face_magnitude(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 

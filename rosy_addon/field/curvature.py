@@ -50,8 +50,7 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
     smooth_surface = smooth_normals(surface)
     x, y = face_frames(smooth_surface)
-    with progress(0.5, 1.0):
-        mean, deviator = face_curvature(smooth_surface, x, y)
+    mean, deviator = face_curvature(smooth_surface, x, y)
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
@@ -104,8 +103,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     smooth_surface = smooth_normals(surface)
     report(0.3, label)
     x, y = face_frames(smooth_surface)
-    with progress(0.4, 0.6):
-        mean, deviator = face_curvature(smooth_surface, x, y)
+    mean, deviator = face_curvature(smooth_surface, x, y)
     report(0.6, label)
     deviator_norm = np.abs(deviator)
     center = smooth_surface.face_center.mean(axis=0)
@@ -118,14 +116,9 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     is_curved = deviator_norm > TINY
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
-    with progress(0.65, 0.68):
-        rotation = corner_rotations(
-            smooth_surface.face_normal,
-            x,
-            smooth_surface.corner_face,
-            smooth_surface.corner_normal,
-            label,
-        )
+    rotation = corner_rotations(
+        smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal
+    )
     weights = corner_angles(smooth_surface)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         report(0.7 + 0.1 * index, label)
@@ -152,10 +145,8 @@ def face_curvature(surface: Surface, x: np.ndarray, y: np.ndarray) -> tuple[np.n
     points = surface.vertices[surface.corner_vertex]
     edge = points[next_corner] - points
     normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
-    report(0.3, "computing principal directions")
     u, v = dot(edge, x[face]), dot(edge, y[face])
     p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
-    report(0.6, "computing principal directions")
     products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
     uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
     trace = uu + vv

@@ -186,10 +186,9 @@ def stripe_pattern(
         gluing = _gluing(triangle_vertex, directions)
     with progress(0.1, 0.2):
         change = _shared_changes(change, gluing, directions)
-    with progress(0.2, 0.3):
-        covering = _covering(triangle_vertex, gluing, directions)
-    with progress(0.3, 0.4):
-        graph = _graph(covering, gluing, change, directions)
+    report(0.2, LABEL)
+    covering = _covering(triangle_vertex, gluing, directions)
+    graph = _graph(covering, gluing, change, directions)
     with progress(0.4, 0.9):
         z = _smoothest(graph)
     phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
@@ -302,19 +301,16 @@ def _covering(
     previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
     first, pointer = corner, previous
     for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
-        report(0.2, LABEL)
         first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
     # A closed fan begins at its first corner, an open one at the corner without a previous one.
     is_closed = has_previous[pointer]
     start = np.where(is_closed & (first == corner), corner, previous)
     shift = np.where(start != corner, gluing.shift, 0)
     while True:
-        report(0.6, LABEL)
         following = start[start]
         if np.array_equal(following, start):
             break
         shift, start = (shift + shift[start]) % degree, following
-    report(0.8, LABEL)
     closes = has_previous & (start == corner)
     turn = (gluing.shift + shift[previous]) % degree
     is_singular = (closes & (turn != 0))[start]
@@ -326,7 +322,6 @@ def _covering(
     node = np.empty((len(corner), families), dtype=np.int32)
     conjugated = np.empty(node.shape, dtype=bool)
     for family in range(families):
-        report(0.9, LABEL)
         direction = (family + shift) % degree
         node[:, family] = number * families + direction % families
         conjugated[:, family] = direction >= families
@@ -392,7 +387,6 @@ def _graph(
     covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
 ) -> _Graph:
     """The graph of the edges of all triangles on the covering."""
-    report(0.0, LABEL)
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))
     has_twin = gluing.twin >= 0
@@ -407,14 +401,12 @@ def _graph(
         covering.node.reshape(-1, families),
         covering.conjugated.reshape(-1, families),
     )
-    report(0.2, LABEL)
     tail_flipped, head_flipped = conjugated[tail], conjugated[head]
     turn = change.reshape(-1, families)[tail]
     np.negative(turn, out=turn, where=head_flipped)
     value = np.exp((2j * np.pi) * turn)
     value *= weight[tail, None]
     flips = tail_flipped != head_flipped
-    report(0.5, LABEL)
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
     return _graph_of_entries(

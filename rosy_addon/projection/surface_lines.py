@@ -171,8 +171,8 @@ def surface_lines(
         corner_field = field_at_corners(rest, matrix, field, display)
     points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
     max_triangles = max(max_triangles, len(rest.triangles))
-    with progress(0.1, 0.2, label):
-        tree = bisect(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
+    report(0.1, label)
+    tree = bisect(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
     count = len(tree.leaf_root)
     check_memory(
         count * (TRIANGLE_BYTES + FAMILY_BYTES * field_symmetry(field).line_count),

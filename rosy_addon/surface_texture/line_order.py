@@ -205,8 +205,8 @@ def _refined(mesh: TangentMesh) -> _RefinedMesh:
     # No number is very large or small.
     points = (points - points.mean(axis=0)) / side
     max_triangles = max(MAX_TRIANGLES, len(triangle_vertex))
-    with progress(0.2, 0.3):
-        tree = bisect(points, triangle_vertex, MAX_EDGE, max_triangles)
+    report(0.2, LABEL)
+    tree = bisect(points, triangle_vertex, MAX_EDGE, max_triangles)
     root = tree.leaf_root
     start = np.arange(0, 3 * len(root) + 1, 3, dtype=np.int32)
     with progress(0.3, 0.6):

@@ -7,12 +7,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 
-from rosy_addon.rendering.band_workers import BandWorkers
-
 from rosy_addon.cache import Cache
 from rosy_addon.compositor.look import is_hatched
 from rosy_addon.preset_files.store import load_preset, preset_keys
-from rosy_addon.progress import run_to_completion
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases
@@ -45,12 +43,10 @@ def view(preset: str, width: int, height: int, samples: int = 0) -> ViewInput:
     return ViewInput((ball,), cases.camera(width, height), look)
 
 
-def draw(
-    preset: str, width: int, height: int, pool: BandWorkers | None = None, samples: int = 0
-) -> None:
+def draw(preset: str, width: int, height: int, *, workers: int = 1, samples: int = 0) -> None:
     """Draw a picture after the camera has moved."""
-    renderer = CpuRenderer(CACHE, keep_gbuffers=False, workers=pool)
-    run_to_completion(renderer.render_task(view(preset, width, height, samples)))
+    picture_view = view(preset, width, height, samples)
+    draw_picture(picture_view, CACHE, keep_gbuffers=False, workers=workers)
 
 
 def measure(runs: int) -> Iterator[Case]:
@@ -66,25 +62,23 @@ def measure(runs: int) -> Iterator[Case]:
                 runs=runs,
             )
     for side, target in SQUARES.items():
-        with BandWorkers(1) as pool:
-            yield compare(
-                f"{side} x {side} / 512 x 512 pixels, one process",
-                lambda side=side, pool=pool: draw("default", side, side, pool),
-                lambda pool=pool: draw("default", 512, 512, pool),
-                target=target,
-                higher_is_better=False,
-                runs=runs,
-            )
+        yield compare(
+            f"{side} x {side} / 512 x 512 pixels, one process",
+            lambda side=side: draw("default", side, side),
+            lambda: draw("default", 512, 512),
+            target=target,
+            higher_is_better=False,
+            runs=runs,
+        )
     for width, height in SIZES:
         for preset in WORKER_PRESETS:
-            with BandWorkers(1) as one, BandWorkers(2) as two:
-                yield compare(
-                    f"one process / two, {preset}, {width} x {height} pixels",
-                    lambda name=preset, size=(width, height), pool=one: draw(name, *size, pool),
-                    lambda name=preset, size=(width, height), pool=two: draw(name, *size, pool),
-                    target=1.75,
-                    runs=runs,
-                )
+            yield compare(
+                f"one process / two, {preset}, {width} x {height} pixels",
+                lambda name=preset, size=(width, height): draw(name, *size),
+                lambda name=preset, size=(width, height): draw(name, *size, workers=2),
+                target=1.75,
+                runs=runs,
+            )
 
 
 if __name__ == "__main__":

@@ -12,8 +12,7 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import lic, look_noise
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
-from rosy_addon.progress import run_to_completion
-from rosy_addon.projection.corner_field import compute_corner_field
+from rosy_addon.projection.corner_field import field_at_corners
 from rosy_addon.projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from rosy_addon.projection.project import project
 from rosy_addon.projection.rasterizer import rasterize
@@ -48,7 +47,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     clip = points @ (camera.projection @ camera.view).T
     triangle = instance.surface.triangle_vertex
     return {
-        "average the field at the corners, once per mesh": lambda: compute_corner_field(
+        "average the field at the corners, once per mesh": lambda: field_at_corners(
             instance.surface, instance.matrix, instance.field, look.display
         ),
         "project": lambda: project([instance], camera, look.display, cache),
@@ -59,7 +58,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
         ),
         "  of which directions on screen": lambda: screen_jacobians(gbuffer),
         "  of which noise": lambda: look_noise(field, look),
-        "  of which streamlines": lambda: run_to_completion(lic(field, look, noise)),
+        "  of which streamlines": lambda: lic(field, look, noise),
         "  of which shading": lambda: diffuse(gbuffer, look, ()),
     }
 

@@ -11,9 +11,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from rosy_addon.rendering.band_workers import BandWorkers
 
-from rosy_addon.progress import run_to_completion
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases
@@ -38,21 +37,19 @@ def measure(runs: int) -> Iterator[Case]:
     look = replace(LOOK, supersampling=SAMPLES)
     instances = (cases.instance(TRIANGLES, DEGREE),)
     azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
-    with BandWorkers(CORES) as pool:
-        renderer = CpuRenderer(cases.CORNER_FIELDS, keep_gbuffers=False, workers=pool)
 
-        def draw() -> None:
-            camera = cases.camera(LARGE_SIZE, azimuth=next(azimuths))
-            run_to_completion(renderer.render_task(ViewInput(instances, camera, look)))
+    def draw() -> None:
+        view = ViewInput(instances, cases.camera(LARGE_SIZE, azimuth=next(azimuths)), look)
+        draw_picture(view, cases.CORNER_FIELDS, keep_gbuffers=False, workers=CORES)
 
-        yield compare(
-            f"N = 4{SAMPLES_LABEL[SAMPLES]} / VTK's one vector field, frame, two cores each",
-            draw,
-            lambda: (draw_next(), read_pixels()),
-            target=0.8,
-            higher_is_better=False,
-            runs=runs,
-        )
+    yield compare(
+        f"N = 4{SAMPLES_LABEL[SAMPLES]} / VTK's one vector field, frame, two cores each",
+        draw,
+        lambda: (draw_next(), read_pixels()),
+        target=0.8,
+        higher_is_better=False,
+        runs=runs,
+    )
 
 
 if __name__ == "__main__":

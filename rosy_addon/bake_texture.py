@@ -12,7 +12,7 @@ from .cache import BAKE_CACHE
 from .compositor.look import Look
 from .compositor.shading import Light
 from .errors import RosyError
-from .image_io.png import compute_png
+from .image_io.png import png_bytes
 from .progress import Progress, Task, as_task, run_to_completion, subtask
 from .scene.blender_images import ImageData
 from .scene.color_inputs import color_attribute_of
@@ -117,7 +117,7 @@ def bake_texture_task(
             png = None
             if not settings.as_float:
                 png = yield from subtask(
-                    as_task(compute_png, rgba, is_color=not texture.is_data), stop, stop
+                    as_task(png_bytes, rgba, is_color=not texture.is_data), stop, stop
                 )
             tiles[number] = ImageData(rgba, png)
         note = texture.overlap_note(f"object '{obj.name}'")

@@ -14,8 +14,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from .progress import Task
-
 Result = TypeVar("Result")
 
 #: Default size limit of a cache, in bytes. Baking a character at 1920 x 1080 takes a third.
@@ -62,13 +60,6 @@ class Cache:
         """
         cached = self.get(key)
         return self.put(key, create()) if cached is None else cached
-
-    def get_or_create_task(
-        self, key: Hashable, create_task: Callable[[], Task[Result]]
-    ) -> Task[Result]:
-        """Do the same as `get_or_create`, for a result that is returned by a task."""
-        cached = self.get(key)
-        return self.put(key, (yield from create_task())) if cached is None else cached
 
     def evict_over_limit(self) -> None:
         """Evict least recently used entries until the rest is within the limit.

@@ -140,7 +140,7 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 def write_blocks(path: str | os.PathLike[str], blocks: Iterable[bytes], block_count: float) -> None:
     """Write a file atomically, block by block; see `replacing`.
 
-    A task that is cancelled leaves an existing file unchanged.
+    If the work is cancelled, an existing file stays unchanged.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def _is_running(pid: int) -> bool:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check that a file could be written, before a long task computes its contents.
+    """Check that a file could be written, before long work computes its contents.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 def check_folder(folder: str | os.PathLike[str]) -> None:
     """Check that Blender can store pictures in a folder. It may be missing if it can be created.
 
-    Call this before a long task.
+    Call this before long work.
 
     Raises
     ------

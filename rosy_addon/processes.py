@@ -1,4 +1,4 @@
-"""Running another program as a task."""
+"""Running another program."""
 
 from __future__ import annotations
 
@@ -6,25 +6,21 @@ import subprocess
 import tempfile
 from collections.abc import Sequence
 
-from .progress import Progress, Task
+from .progress import report
 
-#: Seconds of one step of waiting.
+#: Seconds between two reports.
 POLL_SECONDS = 0.05
 
 
-def process_task(command: Sequence[str], label: str) -> Task[tuple[int, str]]:
-    """Run a program and wait for its end. Closing the task kills it.
+def run_process(command: Sequence[str], label: str) -> tuple[int, str]:
+    """Run a program and wait for its end. An exception, as of a listener that cancels, kills it.
 
     Parameters
     ----------
     command : sequence of str
         The program and its arguments.
     label : str
-        For the progress.
-
-    Yields
-    ------
-    Progress
+        What the program does, for the progress.
 
     Returns
     -------
@@ -39,7 +35,7 @@ def process_task(command: Sequence[str], label: str) -> Task[tuple[int, str]]:
         )
         try:
             while process.poll() is None:
-                yield Progress(0.0, label)
+                report(0.0, label)
                 try:
                     process.wait(POLL_SECONDS)
                 except subprocess.TimeoutExpired:

@@ -12,22 +12,22 @@ from .cache import Cache
 from .color import to_display
 from .compositor.flow import flow_at
 from .compositor.look import Look, has_flow
+from .compositor.picture import Picture
 from .compositor.shading import Light
 from .errors import RosyError
 from .file_io import write_bytes
 from .image_io.gif import gif_bytes
 from .image_io.png import write_png
 from .memory import check_memory
-from .progress import progress, report, run_with_report
+from .progress import progress, report
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
-from .rendering.renderer import Renderer
 from .rendering.view_input import ViewInput
 
 #: Suffixes of videos that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")
 
-#: A task that encodes a video. Its arguments are the folder of pictures, their number and size, the
+#: A function that encodes a video. Its arguments are the folder of pictures, their number and size, the
 #: frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 
@@ -105,7 +105,7 @@ def check_still(look: Look, still: bool, name: str) -> None:
 
 
 def turntable(
-    renderer: Renderer,
+    draw: Callable[[ViewInput], Picture],
     views: Iterator[ViewInput],
     count: int,
     path: Path,
@@ -116,7 +116,8 @@ def turntable(
 
     Parameters
     ----------
-    renderer : Renderer
+    draw : function
+        Draws a view.
     views : iterator of ViewInput
         From `turntable_views`.
     count : int
@@ -132,12 +133,12 @@ def turntable(
     with VideoWriter(path, fps, encode) as writer:
         for index, view in enumerate(views):
             start, stop = (ENCODING_START * done / count for done in (index, index + 1))
-            label = f"picture {index + 1} of {count}"
             if not index:
                 writer.check_memory(count, view.camera.width, view.camera.height)
+            label = f"picture {index + 1} of {count}"
             report(start, label)
-            picture = run_with_report(renderer.render_task(view), report.part(start, stop, label))
-            writer.add(picture.rgba)
+            with progress(start, stop, label):
+                writer.add(draw(view).rgba)
         with progress(ENCODING_START, 1.0, "encoding the video"):
             writer.write()
     return path

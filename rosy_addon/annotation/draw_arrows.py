@@ -11,7 +11,7 @@ from .arrow_marks import FILL_COLOR, NOTCH, OUTLINE_COLOR, WIDTH, ArrowMarks
 from .painting import draw_over
 
 #: Pixels of arrowheads that are drawn in a step.
-PIXELS_PER_STEP = 1 << 19
+PIXELS_PER_BLOCK = 1 << 19
 
 
 def draw_arrows(rgba: np.ndarray, marks: ArrowMarks) -> np.ndarray:
@@ -39,7 +39,7 @@ def draw_arrows(rgba: np.ndarray, marks: ArrowMarks) -> np.ndarray:
     head = np.repeat(np.arange(len(marks)), row_count)
     row = concatenated_ranges(low[:, 1], row_count)
     length = (high - low)[head, 0]
-    for part in blocks_by_count(length, PIXELS_PER_STEP):
+    for part in blocks_by_count(length, PIXELS_PER_BLOCK):
         report(part.start / len(head), "drawing arrowheads")
         column = concatenated_ranges(low[head[part], 0], length[part])
         of_head, of_row = (np.repeat(values[part], length[part]) for values in (head, row))

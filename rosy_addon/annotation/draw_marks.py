@@ -19,7 +19,7 @@ from .singularity_marks import (
 )
 
 #: Dots that are drawn in a step.
-DOTS_PER_STEP = 256
+DOTS_PER_BLOCK = 256
 
 
 def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
@@ -40,7 +40,7 @@ def draw_marks(rgba: np.ndarray, marks: SingularityMarks) -> np.ndarray:
     for number, (center, radius, index, is_visible) in enumerate(
         zip(marks.position, marks.radius.tolist(), marks.index, marks.is_visible, strict=True)
     ):
-        if number % DOTS_PER_STEP == 0:
+        if number % DOTS_PER_BLOCK == 0:
             report(number / len(marks), "drawing singularities")
         draw_dot(
             rgba,

@@ -25,11 +25,10 @@ from ..field.analysis import format_degrees
 from ..field.singularity_matching import DEFAULT_REACH
 from ..file_io import write_bytes
 from ..image_io.png import to_srgb_uint8
-from ..progress import run_to_completion
 from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.visible_vertices import project_vertices
-from ..rendering.band_workers import BandWorkers
+from ..rendering.draw import draw_picture
 from ..rendering.view_input import ViewInput
 from .comparison import Comparison, compare, titled_fields
 from .field import Field
@@ -184,19 +183,18 @@ def figure(
     points = np.concatenate([instance.face_points() for instance in instances.values()])
     size = pixels, max(round(pixels * _aspect(points, view)), 1)
     camera = orbit_camera(points, *view, *size, perspective=not orthographic, margin=MARGIN)
-    with BandWorkers(workers) as pool:
-        studio = _Studio(camera, look, CpuRenderer(Cache(), keep_gbuffers=False, workers=pool))
-        rows, marks = [], {}
-        if set(parts) - {"table"}:
-            marks = {title: studio.marks(instance) for title, instance in instances.items()}
-        if "fields" in parts:
-            panels = [
-                drawing.Panel("" if is_single else title, studio.picture(instance), marks[title])
-                for title, instance in instances.items()
-            ]
-            rows.append(drawing.Row(panels, _color_bar(look, color_label)))
-        if "differences" in parts:
-            rows.append(studio.difference_row(comparison, instances, marks, lines, largest_angle))
+    studio = _Studio(camera, look, Cache(), workers)
+    rows, marks = [], {}
+    if set(parts) - {"table"}:
+        marks = {title: studio.marks(instance) for title, instance in instances.items()}
+    if "fields" in parts:
+        panels = [
+            drawing.Panel("" if is_single else title, studio.picture(instance), marks[title])
+            for title, instance in instances.items()
+        ]
+        rows.append(drawing.Row(panels, _color_bar(look, color_label)))
+    if "differences" in parts:
+        rows.append(studio.difference_row(comparison, instances, marks, lines, largest_angle))
     table = comparison.cells() if "table" in parts else []
     bar = None if scale_bar is None else _scale_bar(camera, scale_bar, drawing.SCALE_BAR_SHARE)
     return drawing.draw_page(drawing.Page(rows, table, caption, bar), width, columns, dpi)
@@ -385,12 +383,15 @@ class _Studio:
     ----------
     camera : Camera
     look : Look
-    renderer : CpuRenderer
+    cache : Cache
+    workers : int
+        As of `draw_picture`.
     """
 
     camera: Camera
     look: Look
-    renderer: CpuRenderer
+    cache: Cache
+    workers: int
 
     def picture(self, instance: MeshInstance, **changes: Any) -> NDArray[np.uint8]:
         """Return the picture of an instance, (H, W, 4) sRGB, the top row first, without singularities."""
@@ -399,7 +400,7 @@ class _Studio:
     def _linear(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
         look = replace(self.look, singularity_dots="none", **changes)
         view = ViewInput((instance,), self.camera, look)
-        return run_to_completion(self.renderer.render_task(view)).rgba
+        return draw_picture(view, self.cache, keep_gbuffers=False, workers=self.workers).rgba
 
     def marks(self, instance: MeshInstance) -> SingularityMarks | None:
         """Return the singularities of an instance in the picture; None if the look shows none.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface as PolygonMesh
 from ..field.surface import face_area_vectors, have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
-from ..rendering.band_workers import BandWorkers
+from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
 from ..turntable_video import Encoder, check_video_path, turntable
@@ -127,9 +127,8 @@ def film(
     views = series.views()
     if on_picture is not None:
         views = announced(views, on_picture)
-    with BandWorkers(workers) as pool:
-        renderer = CpuRenderer(Cache(), keep_gbuffers=False, workers=pool)
-        result = turntable(renderer, views, series.picture_count, path, rate, encode)
+    draw = partial(draw_picture, cache=Cache(), keep_gbuffers=False, workers=workers)
+    result = turntable(draw, views, series.picture_count, path, rate, encode)
     warn(series.advice)
     return result
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +17,14 @@ from ..cache import Cache
 from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
 from ..errors import RosyError
-from ..image_io.png import compute_png, read_png, to_srgb_uint8, write_png
+from ..image_io.png import png_bytes, read_png, to_srgb_uint8, write_png
 from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
-from ..progress import run_to_completion
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
 from ..projection.camera import check_size
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from ..rendering.band_workers import BandWorkers
+from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.view_input import ViewInput
 from ..turntable_video import (
@@ -95,7 +95,7 @@ class Picture:
         return array if dtype is None else array.astype(dtype)
 
     def _repr_png_(self) -> bytes:
-        return compute_png(self.rgba)
+        return png_bytes(self.rgba)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an 8-bit ``.png`` file.
@@ -241,8 +241,7 @@ def render(
         reference_name=name,
     )
     # Only the pixels are kept, not the layers of the picture.
-    with BandWorkers(workers) as pool:
-        return Picture(run_to_completion(CpuRenderer(workers=pool).render_task(picture_view)).rgba)
+    return Picture(draw_picture(picture_view, workers=workers).rgba)
 
 
 def turntable(
@@ -326,10 +325,8 @@ def turntable(
     if on_picture is not None:
         views = announced(views, on_picture)
     cache = Cache()
-    with BandWorkers(workers) as pool:
-        renderer = CpuRenderer(cache, keep_gbuffers=still, workers=pool)
-        views = evicting(views, cache)
-        return rosy_addon_turntable(renderer, views, pictures, path, rate, encode)
+    draw = partial(draw_picture, cache=cache, keep_gbuffers=still, workers=workers)
+    return rosy_addon_turntable(draw, evicting(views, cache), pictures, path, rate, encode)
 
 
 def picture_look(

@@ -115,7 +115,7 @@ class Surface:
             arrays.face_start,
             name=self.name,
             sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
-            sharp_edges=sharp_edges,
+            sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
         )
         uv = arrays.uv if uv is None else uv
         self._uv = None if uv is None else self._corner_values(uv, "uv", 2)

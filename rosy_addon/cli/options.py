@@ -16,7 +16,7 @@ from .streams import print_error
 
 
 def check_output(options: argparse.Namespace, suffix: str = "") -> None:
-    """Check the option -o, before a long task computes its contents.
+    """Check the option -o, before long work computes its contents.
 
     Parameters
     ----------

@@ -41,11 +41,11 @@ def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> Li
     with progress(0.0):
         neighbors = neighbor_table(field)
     angle = look.guiding_angle
-    first_task = partial(_one_set, field, look, noise, neighbors, angle)
+    draw_first = partial(_one_set, field, look, noise, neighbors, angle)
     if field.degree == 1 or look.weights == "none":
-        return first_task()
+        return draw_first()
     with progress(0.0, 0.5):
-        first = first_task()
+        first = draw_first()
     with progress(0.5, 1.0):
         second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
     for block in pixel_blocks(len(field.pixel)):

@@ -18,7 +18,7 @@ from ..cache import Cache
 from ..field.frames import dot
 from ..field.surface import connected_components
 from ..progress import progress, report
-from ..projection.crease_pixels import mark_crease_pixels
+from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.pixel_blocks import pixel_blocks
@@ -296,14 +296,12 @@ def _creases_and_parts(
         mesh = cached_outline_mesh(instance.surface, instance.matrix, crease_angle, cache)
     defined = gbuffer.representation != 0
     if len(mesh.crease_ends):
-        marks = np.zeros(len(grid.cell), dtype=bool)
         points = mesh.crease_points(instance.surface, instance.matrix)
         points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
-        steps = mark_crease_pixels(
-            gbuffer, instance_id, points, grid.entry, grid.origin, grid.stride, marks
-        )
-        for fraction in steps:
-            report(0.5 + 0.3 * fraction, STEP_LABEL)
+        with progress(0.5, 0.8):
+            marks = crease_pixels(
+                gbuffer, instance_id, points, grid.entry, grid.origin, grid.stride
+            )
         line_width[marks & defined] = look.outline / 2
     if mesh.triangle_part is None:
         return

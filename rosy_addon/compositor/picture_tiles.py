@@ -66,18 +66,18 @@ def _round_outward(start: int, stop: int) -> tuple[int, int]:
 
 
 def cached_tiles(
-    create_task: Callable[..., np.ndarray],
+    create: Callable[..., np.ndarray],
     rectangle: TileRectangle,
     *settings: Hashable,
 ) -> np.ndarray:
-    """Return the result of ``create_task(rectangle, *settings)``, from the cache if it is there.
+    """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
 
     It is a flat image of the rectangle. Large images are not stored.
     """
     left, right, bottom, top = rectangle
     if (right - left) * (top - bottom) > MAX_CACHED_PIXELS:
-        return create_task(rectangle, *settings)
-    key = create_task.__name__, rectangle, settings
-    image = TILE_CACHE.get_or_create(key, partial(create_task, rectangle, *settings))
+        return create(rectangle, *settings)
+    key = create.__name__, rectangle, settings
+    image = TILE_CACHE.get_or_create(key, partial(create, rectangle, *settings))
     TILE_CACHE.evict_over_limit()
     return image

@@ -145,10 +145,7 @@ class StreakStatistics(NamedTuple):
 
 
 def look_streak_statistics(look: Look) -> StreakStatistics:
-    """Return the statistics of streaks, from the cache if they are there.
-
-    See `look_streak_statistics_task`.
-    """
+    """Return the statistics of streaks, from the cache if they are there."""
     surface_paper_grain = None
     if look.anchor != "picture":
         args = surface_paper_grain_args(look)

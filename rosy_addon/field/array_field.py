@@ -238,7 +238,7 @@ def array_field(
         vectors = raw.values[:, 0]
         apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
         with progress(0.0, 0.5, _LABEL):
-            tangential = _compute_tangential(surface, vectors, raw.domain, degree)
+            tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
@@ -269,7 +269,7 @@ def _raw_field(array: FieldArray, source: str) -> RawField:
     return RawField(matrices, 4, domain=array.domain, tensors=True)
 
 
-def _compute_tangential(
+def _tangential_on_faces(
     surface: Surface, vectors: np.ndarray, domain: str, degree: int
 ) -> np.ndarray | None:
     """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""

@@ -6,14 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..progress import report
 from .frames import dot
 
 #: Factor by which longer edges are allowed while there would be too many triangles.
 LENGTH_STEP = 1.15
-
-#: Label of all steps.
-STEP_LABEL = "refining triangles"
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +107,6 @@ def bisect(
     split_edges = [np.zeros(root_count, dtype=np.int8)]
     node_count = root_count
     while True:
-        report(0.5, STEP_LABEL)
         lengths = _edge_lengths(vertices, leaf_vertex)
         long = lengths > max_length
         while len(leaf_vertex) + np.count_nonzero(long) > max_triangles and long.any():
@@ -129,7 +124,6 @@ def bisect(
         low, high = np.divmod(unique_key, len(vertices))
         vertices = np.concatenate([vertices, 0.5 * (vertices[low] + vertices[high])])
         while True:
-            report(0.5, STEP_LABEL)
             parent = np.flatnonzero((midpoint >= 0).any(axis=1))
             if not len(parent):
                 break
@@ -161,7 +155,6 @@ def bisect(
             leaf_weights = np.concatenate([leaf_weights, second_weights])
             leaf_root = np.concatenate([leaf_root, leaf_root[parent]])
             leaf_node = np.concatenate([leaf_node, child + 1])
-    report(1.0, STEP_LABEL)
     leaf = np.full(node_count, -1, dtype=np.int32)
     leaf[leaf_node] = np.arange(len(leaf_node), dtype=np.int32)
     return BisectionTree(

@@ -1,4 +1,4 @@
-"""Rows of arrays in blocks, so that long work on a large mesh is done in short steps, and in ranges."""
+"""Rows of arrays in blocks, which bound memory and report progress, and in ranges."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from ..progress import report
 
-#: Rows of an array (faces, corners, edges) in a step. A step with them takes hundredths of a second.
-ROWS_PER_STEP = 1 << 16
+#: Rows of an array (faces, corners, edges) in a block. One takes hundredths of a second.
+ROWS_PER_BLOCK = 1 << 16
 
 
 def row_blocks(count: int, size: int | None = None) -> Iterator[slice]:
     """Split `count` rows into consecutive blocks of `size`; one empty block for no rows."""
-    size = ROWS_PER_STEP if size is None else size
+    size = ROWS_PER_BLOCK if size is None else size
     for start in range(0, max(count, 1), size):
         yield slice(start, min(start + size, count))
 
@@ -33,7 +33,9 @@ def blocks_by_count(count: np.ndarray, limit: int) -> Iterator[slice]:
 
 
 def by_rows(
-    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]], *arrays: np.ndarray, label: str
+    function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
+    *arrays: np.ndarray,
+    label: str | None = None,
 ) -> np.ndarray | tuple[np.ndarray, ...]:
     """Apply a function of arrays to blocks of their rows, and join the results.
 
@@ -43,15 +45,15 @@ def by_rows(
         Takes a block of each array and returns one array, or a tuple of arrays, with as many rows.
         A row of the result depends on the same rows of the arrays alone.
     arrays : (n, ...) ndarray
-    label : str
-        Of the progress.
+    label : str, optional
+        Of the progress. Without one, none is reported.
     """
     count = len(arrays[0])
     parts = []
     for block in row_blocks(count):
-        report(block.start / max(count, 1), label)
+        if label is not None:
+            report(block.start / max(count, 1), label)
         parts.append(function(*(array[block] for array in arrays)))
-    report(1.0, label)
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)

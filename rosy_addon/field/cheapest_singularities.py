@@ -78,8 +78,7 @@ def cheapest_singularities(
     with progress(0.1, 0.3):
         angle = graph.conductance * least_angles(graph, degree, required, [], 0.0)
     mass = np.maximum(area, 1e-12 * area.mean())
-    with progress(0.3, 0.35):
-        matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
+    matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component)
     modulus = np.abs(z)
@@ -187,7 +186,6 @@ class _Neighbors:
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
     """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
-    report(0.0, LABEL)
     count, weight = len(diagonal), 1 / graph.conductance
     source, target = graph.source, graph.target
     transport = np.exp(1j * degree * (graph.unfolding + angle))
@@ -196,5 +194,4 @@ def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarr
     row = np.concatenate([target, source, faces]).astype(np.intp)
     column = np.concatenate([source, target, faces]).astype(np.intp)
     value = np.concatenate([-weight * transport, -weight * transport.conj(), diagonal])
-    with progress(0.0, 1.0):
-        return from_coo(row, column, value, count, count)
+    return from_coo(row, column, value, count, count)

@@ -92,26 +92,17 @@ class _TriangleGrid:
 
     def fill(self) -> None:
         """Find the cells of the triangles. Call this first."""
-        label = "finding the closest faces"
         low, high = self._low, self._high
-        report(0.0, label)
         first = self._cells_of(low)
-        report(0.0, label)
         last = self._cells_of(high)
-        report(0.0, label)
         is_large = (last - first).max(axis=1) >= MAX_CELLS_PER_AXIS
         self.large_triangles = np.flatnonzero(is_large).astype(np.int32)
-        report(0.0, label)
         small = np.flatnonzero(~is_large)
         span = last[small] - first[small] + 1
         count = span.prod(axis=1)
-        report(0.0, label)
         entry = np.repeat(np.arange(len(small)), count)
-        report(0.0, label)
         cell_number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        report(0.0, label)
         spans = span[entry]
-        report(0.0, label)
         offset = np.stack(
             [
                 cell_number // (spans[:, 1] * spans[:, 2]),
@@ -120,11 +111,8 @@ class _TriangleGrid:
             ],
             axis=1,
         )
-        report(0.0, label)
         cell_key = self._keys_of(first[small][entry] + offset)
-        report(0.0, label)
         order = np.argsort(cell_key, kind="stable")
-        report(0.0, label)
         self.key, self.cell_triangle = cell_key[order], small[entry][order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:

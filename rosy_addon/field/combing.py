@@ -1,7 +1,7 @@
 """A field that follows its guides while a brush changes them.
 
 The field is at all times a solution of the system of its guides: near the brush at once, and everywhere
-after `Combing.settle_task`.
+after `Combing.settle`.
 """
 
 from __future__ import annotations
@@ -74,8 +74,7 @@ class Combing:
         """Solve the whole system. Without any guide, the field stays."""
         if not self.guides.any():
             return
-        with progress(0.0, 0.1):
-            self._node_guides = self._compute_node_guides()
+        self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
             self._z = self.system.solve(self._node_guides, self._z, tolerance)
         report(0.95, "averaging the field on the faces")
@@ -84,14 +83,14 @@ class Combing:
     def _update_node_guides(self, node: np.ndarray) -> None:
         """Bring the guides at nodes up to date."""
         if self._node_guides is None:
-            self._node_guides = self._compute_node_guides()
+            self._node_guides = self._guides_at_nodes()
             return
         corner = self.system.corners_of_nodes(node)
-        new = self._compute_node_guides(corner)
+        new = self._guides_at_nodes(corner)
         for name, values in vars(new).items():
             getattr(self._node_guides, name)[node] = values[node]
 
-    def _compute_node_guides(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
+    def _guides_at_nodes(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
         firmness = np.abs(self.guides)
         target = np.divide(
             self.guides, firmness, out=np.zeros_like(self.guides), where=firmness > 0

@@ -75,7 +75,7 @@ def conjugate_gradient(
     smallest_residual = max(tolerance * norm, ROUNDING_ERROR * _norm(residual))
     direction, previous = None, 1.0
     for iteration in range(max_iterations):
-        report(0.5 + 0.5 * (1 - 0.9**iteration), label)
+        report(1 - 0.5 * 0.8**iteration, label)
         if _norm(residual) <= smallest_residual:
             break
         preconditioned = precondition(residual)

@@ -100,17 +100,13 @@ def build_connection(surface: Surface) -> Connection:
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     twin[a], twin[b] = b, a
 
-    report(0.3, label)
-    with progress(0.3, 0.5, label):
-        corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
+    corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
     # In counter-clockwise order around a vertex, the previous corner lies across the edge that
     # leaves from this corner.
     report(0.5, label)
     previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
-    with progress(0.5, 0.6, label):
-        is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
-    with progress(0.6, 0.7, label):
-        first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
+    is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
+    first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
     report(0.7, label)
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
@@ -173,24 +169,19 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
         Hermitian L. Without a shift, z* L z is the sum over all edges of w |z_i - r^N z_j|^2, where
         r transports from node j to node i.
     """
-    c, label = connection, "building the connection Laplacian"
-    report(0.0, label)
+    c = connection
     # Negative weights (of obtuse triangles) would make the matrix indefinite.
     weight = np.maximum(c.weight, 0)
     ends = np.concatenate([c.tail, c.head])
     # Nodes without weight get a nonzero diagonal, so that the matrix stays regular.
     diagonal = np.bincount(ends, np.tile(weight, 2), c.node_count) + shift * c.mass
     diagonal[diagonal <= 0] = max(float(diagonal.mean()), 1.0)
-    report(0.3, label)
     off_diagonal = -weight * np.exp(1j * degree * c.transport_angle)
-    report(0.5, label)
     nodes = np.arange(c.node_count)
     row = np.concatenate([c.tail, c.head, nodes]).astype(np.intp)
     column = np.concatenate([c.head, c.tail, nodes]).astype(np.intp)
-    report(0.6, label)
     value = np.concatenate([off_diagonal, off_diagonal.conj(), diagonal])
-    with progress(0.6, 1.0, label):
-        return from_coo(row, column, value, c.node_count, c.node_count)
+    return from_coo(row, column, value, c.node_count, c.node_count)
 
 
 def _corner_geometry(
@@ -200,7 +191,6 @@ def _corner_geometry(
     corner_angle, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
     area = np.empty(len(triangles))
     for first in range(0, len(triangles), BLOCK_TRIANGLES):
-        report(first / len(triangles), "measuring angles")
         block = slice(first, first + BLOCK_TRIANGLES)
         points = [vertices.take(column, axis=0) for column in triangles[block].T]
         edges = [points[(k + 1) % 3] - points[k] for k in range(3)]
@@ -242,10 +232,8 @@ def _umbrella_starts(
     corner = np.arange(len(previous_in_umbrella))
     smallest, pointer = corner, np.where(previous_in_umbrella >= 0, previous_in_umbrella, corner)
     rounds = max_corners.bit_length()
-    for index in range(rounds):
-        report(index / rounds, "ordering triangles around vertices")
+    for _ in range(rounds):
         smallest, pointer = np.minimum(smallest, smallest[pointer]), pointer[pointer]
-    report(1.0, "ordering triangles around vertices")
     closed = previous_in_umbrella[pointer] >= 0
     first = (previous_in_umbrella < 0) | (closed & (smallest == corner))
     return first, closed[first]
@@ -266,7 +254,6 @@ def _accumulate_angles(
     pointer = np.where(is_first, np.arange(len(previous_in_umbrella)), previous_in_umbrella)
     angle_sum = np.where(is_first, 0.0, angle[pointer])
     while True:
-        report(0.5, "ordering triangles around vertices")
         next_pointer = pointer[pointer]
         if np.array_equal(next_pointer, pointer):
             return pointer, angle_sum

@@ -10,7 +10,7 @@ from ..errors import RosyError
 from ..progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .connection import build_connection, laplacian
-from .curvature import compute_magnitude
+from .curvature import face_magnitude
 from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
@@ -64,18 +64,21 @@ def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyF
     """
     report(0.0, "converting the field")
     if conversion.degree is not None:
-        field = change_degree(surface, field, conversion.degree)
-        report(0.0, "converting the field")
+        with progress(0.0, 0.1):
+            field = change_degree(surface, field, conversion.degree)
     if conversion.rotation:
         field = rotate_field(surface, field, conversion.rotation)
     if conversion.smoothing_length >= MIN_SMOOTHING_LENGTH:
         time = (conversion.smoothing_length * surface.extent) ** 2
-        field = diffuse_field(surface, field, max(time, np.finfo(np.float64).tiny))
+        with progress(0.1, 0.5):
+            field = diffuse_field(surface, field, max(time, np.finfo(np.float64).tiny))
     if conversion.pair_distance > 0:
-        field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
+        with progress(0.5, 0.9):
+            field = cancel_pairs(surface, field, conversion.pair_distance * surface.extent)
     magnitude = conversion.magnitude
     if isinstance(magnitude, str):
-        magnitude = compute_magnitude(surface, magnitude)
+        with progress(0.9, 1.0):
+            magnitude = face_magnitude(surface, magnitude)
     return field if magnitude is None else with_magnitude(field, magnitude)
 
 
@@ -213,9 +216,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     rhs = complex_bincount(
         connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
     )
-    report(0.15, "smoothing the field")
-    with progress(0.15, 0.2):
-        matrix = laplacian(connection, degree)
+    matrix = laplacian(connection, degree)
     report(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import report
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
 from .representation import complex_bincount, power
@@ -12,7 +11,11 @@ from .surface import Surface, face_blocks, next_corners
 
 
 def corner_rotations(
-    face_normal: np.ndarray, face_x: np.ndarray, corner_face: np.ndarray, corner_normal: np.ndarray
+    face_normal: np.ndarray,
+    face_x: np.ndarray,
+    corner_face: np.ndarray,
+    corner_normal: np.ndarray,
+    label: str | None = None,
 ) -> np.ndarray:
     """The rotation from the frame of each face to the frame of each of its corners.
 
@@ -28,30 +31,21 @@ def corner_rotations(
         Face of each corner.
     corner_normal : (C, 3) ndarray
         Unit normals of the corners.
+    label : str, optional
+        Of the progress.
 
     Returns
     -------
     (C,) complex ndarray
         Of modulus 1; 0 for the corners of faces without a frame.
     """
-    transported_x = transport(face_x[corner_face], face_normal[corner_face], corner_normal)
-    x, y = tangent_frame(corner_normal)
-    rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
-    modulus = np.abs(rotation)
-    return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
-
-
-def compute_corner_rotations(
-    face_normal: np.ndarray,
-    face_x: np.ndarray,
-    corner_face: np.ndarray,
-    corner_normal: np.ndarray,
-    label: str,
-) -> np.ndarray:
-    """`corner_rotations` in steps, with the label of their progress."""
 
     def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        return corner_rotations(face_normal, face_x, face, normal)
+        transported_x = transport(face_x[face], face_normal[face], normal)
+        x, y = tangent_frame(normal)
+        rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
+        modulus = np.abs(rotation)
+        return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
 
     return by_rows(rotations, corner_face, corner_normal, label=label)
 
@@ -99,8 +93,7 @@ def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndar
     """
     points = surface.vertices if points is None else points
     angles = np.empty(len(surface.corner_vertex))
-    for faces, corners, starts in face_blocks(surface.face_start):
-        report(faces.start / surface.face_count, "measuring angles")
+    for _, corners, starts in face_blocks(surface.face_start):
         positions, following = points[surface.corner_vertex[corners]], next_corners(starts)
         to_next = positions[following] - positions
         to_previous = np.empty_like(to_next)

@@ -44,8 +44,8 @@ FILTER_RINGS = 4
 #: Smallest crease angle in radians, below which normals differ by rounding only.
 MIN_ANGLE = 1e-3
 
-#: Label of all steps.
-STEP_LABEL = "finding creases"
+#: Label of the progress.
+LABEL = "finding creases"
 
 
 class Creases(NamedTuple):
@@ -63,7 +63,7 @@ class Creases(NamedTuple):
     chain: np.ndarray
 
 
-def compute_creases(surface: Surface, crease_angle: float) -> Creases:
+def find_creases(surface: Surface, crease_angle: float) -> Creases:
     """Find the creases of a mesh.
 
     An edge is strong if the angle between the normals of its faces is at least the crease angle, and
@@ -84,9 +84,9 @@ def compute_creases(surface: Surface, crease_angle: float) -> Creases:
         Borders and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
-    with progress(0.0, 0.3, STEP_LABEL):
+    with progress(0.0, 0.3, LABEL):
         edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, STEP_LABEL)
+    report(0.3, LABEL)
     sides = surface.corner_face[edges.halfedges].T
     # Smaller angles have no effect.
     crease_angle = max(crease_angle, MIN_ANGLE)
@@ -94,8 +94,7 @@ def compute_creases(surface: Surface, crease_angle: float) -> Creases:
     if angle.max(initial=0.0) < crease_angle:
         return none
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
-    report(0.4, STEP_LABEL)
-    with progress(0.4, 0.8, STEP_LABEL):
+    with progress(0.4, 0.8, LABEL):
         normals, noise_angle = filtered_normals(surface, edges, region)
     ends = edges.ends[edges.interior]
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
@@ -103,7 +102,7 @@ def compute_creases(surface: Surface, crease_angle: float) -> Creases:
     mean_length = max(float(length.mean()), 1e-300)
     density = min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
     noise_angle *= density
-    report(0.8, STEP_LABEL)
+    report(0.8, LABEL)
     bent = np.flatnonzero(angle >= WEAK_SHARE * crease_angle)
     least = np.maximum(density * MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
     bent = bent[angle_between(*normals[sides[:, bent]]) >= least]
@@ -114,9 +113,9 @@ def compute_creases(surface: Surface, crease_angle: float) -> Creases:
     bent = bent[is_candidate]
     if not len(bent):
         return none
-    report(0.9, STEP_LABEL)
+    report(0.9, LABEL)
     ends, length, is_strong = ends[bent], length[bent], angle[bent] >= crease_angle
-    with progress(0.9, 1.0, STEP_LABEL):
+    with progress(0.9, 1.0, LABEL):
         chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     total = np.bincount(chain, length)[chain]
     is_kept = np.bincount(chain, length * is_strong)[chain] >= MIN_STRONG_SHARE * total

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..progress import progress, report
-from .corner_fans import compute_corner_rotations, corner_angles, smooth_face_values
+from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
@@ -26,7 +26,7 @@ MAGNITUDES = {
 CURVATURE_SMOOTHING_ROUNDS = 2
 
 
-def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
+def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
     """Compute magnitudes of one of the kinds in `MAGNITUDES`.
 
     "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
@@ -50,9 +50,7 @@ def compute_magnitude(surface: Surface, kind: str) -> np.ndarray:
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
     smooth_surface = smooth_normals(surface)
     x, y = face_frames(smooth_surface)
-    report(0.5, "computing the curvature")
-    with progress(0.5, 1.0):
-        mean, deviator = face_curvature(smooth_surface, x, y)
+    mean, deviator = face_curvature(smooth_surface, x, y)
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
@@ -105,9 +103,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     smooth_surface = smooth_normals(surface)
     report(0.3, label)
     x, y = face_frames(smooth_surface)
-    report(0.4, label)
-    with progress(0.4, 0.6):
-        mean, deviator = face_curvature(smooth_surface, x, y)
+    mean, deviator = face_curvature(smooth_surface, x, y)
     report(0.6, label)
     deviator_norm = np.abs(deviator)
     center = smooth_surface.face_center.mean(axis=0)
@@ -120,17 +116,10 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     is_curved = deviator_norm > TINY
     phase = np.divide(deviator, deviator_norm, out=np.zeros_like(deviator), where=is_curved)
     z = confidence * phase ** (degree // 2)
-    report(0.65, label)
-    with progress(0.65, 0.68):
-        rotation = compute_corner_rotations(
-            smooth_surface.face_normal,
-            x,
-            smooth_surface.corner_face,
-            smooth_surface.corner_normal,
-            label,
-        )
-    with progress(0.68, 0.7, label):
-        weights = corner_angles(smooth_surface)
+    rotation = corner_rotations(
+        smooth_surface.face_normal, x, smooth_surface.corner_face, smooth_surface.corner_normal
+    )
+    weights = corner_angles(smooth_surface)
     for index in range(CURVATURE_SMOOTHING_ROUNDS):
         report(0.7 + 0.1 * index, label)
         z = smooth_face_values(smooth_surface, z, rotation, degree, weights)
@@ -156,10 +145,8 @@ def face_curvature(surface: Surface, x: np.ndarray, y: np.ndarray) -> tuple[np.n
     points = surface.vertices[surface.corner_vertex]
     edge = points[next_corner] - points
     normal_difference = surface.corner_normal[next_corner] - surface.corner_normal
-    report(0.3, "computing principal directions")
     u, v = dot(edge, x[face]), dot(edge, y[face])
     p, q = dot(normal_difference, x[face]), dot(normal_difference, y[face])
-    report(0.6, "computing principal directions")
     products = u * u, u * v, v * v, u * p, v * p + u * q, v * q
     uu, uv, vv, up, mixed, vq = (sum_per_face(product, surface.face_start) for product in products)
     trace = uu + vv

@@ -27,7 +27,7 @@ import numpy as np
 from ..progress import progress, report
 from .blocks import by_rows, row_blocks
 from .frames import dot
-from .representation import compute_matching_angles, face_frames, signed_power, to_representation
+from .representation import face_frames, matching_angles, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, build_edges
 from .symmetry import FieldSymmetry
@@ -297,9 +297,9 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)
     with progress(0.4, 0.7):
-        closest_angle = compute_matching_angles(surface, x, y, z, field.degree, a, b, label)
+        closest_angle = matching_angles(surface, x, y, z, field.degree, a, b, label)
     with progress(0.7, 1.0):
-        stored_angle = compute_matching_angles(surface, x, y, z_stored, 1, a, b, label)
+        stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b, label)
     matching = (
         np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
         % field.degree

@@ -16,7 +16,7 @@ from .surface import Surface, build_edges, connected_components, next_corners
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4
 
-#: Label of all steps.
+#: Label of the progress.
 LABEL = "placing the singularities"
 
 
@@ -117,9 +117,7 @@ def face_graph(
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
-    report(0.8, LABEL)
-    with progress(0.8, 0.9):
-        corner_angle = signed_corner_angles(surface, x, y)
+    corner_angle = signed_corner_angles(surface, x, y)
     report(0.9, LABEL)
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
     node_component = np.zeros(len(is_interior), dtype=component.dtype)
@@ -204,7 +202,6 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     front, done = roots, 0
     while len(front):
         done += len(front)
-        report(done / node_count, LABEL)
         counts = start[front + 1] - start[front]
         entry = concatenated_ranges(start[front], counts)
         entry = entry[~is_reached[neighbor[entry]]]

@@ -39,7 +39,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         In 1 / Blender unit of object space. 0 is flat.
     """
     if surface.rest_vertices is not None:
-        with progress(0.0, label="measuring features"):
+        with progress(0.0, 0.05):
             surface = build_surface(
                 surface.rest_vertices,
                 surface.corner_vertex,
@@ -50,20 +50,17 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     if not surface.face_normal.any():
         return np.zeros((len(surface.triangles), 3), dtype=np.float32)
     extent, surface = surface.extent, of_unit_extent(surface)
-    with progress(0.0, 0.1, "finding edges"):
+    with progress(0.05, 0.1, "finding edges"):
         edges = build_edges(surface.corner_vertex, surface.face_start)
     with progress(0.1, 0.25):
         normals, noise_angle = filtered_normals(surface, edges)
-    with progress(0.25, 0.3):
-        ends = salient_edges(surface, edges, normals, noise_angle)
-    with progress(0.3, 0.35):
-        noise = noise_sample(surface, edges, noise_angle)
+    ends = salient_edges(surface, edges, normals, noise_angle)
+    noise = noise_sample(surface, edges, noise_angle)
     with progress(0.35, 0.45):
         fans = smooth_fans(
             surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
         )
     x, y = face_frames(surface)
-    report(0.45, "measuring features")
     with progress(0.45, 0.55, "measuring features"):
         mean, deviator = bounded_curvature(surface, fans, x, y)
     noisy = replace(surface, vertices=surface.vertices + noise)
@@ -77,7 +74,6 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     with progress(0.65, 0.75, "measuring features"):
         connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, x, y)
-    report(0.75, "measuring features")
     scalar = laplacian(connection, 0)
     scalar = scalar.with_values(scalar.data.real.astype(np.float32))
     line = laplacian(connection, 2)
@@ -90,14 +86,14 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         (scalar, mean_noisy - mean, 0),
         (line, deviator_noisy - deviator, 2),
     ):
-        report(0.8, "measuring features")
-        sums = averages.node_sums(values, order)
-        results.append(averages.smooth(matrix, area, sums))
+        sums, start = averages.node_sums(values, order), 0.8 + 0.04 * len(results)
+        with progress(start, start + 0.04):
+            results.append(averages.smooth(matrix, area, sums))
     mean, deviator, mean_noise, deviator_noise = map(np.abs, results)
-    report(0.95, "measuring features")
     curvature = mean + deviator
     power = averages.mass * (mean_noise + deviator_noise) ** 2
-    power = averages.smooth(scalar, 16 * area, power)
+    with progress(0.96, 1.0):
+        power = averages.smooth(scalar, 16 * area, power)
     signal = curvature**2 - MIN_NOISE_RATIO**2 * np.maximum(power, 0.0)
     curvature = np.sqrt(np.maximum(signal, 0.0)) / extent
     return curvature.astype(np.float32)[connection.corner_node].reshape(-1, 3)

@@ -21,7 +21,7 @@ from .formats.rosy_rawfield import (
     rosy_text,
 )
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
-from .formats.text_rows import ROWS_PER_STEP
+from .formats.text_rows import ROWS_PER_BLOCK
 from .mesh_io import READERS as MESH_READERS
 from .mesh_io import SHARP_ANGLE, read_mesh
 from .rosy_field import RosyField
@@ -264,12 +264,11 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
     check_writable(path)
-    report(0.0, "writing the file")
     with progress(0.0, 0.4):
         blocks = _contents(suffix, field, surface)
     row_count = surface.face_count + (3 * len(surface.vertices) if suffix == ".obj" else 0)
     with progress(0.4, 1.0):
-        write_blocks(path, blocks, 1 + row_count / ROWS_PER_STEP)
+        write_blocks(path, blocks, 1 + row_count / ROWS_PER_BLOCK)
 
 
 def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes]:

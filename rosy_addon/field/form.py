@@ -89,16 +89,13 @@ def form(surface: Surface, degree: int) -> RosyField:
         edges = build_edges(surface.corner_vertex, surface.face_start)
     with progress(0.04, 0.1):
         normals, noise_angle = filtered_normals(surface, edges)
-    with progress(0.1, 0.12, "finding sharp edges"):
-        ends = salient_edges(surface, edges, normals, noise_angle)
-    with progress(0.12, 0.15):
-        noise = noise_sample(surface, edges, noise_angle)
+    ends = salient_edges(surface, edges, normals, noise_angle)
+    noise = noise_sample(surface, edges, noise_angle)
     with progress(0.15, 0.5):
         guides, confidence = _curvature_guides(surface, degree, ends, noise)
     weight = (confidence / REACH) ** 2
     report(0.5, "finding guides")
     edge_guides = guides_from_edges(surface, ends, degree)
-    report(0.5, "finding guides")
     at_edge = edge_guides.any(axis=1)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     if not guides.any():
@@ -132,7 +129,6 @@ def _curvature_guides(
         From 0 to 1.
     """
     x, y = face_frames(surface)
-    report(0.02, "computing principal directions")
     with progress(0.02, 0.1):
         fans = smooth_fans(
             surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
@@ -149,11 +145,8 @@ def _curvature_guides(
         connection = build_connection(surface)
     report(0.38, "averaging curvature")
     averages = SurfaceAverages(surface, connection, x, y)
-    report(0.38, "averaging curvature")
-    with progress(0.38, 0.4):
-        matrix = laplacian(connection, 2)
-    with progress(0.4, 0.42):
-        flat_matrix = laplacian(connection, 0)
+    matrix = laplacian(connection, 2)
+    flat_matrix = laplacian(connection, 0)
     matrix = matrix.with_values(matrix.data.astype(np.complex64))
     flat_matrix = flat_matrix.with_values(flat_matrix.data.real.astype(np.float32))
     deviators = averages.node_sums(deviator, 2), averages.node_sums(deviator_noise - deviator, 2)
@@ -161,8 +154,9 @@ def _curvature_guides(
     for index, scale in enumerate(SCALES):
         area = scale**2
         start = 0.45 + 0.1 * index
-        with progress(start):
+        with progress(start, start + 0.05):
             z = averages.smooth(matrix, area, deviators[0], z)
+        with progress(start + 0.05, start + 0.1):
             z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
         # The angle of a cross is a quarter of that of the square of a deviator.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
@@ -170,10 +164,10 @@ def _curvature_guides(
         clear = averages.mass * modulus / (modulus + 1)
         if weighted_median(turn, clear) <= MAX_TURN:
             break
-    with progress(0.85):
+    with progress(0.85, 0.9):
         mean = averages.smooth(flat_matrix, area, averages.node_sums(mean, 0))
     power = averages.mass * np.abs(z_noise) ** 2
-    with progress(0.9):
+    with progress(0.9, 0.95):
         power = averages.smooth(flat_matrix, 4 * area, power)
     report(0.95, "averaging curvature")
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2

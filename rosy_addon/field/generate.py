@@ -200,9 +200,8 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
-        with progress(0.0, label="finding guides"):
+        with progress(0.0, 0.1):
             ends = feature_edges(surface, settings.sharp_angle)
-        report(0.0, "finding guides")
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
@@ -213,28 +212,26 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
             f"{surface.name}: on each face, the edges cancel each other in a field of degree "
             f"{degree}: choose another degree"
         )
-    return guided_or_smoothest(surface, degree, guides)
+    with progress(0.1, 1.0):
+        return guided_or_smoothest(surface, degree, guides)
 
 
 def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
     """A field along the mean of all guides in the settings."""
     degree = check_degree(degree)
-    guide_sets, label = [], "finding guides"
+    report(0.0, "finding guides")
+    guide_sets = []
     if settings.edges is not None:
         guide_sets.append(guides_from_edges(surface, settings.edges, degree))
-        report(0.0, label)
     if settings.strokes:
         guide_sets.append(guides_from_strokes(surface, settings.strokes, degree))
-        report(0.0, label)
     if settings.axis_guides:
         position, axis, radius = (
             np.array(column, dtype=np.float64) for column in zip(*settings.axis_guides, strict=True)
         )
         guide_sets.append(guides_from_axes(surface, position, axis, radius, degree))
-        report(0.0, label)
     if settings.uv is not None:
-        with progress(0.0):
-            guide_sets.append(guides_from_uv(surface, settings.uv, degree))
+        guide_sets.append(guides_from_uv(surface, settings.uv, degree))
     if settings.vectors is not None:
         guide_sets.append(normalize(settings.vectors))
     if not guide_sets:
@@ -242,7 +239,6 @@ def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
             f"{surface.name}: no guides are given: give strokes, edges, a UV map, vectors or axes"
         )
     faces = np.tile(np.arange(surface.face_count), len(guide_sets))
-    report(0.0, label)
     guides = average_guides(surface, faces, np.concatenate(guide_sets), degree)
     firmness = np.ones(surface.face_count)
     if settings.vectors is not None and settings.vectors_have_firmness:

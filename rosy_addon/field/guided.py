@@ -59,8 +59,7 @@ def guided_field(
         raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
     is_hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
-    with progress(0.1, 0.12):
-        node_guides = system.node_guides(target, weight, is_hard)
+    node_guides = system.node_guides(target, weight, is_hard)
     with progress(0.12, 0.95):
         z = system.solve(node_guides, tolerance=tolerance)
     report(0.95, "averaging the field on the faces")
@@ -90,11 +89,11 @@ def guided_or_smoothest(
     """
     if weight is None:
         weight, hard = 0.0, guides.any(axis=1)
-    with progress(0.0, 0.6):
+    with progress(0.0, 0.8):
         field = guided_field(surface, degree, guides, weight, hard, tolerance)
     unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
     if not unguided.any():
         return field
-    with progress(0.6, 1.0):
+    with progress(0.8, 1.0):
         smoothest = smoothest_field(surface, degree)
     return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import progress
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import FaceGraph
 from .representation import complex_bincount
@@ -33,7 +33,7 @@ MAX_ROUNDS = 12
 #: defined.
 REGULARIZATION = 1e-9
 
-#: Label of all steps.
+#: Label of the progress.
 LABEL = "turning the field to the guides"
 
 
@@ -78,19 +78,20 @@ def guided_rotation(
     sector, limit = 2 * np.pi / degree, np.pi / degree
     angle = None
     for attempt in range(MAX_ATTEMPTS):
-        start, stop = 1 - 0.5**attempt, 1 - 0.5 ** (attempt + 1)
-        with progress(start, label=LABEL):
-            matrix = _system(graph, stiffness, penalty)
-        with progress(start, 0.5 * (start + stop)):
+        rest = 0.5**attempt
+        matrix = _system(graph, stiffness, penalty)
+        with progress(1 - rest, 1 - 0.9 * rest):
             levels = hierarchy(matrix)
         if angle is None:
-            angle = _initial_angle(graph, stiffness, matrix, levels, offset, penalty)
+            with progress(1 - 0.9 * rest, 1 - 0.7 * rest):
+                angle = _initial_angle(graph, stiffness, matrix, levels, offset, penalty)
             angle /= degree
-        for _ in range(MAX_ROUNDS):
-            report(0.5 * (start + stop), LABEL)
+        for index in range(MAX_ROUNDS):
             multiple = np.rint((angle - wanted) / sector)
             rhs = penalty * (wanted + sector * multiple)
-            angle = _solve(matrix, rhs, levels)
+            shares = (0.5 + 0.2 * 0.5**step for step in (index, index + 1))
+            with progress(*(1 - share * rest for share in shares)):
+                angle = _solve(matrix, rhs, levels)
             if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
                 break
         added = angle[graph.target] - angle[graph.source]
@@ -127,13 +128,15 @@ def _initial_angle(
     """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
     modulus = np.abs(offset)
     unit = np.divide(offset, modulus, out=np.zeros_like(offset), where=modulus > 0)
-    mean = _solve(matrix, penalty * unit, levels)
+    with progress(0.0, 0.3):
+        mean = _solve(matrix, penalty * unit, levels)
     difference = np.angle(mean[graph.target] * mean[graph.source].conj())
     count = len(offset)
     divergence = np.bincount(graph.target, stiffness * difference, count)
     divergence -= np.bincount(graph.source, stiffness * difference, count)
     laplacian = _system(graph, stiffness, np.zeros(count))
-    angle = _solve(laplacian, divergence, None)
+    with progress(0.3, 1.0):
+        angle = _solve(laplacian, divergence, None)
     rest = penalty * unit * np.exp(-1j * angle)
     parts = int(graph.component.max(initial=-1)) + 1
     return angle + np.angle(complex_bincount(graph.component, rest, parts))[graph.component]

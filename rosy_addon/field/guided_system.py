@@ -101,16 +101,11 @@ class GuidedSystem:
         corner : (m,) int ndarray or slice
             Corners of triangles that are taken into account.
         """
-        label = "averaging the guides at the vertices"
-        report(0.0, label)
         node, count = self.connection.corner_node[corner], self.connection.node_count
         to_node = np.exp(-1j * self.degree * self.frame_angle[corner])
-        report(0.3, label)
         face, area = self._corner_face[corner], self._corner_area[corner]
         penalty = np.bincount(node, area * weight[face], count)
-        report(0.5, label)
         rhs = complex_bincount(node, area * (weight * target)[face] * to_node, count)
-        report(0.7, label)
         # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
         fixed = complex_bincount(node, area * (is_hard * target)[face] * to_node, count)
         max_modulus = np.bincount(node, area * (is_hard * np.abs(target))[face], count)
@@ -312,7 +307,6 @@ def guided_system(surface: Surface, degree: int) -> GuidedSystem:
         connection = build_connection(surface)
     report(0.5, label)
     frame_angle = corner_frame_angles(surface, connection, x, y)
-    with progress(0.6, 1.0):
-        laplacian_result = laplacian(connection, degree)
-    laplacian_result = laplacian_result.plus_diagonal(REGULAR_SHIFT * laplacian_result.diagonal)
-    return GuidedSystem(surface, degree, x, y, connection, frame_angle, laplacian_result)
+    matrix = laplacian(connection, degree)
+    matrix = matrix.plus_diagonal(REGULAR_SHIFT * matrix.diagonal)
+    return GuidedSystem(surface, degree, x, y, connection, frame_angle, matrix)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import report
+from ..progress import progress
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
@@ -74,13 +74,11 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     (E, 2) int32 ndarray
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    label = "finding guides"
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.0, label)
+    with progress(0.0, 0.5):
+        edges = build_edges(surface.corner_vertex, surface.face_start)
     is_feature = np.ones(len(edges.ends), dtype=bool)
     is_feature[edges.interior] = False
     normal = surface.face_normal
-    report(0.5, label)
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
     # Faces without area have no normal, so their edges have no angle.
     dihedral = np.arccos(np.clip(dot(normal_a, normal_b), -1, 1))
@@ -188,21 +186,17 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     (F, 3) float64 ndarray
         Unit; zero on faces without area in the map.
     """
-    label = "following the UV map"
     x, y = face_frames(surface)
-    report(0.3, label)
     face = surface.corner_face
     offset = surface.vertices[surface.corner_vertex] - surface.face_center[face]
     position = dot(offset, x[face]) + 1j * dot(offset, y[face])
     mean_uv = mean_per_face(np.asarray(uv, dtype=np.float64), surface.face_start)
     u, v = (np.asarray(uv, dtype=np.float64) - mean_uv[face]).T
-    report(0.7, label)
     # Least squares fit of the linear map from (u, v) to the face plane.
     uu, uv_sum, vv = (
         sum_per_face(product, surface.face_start) for product in (u * u, u * v, v * v)
     )
     up, vp = (sum_per_face(axis * position, surface.face_start) for axis in (u, v))
-    report(0.9, label)
     area = uu * vv - uv_sum**2
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up

@@ -137,6 +137,7 @@ def matching_angles(
     degree: int,
     a: np.ndarray,
     b: np.ndarray,
+    label: str | None = None,
 ) -> np.ndarray:
     """The angle between matching members of the two faces at each interior edge.
 
@@ -154,6 +155,8 @@ def matching_angles(
         N of the representations.
     a, b : (I,) int ndarray
         The columns of `Edges.halfedges`: the corners of both faces where the edge starts.
+    label : str, optional
+        Of the progress.
 
     Returns
     -------
@@ -161,24 +164,10 @@ def matching_angles(
         Counter-clockwise angle in radians from a member on side a to the nearest on side b, from
         -pi / N to pi / N.
     """
-    source_face, target_face = surface.corner_face[a], surface.corner_face[b]
-    unfolding = edge_unfolding(surface, x, y, a, b)
-    return np.angle(z[target_face] * (z[source_face] * power(unfolding, degree)).conj()) / degree
-
-
-def compute_matching_angles(
-    surface: Surface,
-    x: np.ndarray,
-    y: np.ndarray,
-    z: np.ndarray,
-    degree: int,
-    a: np.ndarray,
-    b: np.ndarray,
-    label: str,
-) -> np.ndarray:
-    """`matching_angles` in steps, with the label of their progress."""
 
     def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return matching_angles(surface, x, y, z, degree, a, b)
+        source, target = z[surface.corner_face[a]], z[surface.corner_face[b]]
+        unfolding = edge_unfolding(surface, x, y, a, b)
+        return np.angle(target * (source * power(unfolding, degree)).conj()) / degree
 
     return by_rows(angles, a, b, label=label)

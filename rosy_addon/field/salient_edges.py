@@ -109,12 +109,10 @@ def salient_edges(
     (E, 2) int32 ndarray
         Pairs of vertices.
     """
-    label = "finding sharp edges"
     face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
     angle = np.zeros(len(edges.ends))
     # Faces without area have no normal, so their edges have no angle.
     angle[edges.interior] = angle_between(normals[face_a], normals[face_b])
-    report(0.3, label)
     interior = angle[edges.interior]
     others = np.maximum(*largest_of_others(surface, angle[edges.corner_edge], edges.halfedges))
     noise = NOISE_MULTIPLE * noise_angle

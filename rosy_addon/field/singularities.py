@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import counted
 from ..progress import progress, report
 from .frames import dot
-from .representation import compute_matching_angles, face_frames, to_representation
+from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
 from .surface import Surface, build_edges, face_blocks, next_corners
 
@@ -53,13 +53,12 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     x, y = face_frames(surface)
     report(0.1, label)
     z = to_representation(field.vectors, x, y, field.degree)
-    report(0.2, label)
     with progress(0.2, 0.3, label):
         edges = build_edges(surface.corner_vertex, surface.face_start)
     report(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.4, 0.7):
-        matching = compute_matching_angles(surface, x, y, z, field.degree, a, b, label)
+        matching = matching_angles(surface, x, y, z, field.degree, a, b, label)
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
     report(0.7, label)
@@ -67,9 +66,7 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     # around its tail from b to a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
-    report(0.8, label)
-    with progress(0.8, 0.9, label):
-        corner_angles = signed_corner_angles(surface, x, y)
+    corner_angles = signed_corner_angles(surface, x, y)
     angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
     report(0.9, label)
     angle_sum = angle_sum + angle_defect
@@ -121,8 +118,7 @@ def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularit
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))
-    for faces, corners, starts in face_blocks(surface.face_start):
-        report(faces.start / surface.face_count, "measuring angles")
+    for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
         edge = points[following] - points
         face = surface.corner_face[corners]

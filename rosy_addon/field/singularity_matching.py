@@ -12,8 +12,8 @@ from .surface import Surface
 #: Singularities match if they are nearer than this fraction of the longest side of the mesh.
 DEFAULT_REACH = 0.05
 
-#: Distances that are computed in a step.
-DISTANCES_PER_STEP = 2_000_000
+#: Distances that are computed at once.
+DISTANCES_PER_BLOCK = 2_000_000
 
 
 class SingularityMatching(NamedTuple):
@@ -115,7 +115,7 @@ def _candidates(
     """Find all pairs within reach whose indices are the same: both singularities, and distances."""
     empty = np.empty(0, dtype=np.intp)
     found = [(empty, empty, np.empty(0))]
-    rows = max(DISTANCES_PER_STEP // max(len(other_index), 1), 1)
+    rows = max(DISTANCES_PER_BLOCK // max(len(other_index), 1), 1)
     for start in range(0, len(index), rows):
         report(start / len(index), "matching singularities")
         block = slice(start, start + rows)

@@ -8,7 +8,7 @@ from ..progress import progress, report
 from .blocks import concatenated_ranges
 from .surface import Surface, build_edges
 
-#: Label of all steps.
+#: Label of the progress.
 LABEL = "pairing singularities"
 
 

@@ -64,8 +64,8 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
         z, _ = smallest_eigenvectors(connection, degree)
     report(0.95, "aligning the field")
     z = _align_to_edges(connection, z, degree)
-    with progress(0.95, 1.0):
-        vectors = face_vectors(surface, connection, z, degree)
+    report(0.95, "averaging the field on the faces")
+    vectors = face_vectors(surface, connection, z, degree)
     return RosyField(degree, vectors)
 
 
@@ -82,8 +82,7 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
     report(0.0, "building the connection Laplacian")
     mass = connection.positive_mass
     shift = spectral_shift(mass)
-    with progress(0.05, 0.1):
-        matrix = laplacian(connection, degree, shift)
+    matrix = laplacian(connection, degree, shift)
     with progress(0.1, 1.0):
         z, energy = eigenproblem(matrix, mass, connection.component)
     return z, energy - shift
@@ -306,16 +305,11 @@ def face_vectors(
 
     Zero on faces where the mean is zero.
     """
-    label = "averaging the field on the faces"
-    report(0.0, label)
     x, y = face_frames(surface)
-    report(0.3, label)
     frame_angle = corner_frame_angles(surface, connection, x, y)
-    report(0.5, label)
     mean = node_sum_per_face(surface, connection, z, frame_angle, degree)
     modulus = np.abs(mean)
     mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    report(0.9, label)
     return from_representation(mean, x, y, degree)
 
 

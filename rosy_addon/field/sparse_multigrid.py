@@ -28,8 +28,8 @@ DIRECT_SOLVE_SIZE = 400
 #: Rows processed at once, so that their entries fit in the cache of a core.
 BLOCK_ROWS = 1 << 12
 
-#: Blocks of rows of a new matrix that are assembled at once.
-BLOCKS_PER_STEP = 4
+#: Blocks of rows of a new matrix that are assembled between two reports.
+BLOCKS_PER_REPORT = 4
 
 #: Entries below this fraction of the largest off-diagonal entry of both rows are weak: they do not
 #: connect unknowns to an aggregate.
@@ -146,12 +146,9 @@ def from_coo(
     """
     # A radix sort by digits of 16 bits, the low digit first: numpy's stable sort takes linear time
     # only for integers of at most 16 bits.
-    label = "sorting a matrix"
     order = np.argsort(row.astype(np.uint16), kind="stable")
-    report(0.3, label)
     if row_count > 1 << 16:
         order = order.take(np.argsort((row >> 16).astype(np.uint16).take(order), kind="stable"))
-    report(0.6, label)
     indptr = np.zeros(row_count + 1, dtype=np.intp)
     np.cumsum(np.bincount(row, minlength=row_count), out=indptr[1:])
     return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
@@ -198,7 +195,7 @@ def _assemble_by_rows(
     bits = int(column_count).bit_length()
     row_counts, index_blocks, value_blocks = [], [], []
     for first in range(0, len(matrix), BLOCK_ROWS):
-        if first % (BLOCKS_PER_STEP * BLOCK_ROWS) == 0:
+        if first % (BLOCKS_PER_REPORT * BLOCK_ROWS) == 0:
             report(first / len(matrix), "building multigrid levels")
         last = min(first + BLOCK_ROWS, len(matrix))
         row, column, value = entries(slice(matrix.indptr[first], matrix.indptr[last]))
@@ -258,28 +255,25 @@ def hierarchy(matrix: CSRMatrix) -> list[Level]:
     unknown_count = len(matrix)
     label = "building multigrid levels"
     while True:
-        start = 1 - len(matrix) / (unknown_count + 1)
-        middle, stop = 1 - 0.7 * (1 - start), 1 - 0.4 * (1 - start)
-        report(start, label)
+        rest = len(matrix) / (unknown_count + 1)
+        parts = [1 - share * rest for share in (1.0, 0.7, 0.6, 0.5, 0.4)]
+        report(parts[0], label)
         jacobi_weight = _jacobi_weights(matrix)
         aggregation = None
         if len(matrix) > DIRECT_SOLVE_SIZE:
-            with progress(start, middle, label):
+            with progress(parts[0], parts[1], label):
                 aggregation = _aggregates(matrix)
         if aggregation is None or aggregation[1] > 0.8 * len(matrix):
             inverse = _dense_inverse(matrix) if len(matrix) <= 4 * DIRECT_SOLVE_SIZE else None
             levels.append(Level(matrix, None, jacobi_weight, inverse))
             return levels
-        with progress(middle, label=label):
+        with progress(parts[1], parts[2], label):
             prolongation = _smoothed_prolongation(matrix, jacobi_weight, *aggregation)
         levels.append(Level(matrix, prolongation, jacobi_weight, None))
-        with progress(middle, stop):
+        with progress(parts[2], parts[3], label):
             product = matrix_product(matrix, prolongation)
-        report(stop, label)
-        adjoint = prolongation.adjoint
-        report(stop, label)
-        with progress(stop, label=label):
-            matrix = matrix_product(adjoint, product)
+        with progress(parts[3], parts[4], label):
+            matrix = matrix_product(prolongation.adjoint, product)
 
 
 def add_diagonal(levels: list[Level], diagonal: np.ndarray) -> list[Level]:

@@ -29,8 +29,8 @@ from ..progress import progress, report
 from .blocks import row_blocks
 from .surface import build_edges, next_corners, sorted_with_order
 
-#: Label of all steps.
-STEP_LABEL = "spacing lines"
+#: Label of the progress.
+LABEL = "spacing lines"
 
 #: Bounds of the cotangent weights of edges. The lower one also connects obtuse triangles.
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0
@@ -180,22 +180,21 @@ def stripe_pattern(
     -------
     StripePattern
     """
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     change = directions.phase_changes(spacing)
     with progress(0.0, 0.1):
         gluing = _gluing(triangle_vertex, directions)
     with progress(0.1, 0.2):
         change = _shared_changes(change, gluing, directions)
-    with progress(0.2, 0.3):
-        covering = _covering(triangle_vertex, gluing, directions)
-    with progress(0.3, 0.4):
-        graph = _graph(covering, gluing, change, directions)
+    report(0.2, LABEL)
+    covering = _covering(triangle_vertex, gluing, directions)
+    graph = _graph(covering, gluing, change, directions)
     with progress(0.4, 0.9):
         z = _smoothest(graph)
     phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
     index = np.empty(phase.shape[:2], dtype=np.float32)
     for block in row_blocks(len(phase)):
-        report(0.95, STEP_LABEL)
+        report(0.95, LABEL)
         corner = z[covering.node[block]]
         np.conjugate(corner, out=corner, where=covering.conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
@@ -233,15 +232,15 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     """Match the directions of neighboring triangles, unfolded into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    with progress(0.0, 0.6, STEP_LABEL):
+    with progress(0.0, 0.6, LABEL):
         edges = build_edges(corner_vertex, start)
-    report(0.6, STEP_LABEL)
+    report(0.6, LABEL)
     a, b = edges.halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
     angle = (0.5 * (directions.angle + np.roll(directions.angle, -1, axis=1))).reshape(-1)
-    report(0.8, STEP_LABEL)
+    report(0.8, LABEL)
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
@@ -261,7 +260,7 @@ def _shared_changes(
     glued = np.flatnonzero(gluing.twin >= 0)
     twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
-        report(family / families, STEP_LABEL)
+        report(family / families, LABEL)
         direction = (family + shift) % directions.degree
         neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
         np.negative(neighbor, out=neighbor, where=direction < families)
@@ -302,19 +301,16 @@ def _covering(
     previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
     first, pointer = corner, previous
     for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
-        report(0.2, STEP_LABEL)
         first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
     # A closed fan begins at its first corner, an open one at the corner without a previous one.
     is_closed = has_previous[pointer]
     start = np.where(is_closed & (first == corner), corner, previous)
     shift = np.where(start != corner, gluing.shift, 0)
     while True:
-        report(0.6, STEP_LABEL)
         following = start[start]
         if np.array_equal(following, start):
             break
         shift, start = (shift + shift[start]) % degree, following
-    report(0.8, STEP_LABEL)
     closes = has_previous & (start == corner)
     turn = (gluing.shift + shift[previous]) % degree
     is_singular = (closes & (turn != 0))[start]
@@ -326,7 +322,6 @@ def _covering(
     node = np.empty((len(corner), families), dtype=np.int32)
     conjugated = np.empty(node.shape, dtype=bool)
     for family in range(families):
-        report(0.9, STEP_LABEL)
         direction = (family + shift) % degree
         node[:, family] = number * families + direction % families
         conjugated[:, family] = direction >= families
@@ -392,7 +387,6 @@ def _graph(
     covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
 ) -> _Graph:
     """The graph of the edges of all triangles on the covering."""
-    report(0.0, STEP_LABEL)
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))
     has_twin = gluing.twin >= 0
@@ -407,41 +401,35 @@ def _graph(
         covering.node.reshape(-1, families),
         covering.conjugated.reshape(-1, families),
     )
-    report(0.2, STEP_LABEL)
     tail_flipped, head_flipped = conjugated[tail], conjugated[head]
     turn = change.reshape(-1, families)[tail]
     np.negative(turn, out=turn, where=head_flipped)
     value = np.exp((2j * np.pi) * turn)
     value *= weight[tail, None]
     flips = tail_flipped != head_flipped
-    report(0.5, STEP_LABEL)
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
-    with progress(0.5, 1.0):
-        return _graph_of_entries(
-            covering.node_count,
-            np.concatenate([head_node, tail_node]),
-            np.concatenate([tail_node, head_node]),
-            np.concatenate([a, a.conj()]),
-            np.concatenate([b, b]),
-        )
+    return _graph_of_entries(
+        covering.node_count,
+        np.concatenate([head_node, tail_node]),
+        np.concatenate([tail_node, head_node]),
+        np.concatenate([a, a.conj()]),
+        np.concatenate([b, b]),
+    )
 
 
 def _graph_of_entries(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> _Graph:
     """A graph of entries in any order; those between the same nodes add up."""
-    report(0.0, STEP_LABEL)
     entry = np.flatnonzero(row != column)
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)
-    report(0.4, STEP_LABEL)
     entry = entry[order]
     first = _run_starts(key)
     if len(first):
         a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
     row, column = np.divmod(key[first], max(node_count, 1))
-    report(1.0, STEP_LABEL)
     return _Graph(node_count, row, column, a[: len(row)], b[: len(row)])
 
 
@@ -450,12 +438,10 @@ def _smoothest(graph: _Graph) -> np.ndarray:
     levels = [graph]
     clusterings: list[_Clustering] = []
     while graph.node_count > MIN_LEVEL_NODES and len(graph.row):
-        with progress(0.2):
-            clustering = _clustering(graph)
+        clustering = _clustering(graph)
         if clustering.count * MIN_COARSENING > graph.node_count:
             break
-        with progress(0.2):
-            graph = _coarse_graph(graph, clustering)
+        graph = _coarse_graph(graph, clustering)
         clusterings.append(clustering)
         levels.append(graph)
     z = np.ones(graph.node_count, dtype=np.complex128)
@@ -467,7 +453,7 @@ def _smoothest(graph: _Graph) -> np.ndarray:
             inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
         steps = SMOOTHING_STEPS * STEP_GROWTH ** len(clusterings)
         for _ in range(int(min(steps, MAX_SMOOTHING_STEPS))):
-            report(1 - 0.7 * len(clusterings) / len(levels), STEP_LABEL)
+            report(1 - 0.7 * len(clusterings) / len(levels), LABEL)
             z = _smoothed(graph, z, inertia)
         if not clusterings:
             return z
@@ -512,7 +498,6 @@ class _Clustering(NamedTuple):
 
 def _clustering(graph: _Graph) -> _Clustering:
     """Group nodes into pairs and triples along their strongest edges."""
-    report(0.0, STEP_LABEL)
     count = graph.node_count
     # A hash makes the strengths distinct, so that many nodes find a partner at once.
     low, high = np.minimum(graph.row, graph.column), np.maximum(graph.row, graph.column)
@@ -522,7 +507,6 @@ def _clustering(graph: _Graph) -> _Clustering:
     nodes = np.arange(count)
     entry = np.arange(len(graph.row))
     for _ in range(MATCHING_ROUNDS):
-        report(0.2, STEP_LABEL)
         free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
         entry = entry[free]
         if not len(entry):
@@ -534,7 +518,6 @@ def _clustering(graph: _Graph) -> _Clustering:
         mutual = choice[choice[chooser]] == chooser
         partner[chooser[mutual]] = choice[chooser[mutual]]
         link[chooser[mutual]] = chosen[mutual]
-    report(0.8, STEP_LABEL)
     # The first node of a pair is the root; the other and single neighbors of the root follow it.
     is_root = (partner < 0) | (partner > nodes)
     root = np.where(is_root, nodes, partner)
@@ -567,7 +550,6 @@ def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) 
 
 def _coarse_graph(graph: _Graph, clustering: _Clustering) -> _Graph:
     """The graph of clusters: the entries in terms of their values."""
-    report(0.0, STEP_LABEL)
     cluster, p, q, count = clustering
     row, column = cluster[graph.row], cluster[graph.column]
     entry = np.flatnonzero(row != column)
@@ -575,8 +557,6 @@ def _coarse_graph(graph: _Graph, clustering: _Clustering) -> _Graph:
     a, b = graph.a[entry], graph.b[entry]
     # After the map of the column.
     a, b = a * p[tail] + b * q[tail].conj(), a * q[tail] + b * p[tail].conj()
-    report(0.3, STEP_LABEL)
     # Before the inverse map of the row: that of p is its conjugate, that of q is the map itself.
     a, b = p[head].conj() * a + q[head] * b.conj(), p[head].conj() * b + q[head] * a.conj()
-    with progress(0.5, 1.0):
-        return _graph_of_entries(count, row[entry], column[entry], a, b)
+    return _graph_of_entries(count, row[entry], column[entry], a, b)

@@ -246,12 +246,10 @@ def smooth_fans(
     Without a sharp angle, the result does not depend on the vertex positions.
     """
     label = "finding smooth edges"
-    report(0.0, label)
     with progress(0.0, 0.5, label):
         pairs = _smooth_corner_pairs(
             vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
         )
-    report(0.5, label)
     with progress(0.5, 1.0, label):
         return connected_components(len(corner_vertex), pairs)
 
@@ -522,7 +520,6 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
     root = np.arange(count, dtype=np.int32)
     a, b = pairs[:, 0], pairs[:, 1]
     while len(a):
-        report(1 - len(a) / len(pairs), "finding connected parts")
         low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
         _lower(root, high, low)
         while True:

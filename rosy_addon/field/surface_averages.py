@@ -48,8 +48,7 @@ def bounded_curvature(
             triangles=surface.triangles,
             triangle_face=surface.triangle_face,
         )
-    with progress(0.6, 1.0):
-        mean, deviator = face_curvature(smooth, x, y)
+    mean, deviator = face_curvature(smooth, x, y)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     limit = np.maximum(0.5 * np.sqrt(dot(vectors, vectors)), 1e-300) ** -0.5
     modulus = np.abs(deviator)

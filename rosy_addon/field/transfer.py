@@ -48,9 +48,7 @@ def transfer_field(
     RosyError
         If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
     """
-    report(0.0, "transferring the field")
-    with progress(0.0, 0.1):
-        points = _face_points(target)
+    points = _face_points(target)
     with progress(0.1, 0.9):
         triangle, distance = closest_triangles(source, points)
     report(0.9, "transferring the field")
@@ -80,7 +78,6 @@ def _face_points(surface: Surface) -> np.ndarray:
     """(F, 3) a point on each face: the centroid of its largest triangle."""
     points = np.empty((surface.face_count, 3))
     for faces in row_blocks(surface.face_count):
-        report(faces.start / surface.face_count, "transferring the field")
         limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])
         triangles = slice(*limits)
         face = surface.triangle_face[triangles]

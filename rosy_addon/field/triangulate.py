@@ -14,11 +14,11 @@ COLLINEAR_SINE = 1e-6
 #: Corners that are compared with a triangle at once.
 CHUNK_SIZE = 512
 
-#: The label of the steps.
+#: Label of the progress.
 LABEL = "triangulating the mesh"
 
-#: Faces whose corners are compared in a step.
-FACES_PER_STEP = 1 << 14
+#: Faces whose corners are compared at once.
+FACES_PER_BLOCK = 1 << 14
 
 
 def triangulate(
@@ -106,9 +106,8 @@ def _fan_apexes(
     needs_ears = np.zeros(len(faces), dtype=bool)
     for count in np.unique(size):
         same_size = np.flatnonzero(size == count)
-        block_size = max(FACES_PER_STEP * 4 // int(count), 1)
+        block_size = max(FACES_PER_BLOCK * 4 // int(count), 1)
         for start in range(0, len(same_size), block_size):
-            report(0.7 * start / len(same_size), LABEL)
             group = same_size[start : start + block_size]
             corners = face_start[faces[group]][:, None] + np.arange(count)
             sine = _corner_sines(vertices[corner_vertex[corners]])

@@ -81,9 +81,8 @@ def turning_angles(
     triangles = triangle_graph(surface, graph)
     present_between = triangles.on_triangles(present)
     count = len(triangles.area)
-    with progress(0.0, 0.1):
-        tree = spanning_forest(count, triangles.graph.source, triangles.graph.target)
-    with progress(0.1, 0.2):
+    tree = spanning_forest(count, triangles.graph.source, triangles.graph.target)
+    with progress(0.0, 0.2):
         loops = _loops(triangles.graph, tree)
     with progress(0.2, 0.8):
         drop = least_angles(triangles.graph, degree, required, loops, present_between)
@@ -170,7 +169,6 @@ def least_angles(
     present: np.ndarray | float,
 ) -> np.ndarray:
     """(I,) angles of least squares, divided by the conductances; see `turning_angles`."""
-    report(0.0, LABEL)
     with progress(0.0, 0.5):
         solver = _potential_solver(graph)
     share = 0.5 / (len(loops) + 1)
@@ -290,12 +288,11 @@ def _loops(graph: FaceGraph, tree: SpanningForest) -> list[tuple[np.ndarray, np.
     first_border = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.intp)
     first_border[component[border[::-1]]] = border[::-1]
     node[border] = first_border[component[border]]
-    with progress(0.0, 0.5):
-        primal = spanning_forest(graph.node_count, node[graph.tail[rest]], node[graph.head[rest]])
+    primal = spanning_forest(graph.node_count, node[graph.tail[rest]], node[graph.head[rest]])
     closing = rest[~primal.has_edge]
     loops = []
     for edge in closing.tolist():
-        report(0.5 + 0.5 * len(loops) / len(closing), LABEL)
+        report(len(loops) / len(closing), LABEL)
         edges, signs = [np.array([edge])], [np.array([1.0])]
         for face, sign in ((graph.target[edge], -1.0), (graph.source[edge], 1.0)):
             path = tree.path_to_root(int(face))

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import RosyError, counted
 from ..progress import progress, report
 from .blocks import by_rows, row_blocks
-from .corner_fans import compute_corner_rotations, corner_angles
+from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
     closest_rosy,
     detect_families,
@@ -49,7 +49,7 @@ MAX_COMPONENT = 1e30
 #: Vectors whose components are all smaller count as zero, because products would underflow.
 MIN_COMPONENT = 1e-30
 
-#: The label of the steps in which vectors are checked.
+#: Label of the progress of checking vectors.
 LABEL = "checking the field"
 
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
@@ -109,9 +109,7 @@ def validated_field(
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
-    report(0.0, LABEL)
-    with progress(0.0, 0.4, LABEL):
-        normal = tangent_normals(surface, domain)
+    normal = tangent_normals(surface, domain)
     if domain == "face":
         with progress(0.4, 1.0):
             return RosyField(
@@ -169,8 +167,7 @@ def validated_directions(
     count_matches = domain is not None and count == _element_count(surface, domain)
     are_rosys = True
     if count_matches:
-        with progress(0.1, 0.2, LABEL):
-            normal = tangent_normals(surface, domain)
+        normal = tangent_normals(surface, domain)
         for rows in row_blocks(count):
             report(0.2 + 0.1 * rows.start / count, LABEL)
             x, y = tangent_frame(normal[rows])
@@ -218,13 +215,11 @@ def _average_directions_to_faces(
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
     w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-    report(0.0, LABEL)
     with progress(0.0, 0.2):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
     face_x, face_y = face_frames(surface)
-    report(0.3, LABEL)
     with progress(0.3, 0.5):
-        rotation = compute_corner_rotations(
+        rotation = corner_rotations(
             surface.face_normal, face_x, surface.corner_face, normal[surface.corner_vertex], LABEL
         )
 
@@ -271,7 +266,6 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
         on vertices without a face.
     """
     surface = surface.in_rest_shape()
-    report(0.0, "computing normals")
     if domain == "face":
         return surface.face_normal
     return vertex_normals(surface)
@@ -288,13 +282,9 @@ def vertex_normals(surface: Surface) -> np.ndarray:
         Unit normals; zero on vertices without a face.
     """
     count = len(surface.vertices)
-    label = "computing normals"
-    with progress(0.0, 0.5, label):
-        angles = corner_angles(surface)
+    angles = corner_angles(surface)
     face_normal = surface.face_normal
-    report(0.7, label)
     weighted = face_normal[surface.corner_face] * angles[:, None]
-    report(0.8, label)
     columns = [np.bincount(surface.corner_vertex, column, count) for column in weighted.T]
     return normalize(np.stack(columns, axis=1))
 
@@ -413,7 +403,7 @@ def _average_to_faces(
     report(0.2, LABEL)
     corner_normal = normal[surface.corner_vertex]
     with progress(0.2, 0.8):
-        rotation = compute_corner_rotations(
+        rotation = corner_rotations(
             surface.face_normal, x, surface.corner_face, corner_normal, LABEL
         )
     mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)

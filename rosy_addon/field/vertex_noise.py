@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import report
 from .frames import angle_between, dot, normalize
 from .salient_edges import weighted_median
 from .surface import Edges, Surface, face_area_vectors
@@ -37,14 +36,12 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
     (V, 3) float64 ndarray
         Displacements of the vertices, in Blender units.
     """
-    label = "measuring noise"
     count = len(surface.vertices)
     normal = np.stack(
         [np.bincount(surface.corner_vertex, n, count) for n in surface.corner_normal.T], axis=1
     )
     normal = normalize(normal)
     sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
-    report(0.3, label)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     area = np.sqrt(dot(vectors, vectors))
     probe = PROBE * np.sqrt(area.mean())
@@ -53,10 +50,8 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
     )
     turn = weighted_median(angle_between(vectors, displaced), area)
     by_angle = probe * noise_angle / turn if turn > 0 else 0.0
-    report(0.6, label)
     used = surface.used_vertices
     actual = np.median(np.abs(_roughness(surface.vertices, normal, edges.ends)[used]))
-    report(0.8, label)
     unit = np.median(np.abs(_roughness(sample, normal, edges.ends)[used]))
     by_roughness = actual / unit if unit > 0 else 0.0
     return min(by_angle, by_roughness) * sample

@@ -14,7 +14,7 @@ from ..field.frames import transform_components
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, box_corners
 from ..progress import Progress, Task, as_task, subtask
-from ..projection.corner_field import CornerField, compute_corner_field
+from ..projection.corner_field import CornerField, field_at_corners
 from ..projection.face_values import SIMILARITY_EPS
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.mip_map import MipMap
@@ -178,7 +178,7 @@ def mesh_buffers_task(
     if field is not None:
         matrix = np.eye(4)
         matrix[:3, :3] = linear
-        task = as_task(compute_corner_field, surface, matrix, field, display)
+        task = as_task(field_at_corners, surface, matrix, field, display)
         corner_field = yield from subtask(task, 0.2, 0.7)
         tone_values = None if tone is None else tone.values[surface.triangles]
         texels = record_texels(len(channels), tone is not None, values is not None)

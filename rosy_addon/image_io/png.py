@@ -39,7 +39,7 @@ def write_png(path: str | os.PathLike[str], rgba: np.ndarray) -> None:
     RosyError
         If the file cannot be written.
     """
-    write_bytes(path, compute_png(rgba))
+    write_bytes(path, png_bytes(rgba))
 
 
 def to_srgb_uint8(rgba: np.ndarray) -> np.ndarray:
@@ -53,7 +53,7 @@ def _to_uint8(values: np.ndarray) -> np.ndarray:
     return np.rint(np.clip(values, 0, 1) * 255).astype(np.uint8)
 
 
-def compute_png(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
+def png_bytes(rgba: np.ndarray, *, is_color: bool = True) -> bytes:
     """Encode a picture as a PNG file; see `write_png`.
 
     If it is not a color but data, values are stored as they are.

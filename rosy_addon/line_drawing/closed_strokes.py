@@ -33,8 +33,8 @@ MIN_LOOP_LENGTH = 6.0
 #: loop may miss its first point after them.
 MAX_ITERATIONS, CLOSING_TOLERANCE = 4, 1e-3
 
-#: Step of a particle in spacings, and the number of steps after which a task yields.
-TRACE_STEP, STEPS_PER_YIELD = 0.5, 8
+#: Step of a particle in spacings, and the number of steps between two reports.
+TRACE_STEP, STEPS_PER_REPORT = 0.5, 8
 
 
 class _ClosingTrace(NamedTuple):
@@ -169,7 +169,7 @@ def _trace_loops(
     active = np.arange(len(candidates))
     segments: list[tuple[np.ndarray, ...]] = []
     while len(active):
-        if len(segments) % STEPS_PER_YIELD == 0:
+        if len(segments) % STEPS_PER_REPORT == 0:
             report(1 - len(active) / len(candidates), "closing loops")
         current = particles.take(active)
         to_origin = origin[active] - mesh.points_at(current.triangle, current.weights)

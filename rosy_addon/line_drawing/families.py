@@ -109,7 +109,6 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
     node = triangle[:, None] * family_count + slots
     other_node = other[:, None] * family_count + (slots + shift[:, None]) % family_count
     pairs = np.stack([node.ravel(), other_node.ravel()], axis=1)
-    report(0.4, label)
     with progress(0.4, 0.8, label):
         component = connected_components(count * family_count, pairs)
     component = component.reshape(count, family_count)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.creases import compute_creases
+from ..field.creases import find_creases
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
 from ..progress import progress, report
@@ -72,7 +72,7 @@ def outline(
         pixels. Without a camera there are no silhouettes.
     crease_angle : float
         Smallest angle in radians between the normals of the two faces at a crease; see
-        `field.creases.compute_creases`.
+        `field.creases.find_creases`.
 
     Returns
     -------
@@ -80,7 +80,6 @@ def outline(
         World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
     label = "finding outlines"
-    report(0.0, label)
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     points = instance.world_points()[surface.triangle_vertex]
@@ -88,11 +87,11 @@ def outline(
     flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
     corners = _Corners(points, normals[surface.triangles], flat)
     vertex = surface.triangle_vertex.ravel()
-    edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
+    with progress(0.0, 0.3, label):
+        edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    report(0.3, label)
     with progress(0.3, 0.7, label):
-        is_crease = _are_pairs(vertex, a, compute_creases(surface, crease_angle).ends)
+        is_crease = _are_pairs(vertex, a, find_creases(surface, crease_angle).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])

@@ -152,11 +152,14 @@ def draw_instances(
             depth_buffer = rasterize_depth(instances, camera)
     traced = {}
     for rank, index in enumerate(drawn):
-        start, stop = (0.05 + 0.83 * done / len(drawn) for done in (rank, rank + 1))
+        start, middle, stop = (
+            0.05 + 0.83 * (rank + done) / len(drawn) for done in (0.0, 0.05, 1.0)
+        )
         seen = None
         if depth_buffer is not None:
-            seen = seen_triangles(instances, index, camera, depth_buffer)
-        with progress(start, stop):
+            with progress(start, middle):
+                seen = seen_triangles(instances, index, camera, depth_buffer)
+        with progress(middle, stop):
             strokes = _trace_instance(instances[index], camera, style, lights, clips, seen, cache)
         if strokes is not None:
             traced[index] = strokes
@@ -188,7 +191,7 @@ def draw_instances(
     instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
     heads = _arrowheads(strokes, instances, instance_of_family, style) if style.arrows else None
     if style.overshoot:
-        with progress(0.95, 1.0):
+        with progress(0.95, 0.98):
             strokes = _overshoot(strokes, instances, camera, style, clip_to_frame)
     if not len(strokes):
         raise _no_visible_stroke(camera)
@@ -196,7 +199,7 @@ def draw_instances(
         strokes = Strokes.join([strokes, heads])
     marks = None
     if shows_singularities(style):
-        with progress(1.0):
+        with progress(0.98, 1.0):
             marks = singularity_marks(instances, camera, style)
     return StrokeDrawing(
         _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden, marks

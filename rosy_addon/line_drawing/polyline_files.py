@@ -20,7 +20,7 @@ from .visibility import pixel_size
 DRAWING_SUFFIXES = (".svg", ".ply", ".obj", ".csv")
 
 #: Points that are formatted at once.
-POINTS_PER_STEP = 20_000
+POINTS_PER_BLOCK = 20_000
 
 #: The properties of a vertex of a .ply file. Lengths are 8 bytes, so that no position is rounded.
 _PLY_VERTEX = np.dtype(
@@ -72,10 +72,10 @@ def polyline_file(
         return _ply(strokes, *columns)
     blocks = (_csv_blocks if suffix == ".csv" else _obj_blocks)(strokes, *columns)
     contents = []
-    step_count = 2 + len(points) / POINTS_PER_STEP
+    block_count = 2 + len(points) / POINTS_PER_BLOCK
     for block in blocks:
         contents.append(block.encode())
-        report(0.4 + 0.6 * min(len(contents) / step_count, 1.0), "writing strokes")
+        report(0.4 + 0.6 * min(len(contents) / block_count, 1.0), "writing strokes")
     return b"".join(contents)
 
 
@@ -174,6 +174,6 @@ def _without_repeated_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _row_blocks(count: int) -> Iterator[slice]:
-    """Yield the rows of each step."""
-    for first in range(0, count, POINTS_PER_STEP):
-        yield slice(first, min(first + POINTS_PER_STEP, count))
+    """Yield the rows of each block."""
+    for first in range(0, count, POINTS_PER_BLOCK):
+        yield slice(first, min(first + POINTS_PER_BLOCK, count))

@@ -32,7 +32,7 @@ MIN_WALKED_RATIO = 0.999
 #: Gaps that are wider than this in spacings are divided for two strokes, other gaps for one.
 MIN_TWO_STROKE_GAP = 2.5
 
-#: Seeds that are compared with samples in a step. Bounds its time and memory.
+#: Seeds that are compared with samples at once. Bounds memory.
 SEED_BATCH_SIZE = 1 << 12
 
 

@@ -40,7 +40,7 @@ MAX_TURN = np.radians(18)
 #: The same for the normals of the surface: along strokes, and at their ends.
 FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
-#: Points that are examined at once, to bound memory and the length of a step.
+#: Points that are examined at once, to bound memory.
 BLOCK_POINTS = 1 << 14
 
 #: Radius around such points in which strokes are sampled finely, in spacings.
@@ -68,7 +68,6 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
         Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
     """
     label = "separating strokes"
-    report(0.0, label)
     with progress(0.0, 0.3, label):
         suspect = _suspect_points(mesh, strokes)
     if not suspect.any():
@@ -80,7 +79,6 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     )
     report(0.3, label)
     refined, source = _refine(strokes.select(candidates), np.isin(point, near_suspect))
-    report(0.4, label)
     with progress(0.4, 0.8, label):
         too_close = _too_close(mesh, refined, suspect[point][source], strokes.length[candidates])
     if not too_close.any():

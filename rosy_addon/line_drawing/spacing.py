@@ -10,7 +10,7 @@ import numpy as np
 
 from ..color import REC709_LUMINANCE
 from ..errors import RosyError
-from ..field.curvature import compute_magnitude
+from ..field.curvature import face_magnitude
 from ..field.frames import dot, normalize
 from ..field.surface import Surface, sum_per_fan
 from ..projection.camera import Camera
@@ -42,10 +42,14 @@ class LightSource(Protocol):
         Radiance of a white surface that faces the light; for a point light, at distance 1.
     """
 
-    kind: str
-    vector: np.ndarray
-    colour: np.ndarray
-    strength: float
+    @property
+    def kind(self) -> str: ...
+    @property
+    def vector(self) -> np.ndarray: ...
+    @property
+    def colour(self) -> np.ndarray: ...
+    @property
+    def strength(self) -> float: ...
 
 
 def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
@@ -126,7 +130,7 @@ def spacing_by_curvature(
     -------
     (V,) float64 ndarray
     """
-    curvature = compute_magnitude(surface, "curvature")
+    curvature = face_magnitude(surface, "curvature")
     corner = surface.corner_vertex
     count = np.bincount(corner, minlength=len(surface.vertices))
     vertex_curvature = np.bincount(corner, curvature[surface.corner_face], len(surface.vertices))

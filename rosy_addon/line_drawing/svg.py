@@ -59,8 +59,8 @@ _COLOR_CODE = re.compile("#(?:[0-9a-f]{3}){1,2}", re.IGNORECASE)
 #: Largest distance of the outline of a stroke from its center line at a bend, in half widths.
 MAX_MITER = 1.25
 
-#: Strokes that are written, or ordered for a plotter, at once.
-PATHS_PER_STEP = 1000
+#: Strokes that are written, or ordered for a plotter, between two reports.
+PATHS_PER_REPORT = 1000
 
 #: Largest distance in pixels between a removed point and the simplified polyline.
 SIMPLIFY_TOLERANCE_PX = 0.06
@@ -248,7 +248,7 @@ def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
         kept = simplify_mask(pixels, strokes.start, SIMPLIFY_TOLERANCE_PX)
     paths = []
     for stroke, backward in zip(order.tolist(), is_reversed.tolist(), strict=True):
-        if len(paths) % PATHS_PER_STEP == 0:
+        if len(paths) % PATHS_PER_REPORT == 0:
             report(0.6 + 0.4 * len(paths) / len(order), "writing strokes")
         span = slice(strokes.start[stroke], strokes.start[stroke + 1])
         points = pixels[span][kept[span]]
@@ -279,7 +279,7 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
     is_whole = np.bincount(stroke, minlength=len(strokes))[stroke] == 1
     paths = []
     for piece, level in enumerate(opacity_level[first].tolist()):
-        if piece % PATHS_PER_STEP == 0:
+        if piece % PATHS_PER_REPORT == 0:
             report(0.5 + 0.5 * piece / len(first), "writing strokes")
         span = slice(start[piece], start[piece + 1])
         if not level or not max_radius[piece]:
@@ -463,7 +463,7 @@ def plotter_order(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.n
     current, order, is_reversed = low.tolist(), [], []
     current_cell = (0, 0)
     for _ in range(count):
-        if len(order) % PATHS_PER_STEP == 0:
+        if len(order) % PATHS_PER_REPORT == 0:
             report(len(order) / count, "ordering strokes")
         nearest = _nearest_end(
             grid, positions, current, current_cell, cell_count, extent.max() / cell_count

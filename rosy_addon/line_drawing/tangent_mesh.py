@@ -307,7 +307,6 @@ def build_tangent_mesh(
             harmonics.append((channel[1], values))
         else:
             family_z = values.sum(axis=1)
-    report(0.6, label)
     with progress(0.6, 1.0):
         neighbor, neighbor_edge, edge_transport = _adjacency(
             surface,
@@ -484,10 +483,10 @@ def _adjacency(
     creases.
     """
     count, label = len(points), "connecting triangles"
-    edges = build_edges(
-        surface.triangle_vertex.ravel(), np.arange(0, 3 * count + 1, 3, dtype=np.int32)
-    )
-    report(0.5, label)
+    with progress(0.0, 0.5, label):
+        edges = build_edges(
+            surface.triangle_vertex.ravel(), np.arange(0, 3 * count + 1, 3, dtype=np.int32)
+        )
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     triangle_a, triangle_b = a // 3, b // 3
     passable = defined[triangle_a] & defined[triangle_b]

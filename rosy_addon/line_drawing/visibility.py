@@ -19,7 +19,7 @@ from .stroke_set import Strokes, arc_lengths
 #: Largest distance between the points of strokes at which visibility is tested, in pixels.
 SAMPLE_STEP_PX = 1.0
 
-#: Points of strokes that are clipped at once, to bound memory and the length of a step.
+#: Points of strokes that are clipped at once, to bound memory.
 BLOCK_POINTS = 1 << 16
 
 #: Pixels whose depth is computed at once.
@@ -240,7 +240,6 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
     flat_corners = corners.reshape(-1, 3)
     clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
     indices = np.arange(len(flat_corners), dtype=np.int32).reshape(-1, 3)
-    report(0.2, label)
     with progress(0.2, 0.8, label):
         fragments = rasterize(clip, indices, camera.width, camera.height)
     triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)

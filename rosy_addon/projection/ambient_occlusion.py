@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import RosyError
 from ..field.frames import dot, normalize
 from ..field.surface import Surface, sum_per_fan
-from ..progress import report
+from ..progress import progress
 from .gbuffer import MeshInstance
 from .shadow_maps import (
     NORMAL_BIAS_PIXELS,
@@ -68,11 +68,12 @@ def ambient_occlusion(
     points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
     visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
     for index, direction in enumerate(fibonacci_sphere(direction_count)):
-        report(index / direction_count, "sampling directions of light")
         cosine = normals @ direction
         facing_light = np.flatnonzero(cosine > 0)
         camera = sun_camera(direction, caster_points, receiver_points, resolution)
-        depth_map = render_depth_map(instances, camera)
+        start, stop = index / direction_count, (index + 1) / direction_count
+        with progress(start, stop, "sampling directions of light"):
+            depth_map = render_depth_map(instances, camera)
         total_weight[facing_light] += cosine[facing_light]
         visible_weight[facing_light] += cosine[facing_light] * visibility_from(
             camera, depth_map, points[facing_light], normals[facing_light]

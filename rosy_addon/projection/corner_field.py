@@ -95,7 +95,7 @@ class CornerField:
         )
 
 
-def compute_corner_field(
+def field_at_corners(
     surface: Surface, matrix: np.ndarray, field: RosyField, display: str
 ) -> CornerField:
     """Transport a field from the rest shape to the triangle corners of the deformed surface.
@@ -145,16 +145,16 @@ def compute_corner_field(
 def cached_corner_field(
     surface: Surface, matrix: np.ndarray, field: RosyField, display: str, cache: Cache | None = None
 ) -> CornerField:
-    """Do the same as `compute_corner_field`, with results stored in a cache if one is given.
+    """Do the same as `field_at_corners`, with results stored in a cache if one is given.
 
     All cameras, and instances that differ only in their location, share one corner field.
     """
     if cache is None:
-        return compute_corner_field(surface, matrix, field, display)
+        return field_at_corners(surface, matrix, field, display)
     linear = np.ascontiguousarray(np.asarray(matrix, dtype=np.float64)[:3, :3])
     return cache.get_or_create(
         ("corner field", surface, field, linear.tobytes(), display),
-        partial(compute_corner_field, surface, matrix, field, display),
+        partial(field_at_corners, surface, matrix, field, display),
     )
 
 

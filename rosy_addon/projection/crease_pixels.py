@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..field.blocks import blocks_by_count, concatenated_ranges
+from ..progress import report
 from .camera import Camera
 from .gbuffer import GBuffer
 from .pixel_neighbors import depth_slopes
@@ -21,16 +22,15 @@ BLOCK_EDGES, BLOCK_CROSSINGS = 1 << 14, 1 << 16
 LINE_TOLERANCE = 2.0
 
 
-def mark_crease_pixels(
+def crease_pixels(
     gbuffer: GBuffer,
     instance_id: int,
     points: np.ndarray,
     entry_of_cell: np.ndarray,
     origin: int,
     stride: int,
-    marks: np.ndarray,
-) -> Iterator[float]:
-    """Mark the pixels next to visible edges, in steps.
+) -> np.ndarray:
+    """Find the pixels next to visible edges.
 
     An edge crosses the segments between the centers of adjacent pixels. It is visible at one of the
     two pixels if its depth is that of the surface there, extrapolated to the crossing.
@@ -46,22 +46,22 @@ def mark_crease_pixels(
         The entry of the G-buffer in each cell of a frame with a margin, or -1.
     origin, stride : int
         Cell of the lower left pixel, and cells in a row.
-    marks : (P,) bool ndarray
-        Is set at the pixels found.
 
-    Yields
-    ------
-    float
-        Fraction of the edges that are done.
+    Returns
+    -------
+    (P,) bool ndarray
+        Which pixels of the G-buffer these are.
     """
+    marks = np.zeros(len(gbuffer.pixel), dtype=bool)
     for start in range(0, len(points), BLOCK_EDGES):
+        report(start / len(points), "drawing outlines")
         lines = _on_screen(points[start : start + BLOCK_EDGES], gbuffer.camera)
         for axis in (0, 1):
             for crossing in _crossings(lines, axis, gbuffer.camera):
-                yield start / len(points)
                 _mark_visible(
                     gbuffer, instance_id, axis, *crossing, entry_of_cell, origin, stride, marks
                 )
+    return marks
 
 
 def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:

@@ -13,8 +13,8 @@ from ..progress import progress, report
 from .gbuffer import GBuffer
 from .pixel_blocks import pixel_blocks
 
-#: Label of all steps.
-STEP_LABEL = "measuring features"
+#: Label of the progress.
+LABEL = "measuring features"
 
 
 def cached_feature_curvature(surface: Surface, cache: Cache) -> np.ndarray:
@@ -49,7 +49,7 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
             corners = cached_feature_curvature(gbuffer.instances[index].surface, cache)
         pixels = np.flatnonzero(gbuffer.instance_id == index)
         for block in pixel_blocks(len(pixels)):
-            report(stop, STEP_LABEL)
+            report(stop, LABEL)
             part = pixels[block]
             values = corners.take(gbuffer.triangle[part], axis=0)
             curvature[part] = np.einsum("ij,ij->i", values, gbuffer.barycentric[part])

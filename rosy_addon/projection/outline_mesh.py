@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cache import Cache, content_hash
-from ..field.creases import compute_creases
+from ..field.creases import find_creases
 from ..field.surface import Surface, connected_components
 from ..progress import progress, report
 from .face_values import SIMILARITY_EPS
@@ -52,7 +52,7 @@ def outline_mesh(surface: Surface, matrix: np.ndarray, crease_angle: float | Non
     matrix : (3, 3) or (4, 4) ndarray
         Object to world space. The translation has no effect.
     crease_angle : float or None
-        See `compute_creases`. None: no creases.
+        See `find_creases`. None: no creases.
     """
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
@@ -60,7 +60,7 @@ def outline_mesh(surface: Surface, matrix: np.ndarray, crease_angle: float | Non
         if not _is_similarity(linear):
             shape = shape.with_vertices(shape.vertices @ linear.T)
         with progress(0.0, 0.6):
-            ends = compute_creases(shape, crease_angle).ends
+            ends = find_creases(shape, crease_angle).ends
     report(0.6, "finding connected parts")
     pairs = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
     with progress(0.6, 1.0):

@@ -1,7 +1,6 @@
 """Blocks of pixels: the unit in which long lists of pixels are processed.
 
-A block bounds the memory of intermediate results, fits the caches of the processor, and is short
-enough to be a step of a task.
+A block bounds the memory of intermediate results and fits the caches of the processor.
 """
 
 from __future__ import annotations

@@ -21,8 +21,8 @@ from .rasterizer import SampledTriangles
 #: Smallest cosine between the normals of two triangles that show the same surface: that of 30 degrees.
 MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
 
-#: Label of all steps.
-STEP_LABEL = "finding visible pixels"
+#: Label of the progress.
+LABEL = "finding visible pixels"
 
 
 class OtherSamples(NamedTuple):
@@ -102,7 +102,6 @@ def other_samples(
     count = len(sampled.other_entry)
     x, y, depth = np.empty((3, count), dtype=np.float32)
     for block in pixel_blocks(count):
-        report(block.start / count, STEP_LABEL)
         index = sampled.other_sample[block]
         x[block], y[block] = _centers(index, frame.width, samples)
         z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
@@ -131,7 +130,7 @@ def pixel_coverage(
     cell = np.empty(count, dtype=np.int32)
     columns = np.empty((6, count), dtype=np.float32)
     for block in pixel_blocks(count):
-        report(0.2 * block.start / count, STEP_LABEL)
+        report(0.2 * block.start / count, LABEL)
         row, column = np.divmod(gbuffer.pixel[block], np.int32(camera.width))
         cell[block] = (row + 1) * stride + column + 1
         entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
@@ -141,12 +140,12 @@ def pixel_coverage(
     entry = others.entry.copy()
     elsewhere = []
     for block in pixel_blocks(len(entry)):
-        report(0.2 + 0.5 * block.start / len(entry), STEP_LABEL)
+        report(0.2 + 0.5 * block.start / len(entry), LABEL)
         shown = entries.shows(entry[block], others.part(block))
         elsewhere.append(block.start + np.flatnonzero(~shown))
     elsewhere = np.concatenate([np.empty(0, dtype=np.intp), *elsewhere])
     for block in pixel_blocks(len(elsewhere)):
-        report(0.7 + 0.3 * block.start / len(elsewhere), STEP_LABEL)
+        report(0.7 + 0.3 * block.start / len(elsewhere), LABEL)
         part = elsewhere[block]
         sample, home = others.part(part), cell.take(entry[part])
         nearest = np.full(len(part), np.inf, dtype=np.float32)

@@ -95,7 +95,7 @@ def project(
             visible = _visible_pixels(instances, camera, rows)
     with progress(0.3, 0.4):
         gbuffer = _new_gbuffer(instances, camera, visible)
-    with progress(0.4, 1.0):
+    with progress(0.4, 1.0 if sampled is None else 0.9):
         geometric_normals = _fill_instances(gbuffer, visible, display, cache)
     if sampled is None:
         return gbuffer
@@ -103,10 +103,8 @@ def project(
     for instance_id, normal in geometric_normals.items():
         of_instance = np.flatnonzero(other_instance == instance_id)
         other_normal[:, of_instance] = normal.take(other_triangle[of_instance], axis=1)
-    with progress(1.0):
-        others = other_samples(
-            sampled, camera, samples, other_instance, other_triangle, other_normal
-        )
+    others = other_samples(sampled, camera, samples, other_instance, other_triangle, other_normal)
+    with progress(0.9, 1.0):
         coverage, pixel_samples = pixel_coverage(gbuffer, sampled, others, samples)
     return replace(gbuffer, coverage=coverage, samples=pixel_samples)
 
@@ -330,19 +328,14 @@ def _visible_pixels(
             fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0]
         )
     instance_has_field = np.array([instance.field is not None for instance in instances])
-    with progress(1.0):
-        instance_id, triangle = _split_triangles(first_triangle, fragments.triangle)
+    instance_id, triangle = _split_triangles(first_triangle, fragments.triangle)
     has_field = instance_has_field[instance_id]
     if not has_field.any():
         raise_nothing_in_view(instances, camera)
     if not has_field.all():
         field_pixels = np.flatnonzero(has_field)
         instance_id, triangle = instance_id[field_pixels], triangle[field_pixels]
-        collected = []
-        for values in fragments:
-            report(1.0, "finding visible pixels")
-            collected.append(values[field_pixels])
-        fragments = Fragments(*collected)
+        fragments = Fragments(*(values[field_pixels] for values in fragments))
     visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
     return _VisiblePixels(fragments, instance_id, triangle, visible_ids)
 
@@ -393,7 +386,6 @@ def _split_triangles(
         return np.zeros(len(triangle), dtype=np.int32), triangle
     instance_id = np.empty(len(triangle), dtype=np.int32)
     for block in pixel_blocks(len(triangle)):
-        report(1.0, "finding visible pixels")
         instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1
     return instance_id, triangle - first_triangle[instance_id]
 

@@ -29,8 +29,8 @@ MAX_BAND_PIXELS = 1 << 22
 #: Sum of barycentric coordinates that is not due to rounding: the pixel center is outside.
 MAX_WEIGHT_SUM = 1 + 1e-4
 
-#: Label of all steps.
-STEP_LABEL = "finding visible pixels"
+#: Label of the progress.
+LABEL = "finding visible pixels"
 
 
 class Fragments(NamedTuple):
@@ -232,8 +232,10 @@ def rasterize_samples(
     for row_start in range(first_row, stop_row, band_rows):
         row_stop = min(row_start + band_rows, stop_row)
         buffers = []
-        for scale, screen in screens:
-            with progress(row_start / height, row_stop / height):
+        for index, (scale, screen) in enumerate(screens):
+            half = (row_stop - row_start) / (2 * height)
+            start = row_start / height + index * half
+            with progress(start, start + half):
                 triangle, depth = _rasterize_rows(
                     screen, clipped, width * scale, row_start * scale, row_stop * scale
                 )
@@ -243,8 +245,7 @@ def rasterize_samples(
                 triangle.reshape(-1, scale, width, scale),
                 depth.reshape(-1, scale, width, scale),
             )
-        with progress(1.0):
-            band = _group_samples(*buffers, row_start)
+        band = _group_samples(*buffers, row_start)
         bands.append(band._replace(other_entry=band.other_entry + np.int32(entry_count)))
         entry_count += len(band.pixel)
     return SampledTriangles(*(np.concatenate(values) for values in zip(*bands, strict=True)))
@@ -276,7 +277,6 @@ def _group_samples(
     sample_places = [divmod(sample, samples) for sample in order]
     own_triangle, own_depth = center_triangle[:, 0, :, 0].copy(), center_depth[:, 0, :, 0].copy()
     for row, column in sample_places:
-        report(1.0, STEP_LABEL)
         empty = np.nonzero(own_triangle < 0)
         own_triangle[empty] = triangle[:, row, :, column][empty]
         own_depth[empty] = depth[:, row, :, column][empty]
@@ -287,7 +287,6 @@ def _group_samples(
     pixel_row, pixel_column = np.divmod(pixel.astype(np.int32), np.int32(width))
     pixel_row += np.int32(first_row)
     for row, column in sample_places:
-        report(1.0, STEP_LABEL)
         sample_triangle = triangle[:, row, :, column].ravel()[pixel]
         is_own = sample_triangle == own_triangle
         own_samples |= is_own.astype(np.uint16) << np.uint16(row * samples + column)
@@ -435,7 +434,7 @@ def _rasterize_rows(
         for spans in _scan_convert(screen, corners, clipped.triangle[block], width):
             spans.start[:] -= row_start * width
             for span_block in blocks_by_count(spans.count, BLOCK_SIZE):
-                report(start / len(clipped.triangle), STEP_LABEL)
+                report(start / len(clipped.triangle), LABEL)
                 _depth_test(
                     _Spans(*(values[span_block] for values in spans)), depth_buffer, triangle_buffer
                 )
@@ -673,7 +672,7 @@ def barycentrics(
     weights = np.empty((3, len(pixel)), dtype=np.float32)
     front_facing = np.empty(len(pixel), dtype=bool)
     for start in range(0, len(pixel), BLOCK_SIZE):
-        report(start / len(pixel), STEP_LABEL)
+        report(start / len(pixel), LABEL)
         block = slice(start, start + BLOCK_SIZE)
         row, column = np.divmod(pixel[block], np.int32(width))
         column, row = column + 0.5, row + 0.5

@@ -16,8 +16,8 @@ from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
 
-#: Label of all steps.
-STEP_LABEL = "finding points on the surface"
+#: Label of the progress.
+LABEL = "finding points on the surface"
 
 #: Distance of a mesh from its object's origin, in multiples of its size, beyond which positions are
 #: taken relative to the mesh: float32 would be too coarse for them.
@@ -90,7 +90,7 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     -------
     RestCoordinates
     """
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     count = len(gbuffer.pixel)
     coordinates = RestCoordinates(
         *(np.empty((3, count), dtype=np.float32) for _ in range(3)),
@@ -108,7 +108,7 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
             pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
         instance_count = count if pixels is None else len(pixels)
         for block in pixel_blocks(instance_count):
-            report((done + block.start) / count, STEP_LABEL)
+            report((done + block.start) / count, LABEL)
             part = block if pixels is None else pixels[block]
             _fill_pixels(coordinates, gbuffer, instance, rest, screen, part)
         done += instance_count

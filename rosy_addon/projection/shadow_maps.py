@@ -34,8 +34,8 @@ NORMAL_BIAS_PIXELS = 3.2
 #: used, in radii of the receivers. Nearer lights use six.
 SINGLE_VIEW_MIN_RADII = 1.3
 
-#: Label of all steps.
-STEP_LABEL = "casting shadows"
+#: Label of the progress.
+LABEL = "casting shadows"
 
 
 def light_cameras(
@@ -178,11 +178,11 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
     result = np.ones(len(gbuffer.pixel), dtype=np.float32)
     for index, camera in enumerate(cameras):
         rendered, done = (index + 0.5) / len(cameras), (index + 1) / len(cameras)
-        with progress(index / len(cameras), rendered, STEP_LABEL):
+        with progress(index / len(cameras), rendered, LABEL):
             depth_map = render_depth_map(gbuffer.instances, camera)
         for block in pixel_blocks(len(result)):
             fraction = rendered + (done - rendered) * block.start / len(result)
-            report(fraction, STEP_LABEL)
+            report(fraction, LABEL)
             points = (gbuffer.position[block] - translation) @ rotation
             result[block] *= visibility_from(
                 camera, depth_map, points, gbuffer.normal[block] @ rotation

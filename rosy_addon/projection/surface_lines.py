@@ -21,7 +21,7 @@ from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_patte
 from ..field.surface import Surface, build_surface
 from ..memory import check_memory
 from ..progress import progress, report
-from .corner_field import CornerField, compute_corner_field
+from .corner_field import CornerField, field_at_corners
 from .face_values import SIMILARITY_EPS
 from .fan_values import transport_phase
 from .field_channel import rotation_order
@@ -136,7 +136,7 @@ def surface_lines(
         A map of the rest shape to the shape on which distances are measured.
     field : RosyField
     display : {"smooth", "flat"}
-        As for `compute_corner_field`.
+        As for `field_at_corners`.
     spacing : float
         Distance between neighboring lines after `stretch`.
     max_triangles : int
@@ -168,11 +168,11 @@ def surface_lines(
     matrix = np.eye(4)
     matrix[:3, :3] = stretch
     with progress(0.05, 0.1, label):
-        corner_field = compute_corner_field(rest, matrix, field, display)
+        corner_field = field_at_corners(rest, matrix, field, display)
     points = transform_components(np.ascontiguousarray(rest.vertices.T), stretch).T
     max_triangles = max(max_triangles, len(rest.triangles))
-    with progress(0.1, 0.2, label):
-        tree = bisect(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
+    report(0.1, label)
+    tree = bisect(points, rest.triangle_vertex, MAX_EDGE * spacing, max_triangles)
     count = len(tree.leaf_root)
     check_memory(
         count * (TRIANGLE_BYTES + FAMILY_BYTES * field_symmetry(field).line_count),

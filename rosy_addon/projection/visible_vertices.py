@@ -22,11 +22,11 @@ from .project import all_triangles
 #: Surfaces that are nearer to a point than this fraction of the size of the scene do not hide it.
 SAME_POINT = 1e-6
 
-#: Triangles in a step, and pairs of triangles and points that are tested at a time.
-TRIANGLES_PER_STEP, PAIRS_PER_STEP = 1 << 15, 1 << 20
+#: Triangles, and pairs of triangles and points that are tested at a time.
+TRIANGLES_PER_BLOCK, PAIRS_PER_BLOCK = 1 << 15, 1 << 20
 
-#: Labels of all steps, for vertices and for points in triangles.
-STEP_LABEL, POINTS_LABEL = "finding visible singularities", "finding places of arrowheads"
+#: Labels of the progress, for vertices and for points in triangles.
+LABEL, POINTS_LABEL = "finding visible singularities", "finding places of arrowheads"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def project_vertices(
     ProjectedPoints
         Of the vertices of all instances, in their order.
     """
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
     first = np.cumsum([0, *(len(instance.surface.vertices) for instance in instances[:-1])])
     vertex = np.concatenate(
@@ -94,7 +94,7 @@ def project_vertices(
     def touches(triangle: np.ndarray, point: np.ndarray) -> np.ndarray:
         return (scene.triangles[triangle] == vertex[point][:, None]).any(axis=1)
 
-    return _project(scene, scene.clip[vertex], scene.world[vertex], touches, STEP_LABEL)
+    return _project(scene, scene.clip[vertex], scene.world[vertex], touches, LABEL)
 
 
 def project_points(
@@ -209,10 +209,10 @@ def _project(
         clip_planes,
         tolerance,
     )
-    for start in range(0, len(number), TRIANGLES_PER_STEP):
+    for start in range(0, len(number), TRIANGLES_PER_BLOCK):
         report(start / len(number), label)
         left = np.flatnonzero(is_visible)
-        for triangle, chosen in occluders.pairs(start, start + TRIANGLES_PER_STEP, ndc[left]):
+        for triangle, chosen in occluders.pairs(start, start + TRIANGLES_PER_BLOCK, ndc[left]):
             point = left[chosen]
             others = np.flatnonzero(~touches(number[triangle], point))
             triangle, point = triangle[others], point[others]
@@ -282,7 +282,7 @@ class _Occluders:
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        for part in blocks_by_count(count, PAIRS_PER_STEP):
+        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
             triangle = start + kept[np.repeat(box[part], count[part])]
             yield triangle, order[concatenated_ranges(first[part], count[part])]
 

@@ -14,7 +14,7 @@ from ..color import to_linear
 from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_writable, make_folder, replacing, write_bytes
-from ..image_io.png import compute_png
+from ..image_io.png import png_bytes
 from ..progress import progress, report
 
 #: Pixels by which colors are extended past the border of the covered area. A render whose
@@ -74,7 +74,7 @@ def compute_image_data(picture: Picture, *, as_float: bool) -> ImageData:
     if as_float:
         return ImageData(pixels)
     with progress(0.5, 1.0, STEP_LABEL):
-        return ImageData(pixels, compute_png(pixels, is_color=picture.spread is None))
+        return ImageData(pixels, png_bytes(pixels, is_color=picture.spread is None))
 
 
 def _bleed(rgba: np.ndarray) -> np.ndarray:

@@ -27,8 +27,8 @@ SAME_UV = 1e-6
 #: Largest coordinate in a UV map. Beyond it, single texels can no longer be told apart.
 MAX_COORDINATE = 1000.0
 
-#: Label of all steps.
-STEP_LABEL = "reading the UV map"
+#: Label of the progress.
+LABEL = "reading the UV map"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +103,14 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
     RosyError
         If a coordinate is not finite or too large, or no triangle has an area in the UV map.
     """
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     corner_uv = _checked(surface, uv)[surface.triangles]
     linear = 0.5 * (corner_uv * mesh.gradient.conj()).sum(axis=1)
     conjugate = 0.5 * (corner_uv * mesh.gradient).sum(axis=1)
     gradient = _gradients(corner_uv)
     if not gradient.any():
         raise RosyError(f"{surface.name}: no face has an area in the UV map: unwrap the mesh")
-    report(0.2, STEP_LABEL)
+    report(0.2, LABEL)
     edges = _chart_edges(mesh, corner_uv)
     with progress(0.2, 0.4):
         chart = connected_components(len(corner_uv), np.stack(edges[:2], axis=1))
@@ -200,16 +200,16 @@ def _averaged_at_corners(
     fan = surface.corner_fan[surface.triangles].ravel()
     pairs = np.concatenate(edges.ends())
     pairs = pairs[fan[pairs[:, 0]] == fan[pairs[:, 1]]]
-    with progress(0.0, 0.6, STEP_LABEL):
+    with progress(0.0, 0.6, LABEL):
         group = connected_components(len(fan), pairs)
-    report(0.6, STEP_LABEL)
+    report(0.6, LABEL)
     vector = mesh.to_world(np.arange(len(direction)), direction) * mesh.area[:, None]
     total = np.stack(
         [np.bincount(group, np.repeat(component, 3)) for component in vector.T], axis=1
     )
     frame = np.empty((len(direction), 3), dtype=np.complex128)
     for corner in range(3):
-        report(0.7 + 0.1 * corner, STEP_LABEL)
+        report(0.7 + 0.1 * corner, LABEL)
         tangent, normal = total[group[corner::3]], mesh.corner_normal[:, corner]
         tangent = tangent - dot(tangent, normal)[:, None] * normal
         tangent = transport(tangent, normal, mesh.normal)

@@ -20,8 +20,8 @@ from .charts import uv_tangents
 from .line_order import CombedDirections, combed_directions
 from .texel_surface import TexelSurface
 
-#: Label of all steps.
-STEP_LABEL = "drawing directions"
+#: Label of the progress.
+LABEL = "drawing directions"
 
 
 def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.ndarray:
@@ -51,7 +51,7 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
     is_mirrored = charts.density < 0
     values = np.empty((len(texels), 3), dtype=np.float32)
     for block in pixel_blocks(len(texels)):
-        report(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
+        report(0.8 + 0.2 * block.start / len(texels), LABEL)
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         direction, is_defined = _directions_at(mesh, combed, triangle, weights)
         if is_flow:
@@ -83,7 +83,7 @@ def corner_directions(mesh: TangentMesh, guiding_angle: float) -> np.ndarray:
     """
     with progress(0.0, 0.8):
         combed = combed_directions(mesh, guiding_angle)
-    report(0.8, STEP_LABEL)
+    report(0.8, LABEL)
     triangle = np.repeat(np.arange(len(mesh.x)), 3)
     weights = np.tile(np.eye(3, dtype=np.float32), (len(mesh.x), 1))
     direction, is_defined = _directions_at(mesh, combed, triangle, weights)

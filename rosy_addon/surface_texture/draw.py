@@ -41,11 +41,11 @@ from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
 from .direction_maps import direction_map
 from .hatching import hatching
-from .margin import compute_margin
+from .margin import fill_margin
 from .texel_field import texel_field
 from .texel_noise import texel_noise
 from .texel_surface import TexelSurface
-from .texels import Texels, TextureFrame, compute_texels, texture_frame
+from .texels import Texels, TextureFrame, rasterize_charts, texture_frame
 
 #: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
 #: mesh fills has lines of about the same width.
@@ -210,7 +210,7 @@ def draw_texture(
     frame = texture_frame(charts, size, name, is_udim)
     _check_texture_memory(frame, charts, mesh, look)
     with progress(0.1, 0.15):
-        texels = compute_texels(charts, frame, name)
+        texels = rasterize_charts(charts, frame, name)
     step = step_length(mesh, charts, texels)
     crease_angle = None if look.cross_creases else look.crease_angle
     with progress(0.15, 0.3):
@@ -220,17 +220,17 @@ def draw_texture(
     surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"
     if is_direction:
-        pixels_task, is_data = partial(direction_map, on, content, look.guiding_angle), True
+        draw, is_data = partial(direction_map, on, content, look.guiding_angle), True
     elif is_hatched(look):
-        pixels_task = partial(hatching, on, field, surface_look, look.guiding_angle, lights, cache)
+        draw = partial(hatching, on, field, surface_look, look.guiding_angle, lights, cache)
         is_data = lights is None
     else:
-        pixels_task, is_data = partial(_colors, on, field, surface_look), False
+        draw, is_data = partial(_colors, on, field, surface_look), False
     with progress(0.3, 0.95):
-        pixels = pixels_task()
+        pixels = draw()
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
-        image = compute_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
+        image = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
     if image.shape[2] == 4:
         return Texture(frame, image, texels.overlap, is_data, mesh.family_count)
     rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
@@ -295,7 +295,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
         noise = texel_noise(on, look)
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
-    with progress(0.95):
+    with progress(0.95, 0.97):
         layer = degree_layer(field, look, images)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
@@ -306,6 +306,6 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
         field = replace(field, map_position=scaled_positions(values, low, scale))
     color = np.empty((len(field.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(color)):
-        report(0.95 + 0.05 * block.start / len(color), "drawing the colors")
+        report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
         color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
     return color

@@ -59,8 +59,8 @@ TRIANGLES_PER_TEXEL = 16
 #: Least number of spots along the side of a texture where a field has no direction.
 MIN_SPOTS = 8
 
-#: Label of all steps.
-STEP_LABEL = "drawing hatching"
+#: Label of the progress.
+LABEL = "drawing hatching"
 
 
 def thresholds(
@@ -94,16 +94,16 @@ def thresholds(
         order = line_order(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
     wobble_angle = None
     if has_wobble(look):
-        with progress(0.1, 0.15):
+        with progress(0.1, 0.13):
             wobble_angle = _wobble_angle(on, look)
-        with progress(0.15):
+        with progress(0.13, 0.15):
             field = rotate_pixel_field(field, np.float32(look.wobble) * wobble_angle)
     with progress(0.15, 0.85):
         images, modulation = _lines(on, field, look, wobble_angle, cache)
     members = all_members(field, look.guiding_angle)[: field.line_count]
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(pixels)):
-        report(0.85 + 0.15 * block.start / len(pixels), STEP_LABEL)
+        report(0.85 + 0.15 * block.start / len(pixels), LABEL)
         part_images = None if images is None else images.part(block)
         part = modulation.part(block)
         thresholds = np.stack(
@@ -174,7 +174,7 @@ def lit_ink(
     """
     colors = np.ones_like(pixels)
     for block in pixel_blocks(len(pixels)):
-        report(block.start / len(pixels), STEP_LABEL)
+        report(block.start / len(pixels), LABEL)
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
         position = on.mesh.points_at(triangle, weights)
         normal = on.mesh.shading_normals_at(triangle, weights)
@@ -219,7 +219,8 @@ def _lines(
     else:
         with progress(0.3, 0.8):
             (images,) = lic_lengths(field, [look], noise)
-    look_streak_statistics(look)
+    with progress(0.8, 0.9):
+        look_streak_statistics(look)
     if undefined:
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
@@ -229,7 +230,7 @@ def _lines(
         seen_noise = unconvolved_noise(noise, look)
         undirected = undirected_texture(field, seen_noise, grain)
     if has_paper_grain(look):
-        with progress(0.8, 1.0):
+        with progress(0.9, 1.0):
             paper_grain = _paper_grain(on, field, look)
     return images, LineModulation(
         break_images=break_images,
@@ -291,7 +292,7 @@ def _even_lines(
     jacobian = field.screen_jacobian
     area = np.abs((jacobian[:, 0].conj() * jacobian[:, 1]).imag)
     for block in pixel_blocks(len(texels)):
-        report(0.8 + 0.2 * block.start / len(texels), STEP_LABEL)
+        report(0.8 + 0.2 * block.start / len(texels), LABEL)
         triangle, weights = texels.triangle[block], texels.barycentric[block]
         leaf, in_leaf = lines.tree.locate(triangle, weights)
         first, second = lines.heading.take(leaf, axis=1)

@@ -39,8 +39,8 @@ X_AXIS_WEIGHT = 0.01
 #: Sharpness of the choice between lines. Those whose weight is below `MIN_WEIGHT` are not drawn.
 SHARPNESS, MIN_WEIGHT = 6.0, 0.02
 
-#: Label of all steps.
-STEP_LABEL = "ordering lines"
+#: Label of the progress.
+LABEL = "ordering lines"
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ def line_order(mesh: TangentMesh, guiding_angle: float, blend: float) -> LineOrd
     """
     with progress(0.0, 0.4):
         refined = _refined(mesh)
-    with progress(0.4, 1.0, STEP_LABEL):
+    with progress(0.4, 1.0, LABEL):
         return _first_lines(mesh, refined, guiding_angle, blend)
 
 
@@ -173,14 +173,14 @@ def combed_directions(mesh: TangentMesh, guiding_angle: float) -> CombedDirectio
     """
     with progress(0.0, 0.3):
         refined = _refined(mesh)
-    with progress(0.3, 0.6, STEP_LABEL):
+    with progress(0.3, 0.6, LABEL):
         lines = _first_lines(mesh, refined, guiding_angle, 0.0)
     if lines.degree == 1:
         return CombedDirections(lines, lines)
     root = refined.tree.leaf_root
     line = power(_unit_root(lines.first.sum(axis=1), 2), 2)
     guide = _guide(mesh, guiding_angle, 1)[root]
-    with progress(0.6, 1.0, STEP_LABEL):
+    with progress(0.6, 1.0, LABEL):
         sense = _aligned(refined, line, 2, guide, 1, AVERAGE_LENGTHS)
     return CombedDirections(lines, sense)
 
@@ -198,22 +198,22 @@ class _RefinedMesh(NamedTuple):
 
 def _refined(mesh: TangentMesh) -> _RefinedMesh:
     """Refine a mesh."""
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     side = float(np.sqrt(mesh.area.sum()))
     with progress(0.0, 0.2):
         points, triangle_vertex = _welded(mesh)
     # No number is very large or small.
     points = (points - points.mean(axis=0)) / side
     max_triangles = max(MAX_TRIANGLES, len(triangle_vertex))
-    with progress(0.2, 0.3):
-        tree = bisect(points, triangle_vertex, MAX_EDGE, max_triangles)
+    report(0.2, LABEL)
+    tree = bisect(points, triangle_vertex, MAX_EDGE, max_triangles)
     root = tree.leaf_root
     start = np.arange(0, 3 * len(root) + 1, 3, dtype=np.int32)
     with progress(0.3, 0.6):
         leaves = build_surface(tree.vertices, tree.leaf_vertex.ravel(), start)
     with progress(0.6, 0.9):
         connection = build_connection(leaves)
-    report(0.9, STEP_LABEL)
+    report(0.9, LABEL)
     return _RefinedMesh(tree, SurfaceAverages(leaves, connection, mesh.x[root], mesh.y[root]), side)
 
 
@@ -256,17 +256,14 @@ def _aligned(
     """
     averages = refined.averages
     connection = averages.connection
-    with progress(0.0, 0.1):
-        laplacian_result = laplacian(connection, degree)
-    laplacian_result = laplacian_result.with_values(laplacian_result.data.astype(np.complex64))
+    matrix = laplacian(connection, degree)
+    matrix = matrix.with_values(matrix.data.astype(np.complex64))
     nodes = None
     for number, length in enumerate(lengths):
-        done = 0.1 + 0.9 * number / len(lengths)
-        report(done, STEP_LABEL)
         snapped = power(nearest_member(_unit_root(first, degree), z, z_degree), degree)
         sums = averages.node_sums(snapped, degree)
-        with progress(done, label=STEP_LABEL):
-            nodes = averages.smooth(laplacian_result, length**2, sums, nodes)
+        with progress(number / len(lengths), (number + 1) / len(lengths), LABEL):
+            nodes = averages.smooth(matrix, length**2, sums, nodes)
         first = averages.face_means(nodes, degree)
     angle = averages.frame_angle.reshape(-1, 3)
     corners = nodes[connection.corner_node].reshape(-1, 3) * np.exp(1j * degree * angle)

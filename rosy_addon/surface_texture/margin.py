@@ -13,11 +13,11 @@ from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
 from ..progress import report
 from .texels import TextureFrame
 
-#: Label of all steps.
-STEP_LABEL = "filling the margin"
+#: Label of the progress.
+LABEL = "filling the margin"
 
 
-def compute_margin(
+def fill_margin(
     frame: TextureFrame,
     field: PixelField,
     color: np.ndarray,
@@ -43,7 +43,7 @@ def compute_margin(
     (H, W, K) float32 ndarray
         The mean of the colors where there is neither chart nor margin.
     """
-    report(0.0, STEP_LABEL)
+    report(0.0, LABEL)
     height, width, channels = frame.height, frame.width, color.shape[1]
     image = np.empty((height, width, channels), dtype=np.float32)
     image[...] = color.mean(axis=0, dtype=np.float64)
@@ -60,7 +60,7 @@ def compute_margin(
         filled[outer] = True
         ring = np.union1d(ring, outer)
     for number in range(margin):
-        report((number + 1) / (margin + 1), STEP_LABEL)
+        report((number + 1) / (margin + 1), LABEL)
         ring = _dilate(frame, flat, filled, ring)
     return image
 

@@ -34,8 +34,8 @@ MAX_SEAM_STRETCH = 64.0
 #: Texels whose steps across seams are traced at once.
 SEAM_BLOCK = 1 << 14
 
-#: Label of all steps.
-STEP_LABEL = "following the surface across seams"
+#: Label of the progress.
+LABEL = "following the surface across seams"
 
 
 def texel_field(
@@ -89,7 +89,7 @@ def texel_field(
     with progress(0.3, 0.7):
         mask = _neighbor_masks(mesh, charts, texels, z != 0, crease_angle)
     with progress(0.7, 1.0):
-        seam_steps = _compute_seam_steps(mesh, charts, texels, mask, z != 0)
+        seam_steps = _find_seam_steps(mesh, charts, texels, mask, z != 0)
     return PixelField(
         degree=degree,
         width=texels.frame.width,
@@ -134,7 +134,7 @@ def _neighbor_masks(
     band_rows = max((1 << 16) // width, 1)
     corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
     for first_row in range(0, height, band_rows):
-        report(first_row / height, STEP_LABEL)
+        report(first_row / height, LABEL)
         # One more row: the first of the next band, or an empty one.
         first, stop = np.searchsorted(
             texels.index, [first_row * width, (first_row + band_rows + 1) * width]
@@ -178,7 +178,7 @@ def _neighbor_masks(
     return masks
 
 
-def _compute_seam_steps(
+def _find_seam_steps(
     mesh: TangentMesh, charts: UvCharts, texels: Texels, mask: np.ndarray, defined: np.ndarray
 ) -> SeamSteps:
     """Trace the steps that `mask` does not have along the surface."""
@@ -190,7 +190,7 @@ def _compute_seam_steps(
     offsets = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])
     parts = []
     for start in range(0, len(source), SEAM_BLOCK):
-        report(start / len(source), STEP_LABEL)
+        report(start / len(source), LABEL)
         part = slice(start, start + SEAM_BLOCK)
         parts.append(
             _seam_steps(

@@ -29,8 +29,8 @@ SAMPLE_STRIDE = 3
 #: Texels that are spread over the grid at once.
 GRID_BLOCK = 1 << 18
 
-#: Label of all steps.
-STEP_LABEL = "making noise"
+#: Label of the progress.
+LABEL = "making noise"
 
 
 def texel_noise(on: TexelSurface, look: Look) -> np.ndarray:
@@ -60,7 +60,7 @@ def texel_noise(on: TexelSurface, look: Look) -> np.ndarray:
     instance_hash = instance_hashes([surface.name])
     total = np.empty((channels, len(texels)), dtype=np.float32)
     for block in pixel_blocks(len(texels)):
-        report(0.7 * block.start / len(texels), STEP_LABEL)
+        report(0.7 * block.start / len(texels), LABEL)
         triangle = texels.triangle[block]
         corners = triangle_vertex.take(triangle, axis=0).T
         change = gradient.take(triangle, axis=0).T
@@ -79,7 +79,7 @@ def texel_noise(on: TexelSurface, look: Look) -> np.ndarray:
         _subtract_local_means(on, rest, total, sigma)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
     for block in pixel_blocks(len(noise)):
-        report(1.0, STEP_LABEL)
+        report(1.0, LABEL)
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
 
@@ -118,7 +118,7 @@ def _subtract_local_means(
 
     sums = np.zeros((1 + len(channels), int(shape.prod())))
     for number, block in enumerate(blocks):
-        report(0.7 + 0.15 * number / len(blocks), STEP_LABEL)
+        report(0.7 + 0.15 * number / len(blocks), LABEL)
         block = slice(block.start, block.stop, SAMPLE_STRIDE)
         first, place = cells(block)
         weight = area[texels.triangle[block]]
@@ -129,7 +129,7 @@ def _subtract_local_means(
                 out += np.bincount(point, share * values[block], sums.shape[1])
     means = (sums[1:] / np.maximum(sums[0], np.finfo(float).tiny)).astype(np.float32)
     for number, block in enumerate(blocks):
-        report(0.85 + 0.15 * number / len(blocks), STEP_LABEL)
+        report(0.85 + 0.15 * number / len(blocks), LABEL)
         first, place = cells(block)
         for offset, share in _corner_shares(place, stride):
             for values, mean in zip(channels, means, strict=True):

@@ -22,8 +22,8 @@ MAX_TILES = 100
 #: Number of the tile at the origin, and tiles in a row, in the numbering of UDIM.
 FIRST_TILE, TILES_PER_ROW = 1001, 10
 
-#: Label of all steps.
-STEP_LABEL = "finding texels"
+#: Label of the progress.
+LABEL = "finding texels"
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
     )
 
 
-def compute_texels(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
+def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
     """Find the texels whose centers are on the surface.
 
     Where charts overlap, a texel shows the triangle with the smallest index of the first tile.
@@ -170,7 +170,7 @@ def compute_texels(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
         clip[:, 0], clip[:, 1] = 2 * (corners.real - u) - 1, 2 * (corners.imag - v) - 1
         clip[:, 3] = 1
         reaches = _reaches_tile(clip[:, :2].reshape(-1, 3, 2))
-        with progress(start, stop, STEP_LABEL):
+        with progress(start, stop, LABEL):
             fragments = rasterize(clip, triangles[reaches], frame.size, frame.size)
         index = fragments.pixel + np.int32(frame.first_row(number) * frame.width)
         columns = index, reaches[fragments.triangle].astype(np.int32), fragments.barycentric
@@ -179,7 +179,7 @@ def compute_texels(charts: UvCharts, frame: TextureFrame, name: str) -> Texels:
             columns = tuple(column[is_free] for column in columns)
             taken[columns[0]] = True
         parts.append(columns)
-    report(1.0, STEP_LABEL)
+    report(1.0, LABEL)
     index, triangle, barycentric = (np.concatenate(column) for column in zip(*parts, strict=True))
     if not len(index):
         raise RosyError(

@@ -32,7 +32,7 @@ MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
     "memory": {"errors"},
-    "cache": {"progress"},
+    "cache": set(),
     "processes": {"progress"},
     "deterministic_trig": set(),
     "color": {"errors"},
@@ -45,9 +45,10 @@ MAY_IMPORT = {
     "line_drawing": BASE_ROOMS | {"field", "projection", "annotation"},
     "surface_texture": BASE_ROOMS | {"field", "projection", "compositor", "line_drawing"},
     "image_io": BASE_ROOMS,
-    "rendering": BASE_ROOMS | {"field", "projection", "annotation", "compositor", "cache"},
+    "worker": BASE_ROOMS | {"field", "projection", "compositor"},
+    "rendering": BASE_ROOMS | {"field", "projection", "annotation", "compositor", "worker"},
     "preset_files": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "cache"},
+    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "worker"},
     "scene": BASE_ROOMS
     | {
         "field",
@@ -56,19 +57,20 @@ MAY_IMPORT = {
         "compositor",
         "line_drawing",
         "surface_texture",
+        "worker",
         "rendering",
-        "cache",
         "image_io",
         "preset_files",
     },
-    "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
-    "comb_field": BASE_ROOMS | {"field", "scene", "cache"},
-    "bake_texture": BASE_ROOMS | {"compositor", "surface_texture", "scene", "image_io", "cache"},
+    "bake": BASE_ROOMS | {"compositor", "worker", "rendering", "scene", "gpu"},
+    "comb_field": BASE_ROOMS | {"field", "worker", "scene"},
+    "bake_texture": BASE_ROOMS
+    | {"compositor", "surface_texture", "worker", "rendering", "scene", "image_io"},
     "animation": BASE_ROOMS
-    | {"projection", "annotation", "compositor", "rendering", "scene", "gpu", "cache"},
+    | {"projection", "annotation", "compositor", "worker", "rendering", "scene", "gpu"},
     "viewport": BASE_ROOMS
     | {"field", "projection", "annotation", "compositor", "rendering", "scene", "gpu"},
-    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "scene", "cache"},
+    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "worker", "scene"},
     "frame_workers": BASE_ROOMS,
     "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
     "ui": BASE_ROOMS
@@ -93,6 +95,7 @@ MAY_IMPORT = {
         "compositor",
         "line_drawing",
         "surface_texture",
+        "worker",
         "rendering",
         "image_io",
         "preset_files",
@@ -141,7 +144,8 @@ NUMPY_ROOMS = (
     "line_drawing",
     "surface_texture",
     "image_io",
-    "preset_files",
+    "presets",
+    "worker",
     "rendering",
 )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -21,8 +20,8 @@ from rosy_addon.errors import RosyError
 from rosy_addon.external.ffmpeg import find_encoder
 from rosy_addon.field.generate import axis_field
 from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw_compress
-from rosy_addon.processes import process_task
-from rosy_addon.progress import as_task, run_to_completion
+from rosy_addon.processes import run_process
+from rosy_addon.progress import listening
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import (
@@ -90,7 +89,7 @@ def test_the_object_stays_in_the_frame_in_all_views():
     instance = MeshInstance(surface, matrix, axis_field(surface, 2))
     covered = []
     for view in turntable_views(instance, QUICK, 5, (80, 60), (10.0, 25.0)):
-        rgba = (draw_picture(view)).rgba
+        rgba = draw_picture(view).rgba
         assert rgba.shape == (60, 80, 4)
         visible = rgba[..., 3] > 0
         assert not (
@@ -105,7 +104,7 @@ def test_a_video_has_all_frames(tmp_path):
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     path = tmp_path / "film.gif"
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
-    assert turntable(CpuRenderer(), views, 3, path, 12) == path
+    assert turntable(draw_picture, views, 3, path, 12) == path
     gif, actual = decode_frames(path.read_bytes())
     assert len(actual) == 3 and gif.size == (32, 32)
     assert (actual[0][0, 0] == 255).all(), "on white paper"
@@ -118,11 +117,8 @@ def test_streaks_drift_before_a_still_camera_in_whole_cycles():
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 1))
     look = Look(length=8, flow=1.5)
     cache = Cache()
-    renderer = CpuRenderer(cache)
     views = evicting(turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True), cache)
-    pictures = []
-    for view in views:
-        pictures.append(run_to_completion(renderer.render_task(view)).rgba[..., 0])
+    pictures = [draw_picture(view, cache).rgba[..., 0] for view in views]
     assert len(pictures) == 12 and len(cache) < 12
     visible = pictures[0] > 0
     likeness = [
@@ -141,14 +137,18 @@ def test_lights_stay_fixed_while_the_camera_orbits():
     look = Look(length=8, shading=1.0, light="scene")
     sun = Light("sun", np.array([0.0, 1.0, 0.0]), np.ones(3), 1.0)
     dark, lit = (
-        (draw_picture(view)).rgba[20:44, 20:44, :3].mean()
+        draw_picture(view).rgba[20:44, 20:44, :3].mean()
         for view in turntable_views(instance, look, 2, (64, 64), (0.0, 0.0), lights=[sun])
     )
     assert dark < 0.05 < 0.2 < lit
 
 
-def test_the_encoder_is_stopped_with_the_task(tmp_path, monkeypatch):
-    """An .mp4 is encoded by another program: in short steps, and closing the task kills it."""
+class CancelledError(Exception):
+    """Raised by listeners."""
+
+
+def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
+    """An .mp4 is encoded by another program."""
     surface = icosphere(2)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     views = turntable_views(instance, QUICK, 2, (32, 32), (0.0, 0.0))
@@ -158,40 +158,49 @@ def test_the_encoder_is_stopped_with_the_task(tmp_path, monkeypatch):
         code = (
             f"import os, time; open({str(pid_file)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
         )
-        yield from process_task([sys.executable, "-c", code], "encoding")
+        run_process([sys.executable, "-c", code], "encoding")
 
-    task = as_task(turntable, CpuRenderer(), views, 2, tmp_path / "film.mp4", 12, encode)
-    while not pid_file.exists() or not pid_file.read_text():
-        start = time.monotonic()
-        progress = next(task)
-        assert progress.label != "encoding the video" or time.monotonic() - start < 5
-    task.close()
+    def cancel(fraction, label):
+        if label == "encoding the video" and pid_file.exists() and pid_file.read_text():
+            raise CancelledError
+
+    with listening(cancel), pytest.raises(CancelledError):
+        turntable(draw_picture, views, 2, tmp_path / "film.mp4", 12, encode)
     with pytest.raises(ProcessLookupError):
         os.kill(int(pid_file.read_text()), 0)
     assert not (tmp_path / "film.mp4").exists()
 
 
-def test_a_program_that_fails(tmp_path):
-    status, output = run_to_completion(
-        process_task([sys.executable, "-c", "import sys; print('bad pixels'); sys.exit(3)"], "")
-    )
+def test_a_program_that_fails():
+    program = "import sys; print('bad pixels'); sys.exit(3)"
+    status, output = run_process([sys.executable, "-c", program], "")
     assert (status, output.strip()) == (3, "bad pixels")
 
 
-def test_a_gif_is_encoded_frame_by_frame():
-    frames = [np.full((4, 4, 3), value, dtype=np.uint8) for value in (0, 90, 200)]
-    assert [progress.fraction for progress in as_task(gif_bytes, frames, 20)] == [0, 1 / 3, 2 / 3]
-
-
-def test_an_unfinished_video_leaves_no_file(tmp_path):
+def test_the_progress_names_each_picture(tmp_path):
     surface = icosphere(2)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
-    task = as_task(turntable, CpuRenderer(), views, 3, tmp_path / "film.gif", 12)
-    for progress in task:
-        if progress.label == "picture 3 of 3":
-            break
-    task.close()
+    reports = []
+    with listening(lambda *report: reports.append(report)):
+        turntable(draw_picture, views, 3, tmp_path / "film.gif", 12)
+    fractions = [fraction for fraction, _ in reports]
+    assert fractions == sorted(fractions) and fractions[0] == 0 and 0.97 < fractions[-1] < 1
+    labels = [f"picture {number} of 3" for number in (1, 2, 3)]
+    assert list(dict.fromkeys(label for _, label in reports)) == [*labels, "encoding the video"]
+
+
+def test_a_cancelled_video_leaves_no_file(tmp_path):
+    surface = icosphere(2)
+    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
+    views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
+
+    def cancel(fraction, label):
+        if label == "picture 3 of 3":
+            raise CancelledError
+
+    with listening(cancel), pytest.raises(CancelledError):
+        turntable(draw_picture, views, 3, tmp_path / "film.gif", 12)
     assert not list(tmp_path.iterdir())
 
 
@@ -203,7 +212,7 @@ def test_an_mp4_with_ffmpeg(tmp_path):
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     views = turntable_views(instance, QUICK, 4, (64, 48), (0.0, 0.0))
     path = tmp_path / "film.mp4"
-    turntable(CpuRenderer(), views, 4, path, 12, find_encoder())
+    turntable(draw_picture, views, 4, path, 12, find_encoder())
     facts, *pictures = imageio_ffmpeg.read_frames(str(path))
     assert facts["fps"] == 12 and facts["codec"] == "h264" and facts["source_size"] == (64, 48)
     assert len(pictures) == 4

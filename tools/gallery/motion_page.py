@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from rosy_addon.cache import Cache
@@ -10,6 +12,7 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import evicting, turntable, turntable_views
 
 from .page import ROOT
@@ -48,4 +51,5 @@ def _write_loop(surface: Surface, field: RosyField, look: Look, name: str) -> No
     instance = MeshInstance(surface, np.eye(4), field)
     cache = Cache()
     views = turntable_views(instance, look, COUNT, (SIDE, SIDE), ANGLES, still=True)
-    turntable(CpuRenderer(cache), evicting(views, cache), COUNT, IMAGES / name, RATE)
+    draw = partial(draw_picture, cache=cache)
+    turntable(draw, evicting(views, cache), COUNT, IMAGES / name, RATE)

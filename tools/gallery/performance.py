@@ -21,10 +21,10 @@ from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.preset_files.store import load_preset
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 from .page import ROOT
@@ -69,8 +69,7 @@ def _samples(look: Look, name: str) -> None:
     pictures = {}
     for label, samples in (("one sample", 1), ("2 x 2 samples", 2)):
         sampled = replace(look, supersampling=samples)
-        task = CpuRenderer().render_task(ViewInput((instance,), camera, sampled))
-        pictures[label] = display(run_to_completion(task).rgba)
+        pictures[label] = display(draw_picture(ViewInput((instance,), camera, sampled)).rgba)
     gbuffer = project([instance], camera.scaled(4))
     every_sample = compose(gbuffer, replace(look, supersampling=4))
     pictures["streaks at each of 4 x 4 samples"] = display(every_sample.rgba)

@@ -88,7 +88,7 @@ def render_view(
     """Return the (side, side, 4) linear RGBA of a field as users draw it, with its singularities."""
     instance = MeshInstance(surface, np.eye(4), field)
     view_input = ViewInput((instance,), view(surface, angles, (side, side), 1), look)
-    return (draw_picture(view_input)).rgba
+    return draw_picture(view_input).rgba
 
 
 def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:

@@ -12,7 +12,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.image_io.png import compute_png
+from rosy_addon.image_io.png import png_bytes
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_basis, orbit_camera
@@ -81,7 +81,7 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
     for label, angle in (("horizontal strokes", 0.0), ("vertical strokes", np.pi / 2)):
         look = Look(guiding_angle=angle)
         pixels = draw_texture(instance, uv, look, TEXTURE_SIDE, content="anisotropy").rgba
-        png = compute_png(pixels, is_color=False)
+        png = png_bytes(pixels, is_color=False)
         image = new_image("map", ImageData(pixels, png), is_color=False)
         material = new_anisotropy_material("metal", image, obj.data.uv_layers.active.name)
         obj.data.materials.clear()

@@ -7,6 +7,7 @@ import numpy as np
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import turntable, turntable_views
 
 from .page import ROOT
@@ -21,4 +22,4 @@ def write() -> None:
     instance = MeshInstance(monkey, np.eye(4), generate(monkey, "smoothest", 4))
     views = turntable_views(instance, LOOK, 24, (240, 240), (-26.0, 10.0))
     path = ROOT / "docs" / "images" / "turntable.gif"
-    turntable(CpuRenderer(), views, 24, path, 10)
+    turntable(draw_picture, views, 24, path, 10)

@@ -20,7 +20,7 @@ from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ...progress import progress, report
 from ..blocks import row_blocks
-from ..corner_fans import compute_corner_rotations, corner_angles
+from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame
 from ..representation import (
     complex_bincount,
@@ -34,7 +34,7 @@ from ..surface import Surface
 from ..validate import vertex_normals
 from .obj import read_obj
 from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_STEP, TextRows, format_blocks, format_rows, read_rows
+from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, format_blocks, format_rows, read_rows
 
 
 def read_fieldgen(path: Path) -> RawField:
@@ -58,7 +58,7 @@ def read_fieldgen(path: Path) -> RawField:
         rows = read_rows(path, comment=None, data=data)
     degree, vertex_lines = None, []
     for row, words in enumerate(rows.words):
-        if row % ROWS_PER_STEP == 0:
+        if row % ROWS_PER_BLOCK == 0:
             report(0.7 + 0.1 * row / len(rows), LABEL)
         if not words[0].startswith(b"#"):
             continue
@@ -78,7 +78,6 @@ def read_fieldgen(path: Path) -> RawField:
         [words for _, words in vertex_lines],
         [rows.line_numbers[row] for row, _ in vertex_lines],
     )
-    report(0.8, LABEL)
     with progress(0.8, 1.0):
         numbers = vertex_rows.floats("part of a vector")
     report(1.0, LABEL)
@@ -90,7 +89,6 @@ def read_fieldgen(path: Path) -> RawField:
             f"{path}: expected one '# field' line for each of {count} vertices, found "
             f"{counted(len(vertex), 'line')} for vertices {vertex.min() + 1} to {vertex.max() + 1}"
         )
-    report(1.0, LABEL)
     values = np.zeros((count, 1, 3))
     values[vertex, 0] = numbers[:, 1:]
     return RawField(values, degree, domain="vertex", polygons=polygons)
@@ -104,18 +102,16 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     """
     label = "averaging the field at the vertices"
     count = len(surface.vertices)
-    with progress(0.0, 0.2, label):
-        angle = corner_angles(surface)
+    angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
-    with progress(0.2, 0.5, label):
-        normal = vertex_normals(surface)
+    normal = vertex_normals(surface)
     report(0.5, label)
     face_x, face_y = face_frames(surface)
     report(0.6, label)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
     with progress(0.6, 0.8):
         rotation = power(
-            compute_corner_rotations(surface.face_normal, face_x, face, normal[vertex], label),
+            corner_rotations(surface.face_normal, face_x, face, normal[vertex], label),
             field.degree,
         )
     report(0.8, label)
@@ -135,7 +131,7 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
 
 def _face_lines(surface: Surface) -> Iterator[str]:
     """Lines `f v//v ...` in blocks."""
-    for faces in row_blocks(surface.face_count, ROWS_PER_STEP):
+    for faces in row_blocks(surface.face_count, ROWS_PER_BLOCK):
         starts = surface.face_start[faces.start : faces.stop + 1]
         block = surface.corner_vertex[starts[0] : starts[-1]] + 1
         corners = [f"{v}//{v}" for v in block.tolist()]
@@ -145,7 +141,7 @@ def _face_lines(surface: Surface) -> Iterator[str]:
 
 def _field_lines(member: np.ndarray) -> Iterator[str]:
     """Lines `# field i x y z` in blocks."""
-    for rows in row_blocks(len(member), ROWS_PER_STEP):
+    for rows in row_blocks(len(member), ROWS_PER_BLOCK):
         lines = format_rows(member[rows])
         yield "".join(
             [f"# field {number} {line}\n" for number, line in enumerate(lines, rows.start + 1)]

@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import counted
 from ...progress import progress, report
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, ROWS_PER_STEP, TextRows, read_rows
+from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, read_rows
 
 
 def read_obj(path: Path) -> Polygons:
@@ -33,12 +33,10 @@ def read_obj(path: Path) -> Polygons:
     with progress(0.4, 0.5):
         is_vertex, is_face = _rows_of_kinds(rows, b"v", b"f")
     vertex_rows = _select_rows(rows, is_vertex, 3)
-    report(0.5, LABEL)
     with progress(0.5, 0.6):
         vertices = vertex_rows.points("vertex")
     report(0.6, LABEL)
     corners = _select_rows(rows, is_face)
-    report(0.6, LABEL)
     for row, words in enumerate(corners.words):
         if len(words) < 3:
             raise corners.error(
@@ -69,9 +67,9 @@ def _rows_of_kinds(
 ) -> list[np.ndarray]:
     """Whether the first word of each row is that of a kind: a (rows,) bool ndarray for each kind."""
     masks = [np.zeros(len(rows), dtype=bool) for _ in kinds]
-    for start in range(0, len(rows), ROWS_PER_STEP):
+    for start in range(0, len(rows), ROWS_PER_BLOCK):
         report(start / len(rows), LABEL)
-        block = slice(start, start + ROWS_PER_STEP)
+        block = slice(start, start + ROWS_PER_BLOCK)
         first_words = [words[0] for words in rows.words[block]]
         for mask, kind in zip(masks, kinds, strict=True):
             mask[block] = [word == kind for word in first_words]
@@ -92,9 +90,9 @@ def _select_rows(rows: TextRows, is_selected: np.ndarray, max_words: int | None 
 def _position_indices(corners: TextRows) -> TextRows:
     """Reduce corners v, v/vt, v//vn and v/vt/vn to v, the index of the position."""
     rows: list[Sequence[bytes]] = []
-    for start in range(0, len(corners), ROWS_PER_STEP):
+    for start in range(0, len(corners), ROWS_PER_BLOCK):
         report(start / len(corners), LABEL)
-        words = corners.words[start : start + ROWS_PER_STEP]
+        words = corners.words[start : start + ROWS_PER_BLOCK]
         joined = b"\n".join(b" ".join(row) for row in words)
         if b"/" in joined:
             lines = re.sub(rb"(?<=\d)/[-\d/]*(?=\s|$)", b"", joined).split(b"\n")

@@ -46,7 +46,6 @@ def read_off(path: Path) -> Polygons:
     with progress(0.5, 0.7):
         vertices = body[:vertex_count].points("vertex")
     face_rows = body[vertex_count : vertex_count + face_count]
-    report(0.7, LABEL)
     with progress(0.7, 1.0):
         return Polygons(vertices, *_faces(face_rows, vertex_count))
 

@@ -18,7 +18,7 @@ from ...progress import progress, report
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
 from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_STEP, format_blocks, read_rows
+from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -109,8 +109,8 @@ def npy_blocks(directions: np.ndarray) -> Iterator[bytes]:
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(rows))
     yield header.getvalue()
-    for start in range(0, len(rows), ROWS_PER_STEP):
-        yield rows[start : start + ROWS_PER_STEP].tobytes()
+    for start in range(0, len(rows), ROWS_PER_BLOCK):
+        yield rows[start : start + ROWS_PER_BLOCK].tobytes()
 
 
 def _check_columns(source: str, columns: int) -> None:

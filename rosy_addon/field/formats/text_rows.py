@@ -13,10 +13,10 @@ from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ...progress import report
 
-#: Rows and words of a text file that are parsed or written in a step.
-ROWS_PER_STEP, WORDS_PER_STEP = 1 << 14, 1 << 16
+#: Rows and words of a text file that are parsed or written at once.
+ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
 
-#: The label of the steps in which a file is read.
+#: Label of the progress of reading a file.
 LABEL = "reading the file"
 
 
@@ -93,9 +93,9 @@ class TextRows:
         count = sum(map(len, self.words))
         values = np.empty(count, dtype=dtype)
         words = chain.from_iterable(self.words)
-        for start in range(0, count, WORDS_PER_STEP):
+        for start in range(0, count, WORDS_PER_BLOCK):
             report(start / count, LABEL)
-            stop = min(start + WORDS_PER_STEP, count)
+            stop = min(start + WORDS_PER_BLOCK, count)
             try:
                 values[start:stop] = list(map(convert, islice(words, stop - start)))
             except (ValueError, OverflowError):
@@ -141,9 +141,9 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
-    for start in range(0, len(lines), ROWS_PER_STEP):
+    for start in range(0, len(lines), ROWS_PER_BLOCK):
         report(start / len(lines), LABEL)
-        block = lines[start : start + ROWS_PER_STEP]
+        block = lines[start : start + ROWS_PER_BLOCK]
         if has_comments:
             block = [line.partition(comment)[0] for line in block]
         for number, line in enumerate(block, start + 1):
@@ -165,7 +165,7 @@ def format_rows(rows: np.ndarray) -> list[str]:
 
 
 def format_blocks(rows: np.ndarray, prefix: str = "") -> Iterator[str]:
-    """Format (n, k) numbers as lines of text with a prefix, in blocks of up to `ROWS_PER_STEP`."""
-    for start in range(0, len(rows), ROWS_PER_STEP):
-        lines = format_rows(rows[start : start + ROWS_PER_STEP])
+    """Format (n, k) numbers as lines of text with a prefix, in blocks of up to `ROWS_PER_BLOCK`."""
+    for start in range(0, len(rows), ROWS_PER_BLOCK):
+        lines = format_rows(rows[start : start + ROWS_PER_BLOCK])
         yield "".join([f"{prefix}{line}\n" for line in lines])

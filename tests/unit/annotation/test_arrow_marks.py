@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rosy_addon.rendering.band_workers import BandWorkers
 from shapes import globe, icosphere, torus
 
 from rosy_addon.annotation.arrow_marks import (
@@ -26,7 +25,6 @@ from rosy_addon.field.directional_field import field_directions, field_from_dire
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import (
     look_at,
     orbit_camera,
@@ -34,6 +32,7 @@ from rosy_addon.projection.camera import (
     perspective_camera,
 )
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 480, 400, fov=0.7)
@@ -247,15 +246,14 @@ def test_an_arrowhead_has_its_shape_and_its_outline():
 
 
 def rendered(view, **options):
-    return run_to_completion(CpuRenderer(**options).render_task(view)).rgba
+    return draw_picture(view, **options).rgba
 
 
 def test_processes_and_supersampling_draw_the_same_arrowheads():
     instance = instance_of(globe(48, 96), 3)
     looks = [Look(length=8, arrows=40.0, supersampling=samples) for samples in (1, 2)]
     views = [ViewInput((instance,), CAMERA, look) for look in looks]
-    with BandWorkers(2) as workers:
-        np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=workers))
+    np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=2))
     changed = []
     for view in views:
         plain = replace(view, look=replace(view.look, arrows=0.0))

@@ -7,7 +7,6 @@ import re
 import numpy as np
 import pytest
 from conftest import long
-from rosy_addon.rendering.band_workers import BandWorkers
 from shapes import globe, icosphere, torus
 
 from rosy_addon.annotation.draw_marks import draw_marks
@@ -20,9 +19,9 @@ from rosy_addon.field.singularities import find_singularities, format_index
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import svg_text
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 CAMERA = perspective_camera(look_at((2.5, -3.0, 1.5), (0, 0, 0)), 240, 200, fov=0.7)
@@ -58,7 +57,7 @@ def view_of(surface, degree, **settings):
 
 
 def rendered(view, **options):
-    return run_to_completion(CpuRenderer(**options).render_task(view)).rgba
+    return draw_picture(view, **options).rgba
 
 
 @pytest.mark.parametrize("index", [1, -2, 4])
@@ -145,8 +144,7 @@ def test_visible_singularities_of_a_mesh_have_dots_at_their_vertices(degree):
 def test_processes_and_supersampling_draw_the_same_dots():
     surface = globe(48, 96)
     views = [view_of(surface, 4, singularity_dots="all", supersampling=s) for s in (1, 2)]
-    with BandWorkers(2) as workers:
-        np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=workers))
+    np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=2))
     dots = [
         np.abs(rendered(view) - rendered(view_of(surface, 4, supersampling=samples))).max(axis=2)
         > 0

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rosy_addon.compositor.band_division import divide_rows
-from rosy_addon.rendering.band_workers import BandWorkers
 from shapes import icosphere, plane
 
 from rosy_addon.color import color_stops, map_colors, to_linear
@@ -15,7 +14,6 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
 from rosy_addon.field.generate import axis_field
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -159,8 +157,7 @@ def test_processes_draw_the_same_bytes():
     instance = replace(instance, field=axis_field(BALL, 11, (0, 0, 1)))
     look = replace(FLAT, gain=1.0, length=10)
     view = ViewInput((instance,), camera(320, 1216), look)
-    alone = (draw_picture(view)).rgba
-    with BandWorkers(2) as workers:
-        assert len(divide_rows(look, view.camera, view.instances, 2)) == 2
-        together = run_to_completion(CpuRenderer(workers=workers).render_task(view)).rgba
+    alone = draw_picture(view).rgba
+    assert len(divide_rows(look, view.camera, view.instances, 2)) == 2
+    together = draw_picture(view, workers=2).rgba
     assert together.tobytes() == alone.tobytes()

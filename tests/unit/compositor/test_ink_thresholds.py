@@ -28,9 +28,9 @@ from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.undirected import undirected_texture
 from rosy_addon.field.generate import axis_field
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 SIZE = 400
@@ -169,12 +169,11 @@ def test_thresholds_of_a_picture_draw_its_ink(lines, supersampling):
     instance = MeshInstance(mesh, np.eye(4), axis_field(mesh, 4, (0, 0, 1)))
     camera = orbit_camera(instance.face_points(), 0.0, 50.0, 320, 240)
     view = ViewInput((instance,), camera, look)
-    renderer = CpuRenderer()
-    expected = run_to_completion(renderer.render_task(view)).rgba
+    expected = draw_picture(view).rgba
     view = replace(view, look=unlit_look(look), draws_thresholds=True)
-    picture = run_to_completion(renderer.render_task(view))
+    picture = draw_picture(view)
     gray = replace(look, ink="soft", gain=0.0, supersampling=1)
-    tone = run_to_completion(renderer.render_task(replace(view, look=gray))).rgba[..., 0]
+    tone = draw_picture(replace(view, look=gray)).rgba[..., 0]
     tone /= to_linear(np.float32(0.5))
     pixels = np.dstack([picture.rgba[..., :3], picture.spread])
     inside = (picture.rgba[..., 3] > 0.99) & (expected[..., 3] > 0.99)

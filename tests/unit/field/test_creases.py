@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from shapes import cube, cylinder, from_triangles, icosphere
 
-from rosy_addon.field.creases import compute_creases
+from rosy_addon.field.creases import find_creases
 from rosy_addon.field.surface import build_surface
 
 
 def creases(surface, angle=0.7):
-    return compute_creases(surface, angle)
+    return find_creases(surface, angle)
 
 
 def ridge(height, cells=48, noise=0.0):

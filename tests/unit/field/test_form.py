@@ -8,7 +8,6 @@ from conftest import mainly
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
-from rosy_addon.field.form import form
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import generate
 from rosy_addon.field.representation import face_frames
@@ -18,7 +17,6 @@ from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_edges, build_surface
 from rosy_addon.field.surface_averages import SurfaceAverages
 from rosy_addon.field.vertex_noise import noise_sample
-from rosy_addon.progress import as_task
 
 AXES = np.array([1.0, 0.8, 0.6])
 
@@ -178,12 +176,6 @@ def test_disconnected_parts_and_stray_faces():
     field = generate(both, "form", 4)
     np.testing.assert_allclose(field.magnitude[:-1], 1.0, atol=1e-6)
     assert field.magnitude[-1] == 0
-
-
-def test_long_work_is_done_in_steps():
-    steps = [progress.fraction for progress in as_task(form, torus(64, 32), 4)]
-    assert len(steps) > 60
-    assert steps == sorted(steps)
 
 
 def test_averages_of_numbers_below_all_normal_ones():

@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 from shapes import from_triangles, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
-from rosy_addon.field import sparse_multigrid
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot
 from rosy_addon.field.mesh_io import read_mesh
@@ -28,7 +27,6 @@ from rosy_addon.field.sparse_multigrid import (
     w_cycle,
 )
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import as_task
 
 
 def random_sphere(count, seed=1):
@@ -59,13 +57,6 @@ def test_products_of_sparse_matrices():
     np.testing.assert_allclose(as_scipy(matrix_product(a, b)).toarray(), dense, atol=1e-12)
     vector = np.arange(40) * (1 + 2j)
     np.testing.assert_allclose(a @ vector, as_scipy(a) @ vector, atol=1e-10)
-
-
-def test_products_of_larger_matrices_take_more_steps(monkeypatch):
-    monkeypatch.setattr(sparse_multigrid, "BLOCKS_PER_STEP", 1)
-    small, large = (laplacian(build_connection(icosphere(level)), 4, shift=1.0) for level in (3, 5))
-    assert sum(1 for _ in as_task(matrix_product, small, small)) <= 2
-    assert sum(1 for _ in as_task(matrix_product, large, large)) >= len(large) / 2**13
 
 
 def test_the_adjoint():
@@ -318,13 +309,6 @@ def test_no_area_at_all_is_an_error():
     flat = from_triangles([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     with pytest.raises(RosyError, match="no face has an area"):
         smoothest_field(flat, 4)
-
-
-def test_progress_never_decreases():
-    fractions = [step.fraction for step in as_task(smoothest_field, icosphere(4), 4)]
-    assert fractions == sorted(fractions)
-    assert 0 <= fractions[0] <= fractions[-1] <= 1
-    assert len(fractions) > 20
 
 
 def test_a_component_far_smaller_than_the_others():

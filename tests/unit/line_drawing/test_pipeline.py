@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from listeners import cancel_at
 from shapes import from_triangles, icosphere, moved, plane
 
 from rosy_addon.compositor.shading import KEY_LIGHT, Light
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
-from rosy_addon.line_drawing import lateral_neighbors, separation, visibility
+from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.pipeline import (
     draw_instances,
     offset_toward_camera,
@@ -24,7 +25,7 @@ from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
 from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
-from rosy_addon.progress import as_task
+from rosy_addon.progress import listening
 from rosy_addon.projection.camera import (
     look_at,
     orbit_camera,
@@ -190,11 +191,9 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
     instance = MeshInstance(
         surface, IDENTITY, generate(surface, GeneratorSettings("axis", (1, 0, 0)), 2)
     )
-    task = as_task(trace_strokes, instance, 0.1)
-    with pytest.raises(StopIteration) as done:
-        for _ in range(300):
-            next(task)
-    assert 30 < done.value.value.length.sum() < 50
+    with listening(cancel_at(300)):
+        strokes = trace_strokes(instance, 0.1)
+    assert 30 < strokes.length.sum() < 50
 
 
 def test_samples_are_compared_in_blocks(monkeypatch):
@@ -207,24 +206,16 @@ def test_samples_are_compared_in_blocks(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", [separation, visibility])
-def test_blocks_divide_the_work_and_do_not_change_strokes(module, monkeypatch):
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [(separation, "BLOCK_POINTS"), (visibility, "BLOCK_POINTS"), (seeding, "SEED_BATCH_SIZE")],
+)
+def test_blocks_do_not_change_strokes(module, name, monkeypatch):
     style = StrokeStyle(spacing=10, outline=True)
 
-    def draw():
-        """Return the number of steps, and the strokes."""
-        steps, task = 0, as_task(draw_instances, [SPHERE], CAMERA, style)
-        while True:
-            try:
-                next(task)
-            except StopIteration as done:
-                return steps, done.value.strokes
-            steps += 1
-
-    steps, expected = draw()
-    monkeypatch.setattr(module, "BLOCK_POINTS", 100)
-    more_steps, strokes = draw()
-    assert more_steps > steps + 10
+    expected = draw_instances([SPHERE], CAMERA, style).strokes
+    monkeypatch.setattr(module, name, 100)
+    strokes = draw_instances([SPHERE], CAMERA, style).strokes
     for name, values in vars(expected).items():
         np.testing.assert_array_equal(getattr(strokes, name), values, err_msg=name)
 
@@ -240,8 +231,8 @@ def test_seeding_ends_where_all_strokes_are_short():
     )
     instance = MeshInstance(surface, IDENTITY, generate(surface, "smoothest", 6))
     camera = orbit_camera(surface, 45, 20, 150, 100)
-    task = as_task(draw_instances, [instance], camera, StrokeStyle(curvature=0.5, hidden=True))
-    assert sum(1 for _ in zip(range(400), task, strict=False)) < 300
+    with listening(cancel_at(300)):
+        draw_instances([instance], camera, StrokeStyle(curvature=0.5, hidden=True))
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ from rosy_addon.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import as_task
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.camera import perspective_camera as lens
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -494,19 +493,6 @@ def test_a_mesh_seen_edge_on_covers_no_pixel():
     camera = lens(look_at((5, 0, 0), (0, 0, 0)), 50, 50)
     with pytest.raises(RosyError, match="is seen exactly edge-on, or smaller than a pixel"):
         project([MeshInstance(square, IDENTITY, tangent_field(square, 4))], camera)
-
-
-def test_progress_grows_and_the_task_can_be_closed():
-    surface = torus()
-    instances = [MeshInstance(surface, IDENTITY, tangent_field(surface, 4))] * 2
-    camera = orbit_camera(surface, 0, 40, 300, 300)
-    fractions = [step.fraction for step in as_task(project, instances, camera)]
-    assert fractions == sorted(fractions)
-    assert 0 <= fractions[0] <= fractions[-1] <= 1
-    assert len(fractions) > 4
-    task = as_task(project, instances, camera)
-    next(task)
-    task.close()
 
 
 def test_the_same_input_gives_the_same_bits():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from awkward import AWKWARD
@@ -16,7 +14,6 @@ from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import as_task
 from rosy_addon.projection.surface_lines import (
     cached_surface_lines,
     rest_matrix,
@@ -282,21 +279,3 @@ def test_rest_matrices_measure_lengths():
     np.testing.assert_allclose(rest_matrix(matrix), np.diag([1, 2, 3.0]), atol=1e-12)
     matrix[:3, :3] = -2 * rotation
     np.testing.assert_allclose(rest_matrix(matrix), 2 * np.eye(3), atol=1e-12)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("degree", [4, *long(3)])
-def test_steps_are_short(degree):
-    """No step does more than a small part of the work."""
-    surface = icosphere(5)
-    field = generate(surface, "smoothest", degree)
-    task = as_task(surface_lines, surface, np.eye(3), field, "smooth", 0.02)
-    times = [time.process_time()]
-    try:
-        while True:
-            next(task)
-            times.append(time.process_time())
-    except StopIteration:
-        times.append(time.process_time())
-    steps = np.diff(times)
-    assert steps.max() < 0.25 * steps.sum()

@@ -78,8 +78,8 @@ def test_a_vertex_of_a_convex_solid_is_visible_if_one_of_its_faces_is(camera):
 @pytest.mark.parametrize("pairs", [1 << 20, 50])
 def test_vertices_are_visible_if_rays_reach_the_eye(camera, pairs, monkeypatch):
     """Of solids that hide each other, and one that reaches behind the eye."""
-    monkeypatch.setattr(visible_vertices, "PAIRS_PER_STEP", pairs)
-    monkeypatch.setattr(visible_vertices, "TRIANGLES_PER_STEP", 300)
+    monkeypatch.setattr(visible_vertices, "PAIRS_PER_BLOCK", pairs)
+    monkeypatch.setattr(visible_vertices, "TRIANGLES_PER_BLOCK", 300)
     instances = [
         moved(torus(32, 16)),
         moved(icosphere(2), (0.9, -0.9, 0.3), 0.3),

@@ -13,7 +13,6 @@ from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.progress import as_task
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_lines import cached_surface_lines
 from rosy_addon.surface_texture import hatching
@@ -204,12 +203,12 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
     """Where all charts lie on each other, a texel shows little of the surface."""
     counts = []
 
-    def counted_task(*args):
-        lines = yield from as_task(cached_surface_lines, *args)
+    def counted(*args):
+        lines = cached_surface_lines(*args)
         counts.append(len(lines.tree.leaf_root))
         return lines
 
-    monkeypatch.setattr(hatching, "cached_surface_lines", counted_task)
+    monkeypatch.setattr(hatching, "cached_surface_lines", counted)
     grid = plane(1, 200)
     surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))

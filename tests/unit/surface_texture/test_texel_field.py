@@ -19,7 +19,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.surface_texture.charts import uv_charts
 from rosy_addon.surface_texture.draw import step_length
 from rosy_addon.surface_texture.texel_field import frames_at, texel_field
-from rosy_addon.surface_texture.texels import compute_texels, texture_frame
+from rosy_addon.surface_texture.texels import rasterize_charts, texture_frame
 
 #: Steps of the streamlines that are compared.
 STEPS = 40
@@ -38,7 +38,7 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
     mesh = build_tangent_mesh(instance)
     charts = uv_charts(surface, mesh, patches_uv(3))
     assert charts.chart.max() + 1 == 32
-    texels = compute_texels(charts, texture_frame(charts, 1024, "torus"), "torus")
+    texels = rasterize_charts(charts, texture_frame(charts, 1024, "torus"), "torus")
     step = step_length(mesh, charts, texels)
     field = texel_field(mesh, charts, texels, step, np.pi)
     look = look_on_surface(Look(), step, step)
@@ -82,7 +82,7 @@ def test_steps_across_seams_are_isometries():
     )
     mesh = build_tangent_mesh(instance)
     charts = uv_charts(surface, mesh, patches_uv(3))
-    texels = compute_texels(charts, texture_frame(charts, 512, "torus"), "torus")
+    texels = rasterize_charts(charts, texture_frame(charts, 512, "torus"), "torus")
     steps = texel_field(mesh, charts, texels, 0.01, np.pi).seam_steps
     source, target = texels.triangle[steps.source], texels.triangle[steps.target]
     displacement = np.exp(1j * np.arange(len(source)))

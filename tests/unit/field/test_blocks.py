@@ -1,16 +1,17 @@
-"""Fields are read and written in steps that do not grow with the mesh."""
+"""Fields are read and written block by block."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from listeners import CancelledError, cancel_at
 from shapes import torus
 
 from rosy_addon.field import blocks, surface
 from rosy_addon.field.field_io import load_field, write_field
 from rosy_addon.field.formats import fieldgen, obj, plain, text_rows
 from rosy_addon.field.generate import axis_field
-from rosy_addon.progress import as_task
+from rosy_addon.progress import listening
 
 #: Rows of the blocks in these tests, and faces of the mesh.
 BLOCK, SIDE = 64, 32
@@ -24,13 +25,9 @@ def mesh():
 @pytest.fixture
 def small_blocks(monkeypatch):
     for module in (blocks, text_rows, plain, obj, fieldgen):
-        monkeypatch.setattr(module, "ROWS_PER_STEP", BLOCK)
-    monkeypatch.setattr(text_rows, "WORDS_PER_STEP", BLOCK)
+        monkeypatch.setattr(module, "ROWS_PER_BLOCK", BLOCK)
+    monkeypatch.setattr(text_rows, "WORDS_PER_BLOCK", BLOCK)
     monkeypatch.setattr(surface, "BLOCK_ELEMENTS", BLOCK)
-
-
-def step_count(task):
-    return sum(1 for _ in task)
 
 
 @pytest.mark.parametrize("suffix", [".rosy", ".rawfield", ".txt", ".obj"])
@@ -47,26 +44,13 @@ def test_small_blocks_change_nothing(mesh, tmp_path, suffix, request):
     assert np.array_equal(again.vectors, expected.vectors)
 
 
-@pytest.mark.parametrize("suffix", [".rosy", ".rawfield", ".txt", ".obj"])
-def test_a_step_reads_and_writes_one_block(mesh, tmp_path, suffix, small_blocks):
-    """So the longest step does not grow with the file."""
-    least = mesh.face_count / BLOCK
-    path = tmp_path / f"a{suffix}"
-    field = axis_field(mesh, 4, (1, 0.3, 0.2))
-    assert step_count(as_task(write_field, path, field, mesh)) > least
-    # Each block of rows is split into words, and each block of words into numbers.
-    assert step_count(as_task(load_field, path, mesh)) > 4 * least
-
-
 def test_a_cancelled_export_leaves_the_old_file(mesh, tmp_path, small_blocks):
     path = tmp_path / "a.rosy"
     path.write_bytes(b"old")
-    task = as_task(write_field, path, axis_field(mesh, 4, (1, 0.3, 0.2)), mesh)
-    for _ in range(8):
-        next(task)
-    assert len(list(tmp_path.iterdir())) == 2
-    task.close()
+    field = axis_field(mesh, 4, (1, 0.3, 0.2))
+    with listening(cancel_at(8)), pytest.raises(CancelledError):
+        write_field(path, field, mesh)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
-    write_field(path, axis_field(mesh, 4, (1, 0.3, 0.2)), mesh)
+    write_field(path, field, mesh)
     assert path.read_bytes().startswith(b"1024\n4\n")

@@ -1,0 +1,189 @@
+"""Progress: long functions report it to a listener, which can end them."""
+
+from __future__ import annotations
+
+import contextvars
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from listeners import CancelledError, cancel_at, reported
+from shapes import plane, torus
+from uv_maps import torus_uv
+
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.shading import Light
+from rosy_addon.errors import RosyError
+from rosy_addon.field.convert import Conversion, convert
+from rosy_addon.field.generate import generate
+from rosy_addon.field.prescribed import prescribed_field
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.preset_files.store import load_preset
+from rosy_addon.progress import current_report, listening, progress, report
+from rosy_addon.projection.ambient_occlusion import ambient_occlusion
+from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+from rosy_addon.rendering.draw import draw_picture
+from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.surface_texture.draw import draw_texture
+
+SURFACE = torus(48, 24)
+FIELD = generate(SURFACE, "smoothest", 4)
+INSTANCE = MeshInstance(SURFACE, np.eye(4), FIELD)
+SQUARE = plane(2, 20)
+SUN = Light("sun", np.array([0.3, 0.5, 0.8]), np.ones(3), 1.0)
+CAMERA = orbit_camera(INSTANCE.face_points(), 20, 40, 200, 200)
+
+
+# --- parts and labels -----------------------------------------------------------------------------
+
+
+def steps(*fractions: float, label: str = "step") -> None:
+    for fraction in fractions:
+        report(fraction, label)
+
+
+def test_parts_are_scaled_within_parts():
+    def work():
+        steps(0.0)
+        with progress(0.5, 1.0):
+            steps(0.0, 0.5)
+            with progress(0.5, 0.75):
+                steps(0.0, 1.0)
+        steps(1.0)
+
+    fractions = [fraction for fraction, _ in reported(work)]
+    assert fractions == [0.0, 0.5, 0.75, 0.75, 0.875, 1.0]
+
+
+def test_a_part_without_an_end_takes_no_time():
+    def work():
+        with progress(0.25):
+            steps(0.0, 0.5, 1.0)
+
+    assert [fraction for fraction, _ in reported(work)] == [0.25] * 3
+
+
+def test_the_outermost_label_replaces_those_within():
+    def work():
+        report(0.0, "first")
+        with progress(0.0, 1.0, "outer"):
+            report(0.0, "second")
+            with progress(0.0, 1.0, "inner"):
+                report(0.0, "third")
+        with progress(0.0, 1.0):
+            report(0.0, "fourth")
+
+    assert [label for _, label in reported(work)] == ["first", "outer", "outer", "fourth"]
+
+
+def test_nobody_need_listen():
+    with progress(0.0, 1.0):
+        report(0.5, "unheard")
+    heard = []
+    with listening(lambda *told: heard.append(told)):
+        with listening(None), progress(0.0, 1.0):
+            report(0.5, "unheard")
+        report(1.0, "heard")
+    report(1.0, "unheard")
+    assert heard == [(1.0, "heard")]
+
+
+def test_the_part_ends_with_an_exception():
+    def work():
+        with pytest.raises(RosyError), progress(0.5, 0.6):
+            raise RosyError("a mistake")
+        report(1.0, "after")
+
+    assert reported(work) == [(1.0, "after")]
+
+
+def test_a_report_to_a_part_from_elsewhere():
+    """As by a process pool, which hears the progress of its own part of the work itself."""
+
+    def work():
+        with progress(0.5, 1.0):
+            report_here = current_report()
+            with listening(lambda fraction, label: report_here(fraction / 2, label)):
+                report(0.5, "elsewhere")
+        report_here(1.0, "elsewhere")
+
+    assert reported(work) == [(0.625, "elsewhere"), (1.0, "elsewhere")]
+    current_report()(0.5, "unheard")
+
+
+def test_each_context_has_its_own_listener():
+    def work():
+        contextvars.Context().run(report, 0.5, "unheard")
+        contextvars.copy_context().run(report, 0.5, "heard")
+
+    assert reported(work) == [(0.5, "heard")]
+
+
+# --- long functions -------------------------------------------------------------------------------
+
+
+def picture(look: Look) -> None:
+    draw_picture(ViewInput((INSTANCE,), CAMERA, look, (SUN,)))
+
+
+def texture(look: Look) -> None:
+    draw_texture(INSTANCE, torus_uv(48, 24), look, 128)
+
+
+CONVERSION = Conversion(2, rotation=0.1, smoothing_length=0.05, pair_distance=0.2)
+
+#: Long functions, their arguments, and the least part of the work at which the last report comes.
+LONG = {
+    "smoothest": (generate, (SURFACE, "smoothest", 4), 0.9),
+    "form": (generate, (SURFACE, "form", 4), 0.8),
+    "curvature": (generate, (SURFACE, "curvature", 4), 0.9),
+    "features": (generate, (SQUARE, "features", 4), 0.7),
+    "prescribed": (prescribed_field, (SURFACE, 4, np.array([5, 200]), np.array([1, -1])), 0.8),
+    "convert": (convert, (SURFACE, FIELD, replace(CONVERSION, magnitude="curvature")), 0.9),
+    "singularities": (find_singularities, (SURFACE, FIELD), 0.9),
+    "project": (project, ([INSTANCE] * 2, CAMERA), 0.9),
+    "several samples": (project, ([INSTANCE], CAMERA, "smooth", None, 3), 0.9),
+    "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
+    "picture": (picture, (Look(),), 0.9),
+    "members": (picture, (Look(method="members"),), 0.9),
+    "strokes": (draw_instances, ([INSTANCE], CAMERA), 0.9),
+    "all strokes": (
+        draw_instances,
+        ([INSTANCE], CAMERA, StrokeStyle(arrows=30.0, overshoot=4.0, outline=True)),
+        0.9,
+    ),
+    "texture": (texture, (Look(length=20),), 0.9),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_progress_never_goes_back(name):
+    function, arguments, last = LONG[name]
+    fractions = [fraction for fraction, _ in reported(function, *arguments)]
+    assert len(fractions) > 5
+    assert all(later >= sooner - 1e-9 for sooner, later in itertools.pairwise(fractions))
+    assert 0 <= fractions[0] < 0.1 and last <= fractions[-1] <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("name", ["form", "picture", "strokes"])
+def test_a_listener_ends_the_work(name):
+    """And what is left does not change what is done next."""
+    function, arguments, _ = LONG[name]
+    count = len(reported(function, *arguments))
+    for stop in (1, count // 2, count):
+        with listening(cancel_at(stop)), pytest.raises(CancelledError):
+            function(*arguments)
+    assert len(reported(function, *arguments)) <= count
+
+
+def test_listening_does_not_change_pixels():
+    view = ViewInput((INSTANCE,), CAMERA, load_preset("pen-and-ink").look, (SUN,))
+    alone = draw_picture(view).rgba
+    with listening(lambda fraction, label: None):
+        heard = draw_picture(view).rgba
+    assert heard.tobytes() == alone.tobytes()

@@ -100,8 +100,20 @@ def progress(start: float, stop: float | None = None, label: str | None = None) 
 
 
 def listening(listener: Listener | None) -> _Scope:
-    """Tell a listener what is reported in a ``with`` block; with None, nobody."""
-    return _Scope(None if listener is None else _Part(listener, 0.0, 1.0, None))
+    """Tell a listener what is reported in a ``with`` block; with None, nobody.
+
+    A fraction that is less than one before is told as that one: progress stands still, and never goes back.
+    """
+    if listener is None:
+        return _Scope(None)
+    last = 0.0
+
+    def tell(fraction: float, label: str) -> None:
+        nonlocal last
+        last = max(last, fraction)
+        listener(last, label)
+
+    return _Scope(_Part(tell, 0.0, 1.0, None))
 
 
 def current_report() -> Listener:

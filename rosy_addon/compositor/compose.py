@@ -45,6 +45,9 @@ from .strip_division import divide_into_strips
 from .strips import Strip, entries_of_rows, join_strips
 from .target_tone import ReferenceRender, target_tone
 
+#: Share of the progress that tones, directions and outlines take, which all strips share.
+SHARED_SHARE = 0.3
+
 #: Contrast of streaks in colored pictures, relative to gray pictures.
 COLOR_CONTRAST = 1.5
 
@@ -108,14 +111,23 @@ def compose(
         pixel_look = sharp_look(pixel_look)
     cache = Cache() if cache is None else cache
     stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache)
-    with progress(0.0):
-        canvas = _Canvas(gbuffer, look, lights, reference, cache, draws_thresholds)
-        layers = [_prepared(stages, canvas, degree, pixel_look) for degree in canvas.degrees]
+    with progress(0.0, SHARED_SHARE):
+        with progress(0.0, 0.2):
+            canvas = _Canvas(gbuffer, look, lights, reference, cache, draws_thresholds)
+        layers = []
+        for number, degree in enumerate(canvas.degrees):
+            with progress(0.2 + 0.8 * number / len(canvas.degrees), 1.0):
+                layers.append(_prepared(stages, canvas, degree, pixel_look))
     pictures, drawn = [], []
-    for number, strip in enumerate(strips):
-        with progress(number / len(strips), (number + 1) / len(strips)):
-            drawn = [_draw_layer(stages, canvas, layer, strip) for layer in layers]
-            pictures.append(canvas.picture(strip))
+    with progress(SHARED_SHARE, 1.0):
+        for number, strip in enumerate(strips):
+            drawn = []
+            for index, layer in enumerate(layers):
+                start = (number + index / len(layers)) / len(strips)
+                with progress(start, start + 0.95 / (len(layers) * len(strips))):
+                    drawn.append(_draw_layer(stages, canvas, layer, strip))
+            with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
+                pictures.append(canvas.picture(strip))
     rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
     color_range = common_color_range({layer.look.magnitude_range for layer in layers})
     if not colors_magnitude(look):
@@ -209,21 +221,28 @@ class _Layer(NamedTuple):
 def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: Look) -> _Layer:
     """Compute what the strips of the fields of one degree share."""
     report(0.0, "finding directions")
-    field = stages.pixel_field(degree, pixel_look)
+    with progress(0.0, 0.3):
+        field = stages.pixel_field(degree, pixel_look)
     look = look_for_symmetry(pixel_look, field.symmetry)
-    even_lines = stages.even_lines(field, look) if has_even_lines(look) else None
+    even_lines = paper_grain = outline = None
+    if has_even_lines(look):
+        with progress(0.3, 0.6):
+            even_lines = stages.even_lines(field, look)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if not is_hatched(look):
         return _Layer(field, look, even_lines)
+    if has_paper_grain(look):
+        with progress(0.6, 0.7):
+            paper_grain = _paper_grain(stages, field, look)
+    if has_outline(look):
+        with progress(0.7, 0.9):
+            outline = stages.outline(field, look)
+    with progress(0.9, 1.0):
+        undirected = stages.undirected_texture(field, look)
+    tone = canvas.tone_rgb[field.gbuffer_index].mean(axis=1)
     return _Layer(
-        field,
-        look,
-        even_lines,
-        _mean_tone(canvas.tone_rgb[field.gbuffer_index]),
-        _paper_grain(stages, field, look) if has_paper_grain(look) else None,
-        stages.outline(field, look) if has_outline(look) else None,
-        stages.undirected_texture(field, look),
+        field, look, even_lines, np.clip(tone, 0, 1, out=tone), paper_grain, outline, undirected
     )
 
 
@@ -231,17 +250,19 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
     """Draw the fields of one degree in a strip, and return its images."""
     field, look = layer.field, layer.look
     rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
-    images, break_images = _line_images(stages, layer, strip)
+    with progress(0.0, 0.7):
+        images, break_images = _line_images(stages, layer, strip)
     modulation = None
     if is_hatched(look):
-        modulation = _line_modulation(stages, layer, strip, break_images)
+        with progress(0.7, 0.85):
+            modulation = _line_modulation(stages, layer, strip, break_images)
     field = field.part(rows)
     if canvas.map_position is not None:
         field = replace(field, map_position=canvas.map_position[field.gbuffer_index])
-    with progress(1.0):
+    with progress(0.85, 0.9):
         drawn = degree_layer(field, look, images)
     for block in pixel_blocks(len(field.pixel)):
-        report(1.0, "drawing the ink")
+        report(0.9 + 0.1 * block.start / len(field.pixel), "drawing the ink")
         part, part_images = field.part(block), images.part(block)
         entries = part.gbuffer_index
         if modulation is None:
@@ -310,15 +331,6 @@ def compose_planar(
     return Picture(
         _resolve_pixels(field.pixel, color, opaque, field.width, (0, field.height), 1), (layer,)
     )
-
-
-def _mean_tone(tone_rgb: np.ndarray) -> np.ndarray:
-    """(P,) float32 tones from 0 to 1: the means of the three channels of (P, 3) tones."""
-    tone = np.empty(len(tone_rgb), dtype=np.float32)
-    for block in pixel_blocks(len(tone)):
-        report(block.start / len(tone), "finding tones")
-        tone[block] = np.clip(tone_rgb[block].mean(axis=1), 0, 1)
-    return tone
 
 
 def _line_modulation(

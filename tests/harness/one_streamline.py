@@ -47,7 +47,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
         f"{package}.gpu.lic_stage"
     ).INTERPOLATED_CONTRAST
 
-    def draw_lengths(field, looks, noise, _band, _name):
+    def draw_lengths(field, looks, noise, _strip):
         results = []
         for look in looks:
             images = rosy.brute_force.brute_force(field, look, noise)
@@ -66,7 +66,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
         return convolve_still(field, look, *arguments)
 
     with (
-        mock.patch.object(rosy.lic, "fast_lic_lengths", draw_lengths),
+        mock.patch.object(rosy.lic, "fast_lic", draw_lengths),
         mock.patch.object(rosy.brute_force, "convolve_members", convolve),
     ):
         yield
@@ -111,7 +111,7 @@ def _members(
 ) -> Any:
     """Do the same as `lic_images.convolve_members`, by kernels that move or with interpolated noise."""
     count = len(field.pixel)
-    limit = rosy.lic_images.compute_step_limits(field, look)
+    limit = rosy.lic_images.magnitude_step_limits(field, look)
     length = np.full(count, look.length) if limit is None else limit
     kind = rosy.filter_kernel.kernel_of(look)
     reach = rosy.flow.streamline_reach(look)

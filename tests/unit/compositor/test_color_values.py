@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rosy_addon.compositor.band_division import divide_rows
 from shapes import icosphere, plane
 
 from rosy_addon.color import color_stops, map_colors, to_linear
@@ -18,7 +17,7 @@ from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.projection.surface_sampling import surface_values
-from rosy_addon.rendering.draw import draw_picture
+from rosy_addon.rendering.draw import draw_picture, picture_groups
 from rosy_addon.rendering.view_input import ViewInput
 
 #: Pixels along each side. The pictures show a square from -1.2 to 1.2.
@@ -158,6 +157,6 @@ def test_processes_draw_the_same_bytes():
     look = replace(FLAT, gain=1.0, length=10)
     view = ViewInput((instance,), camera(320, 1216), look)
     alone = draw_picture(view).rgba
-    assert len(divide_rows(look, view.camera, view.instances, 2)) == 2
+    assert len(picture_groups(view, 2)) == 2
     together = draw_picture(view, workers=2).rgba
     assert together.tobytes() == alone.tobytes()

@@ -16,7 +16,6 @@ from scipy import ndimage
 from rosy_addon.compositor import fast_lic
 from rosy_addon.compositor.brute_force import brute_force
 from rosy_addon.compositor.covering import build_covering
-from rosy_addon.compositor.fast_lic import compute_fast_lic
 from rosy_addon.compositor.filter_kernel import kernel_weights
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
@@ -42,7 +41,8 @@ def make_noise(field, look=LOOK, channels=1):
 
 
 def fast_images(field, look=LOOK, noise=None):
-    return compute_fast_lic(field, look, make_noise(field) if noise is None else noise)
+    (images,) = fast_lic.fast_lic(field, [look], make_noise(field) if noise is None else noise)
+    return images
 
 
 def brute_force_images(field, look=LOOK, noise=None):
@@ -215,26 +215,6 @@ def test_three_channels_are_three_pictures():
 def test_the_same_input_gives_the_same_bytes():
     field = singular_field(5)
     assert fast_images(field).members.tobytes() == fast_images(field).members.tobytes()
-
-
-def test_strips_bound_the_memory_and_leave_no_seam(monkeypatch):
-    # A tall picture with vertical streaks: a seam would be a large change between two rows.
-    field = planar_pixel_field(np.full((1024, 64), np.pi / 2 + 0.1), 2)
-    in_one_strip = fast_images(field)
-    monkeypatch.setattr(fast_lic, "STRIP_STATES", 64 * 256 * 2)
-    monkeypatch.setattr(fast_lic, "MIN_STRIP_MARGINS", 1)
-    strips = fast_lic._strips(field, LOOK, None)
-    assert len(strips) == 4
-    margin = fast_lic.streamline_margin(LOOK)
-    rows = [(strip.extent.stop - strip.extent.start) // 64 for strip in strips]
-    assert max(rows) == 256 + fast_lic.OVERLAP_ROWS + 2 * margin
-    actual = fast_images(field)
-    assert actual.effective_samples.min() >= 1
-    assert np.abs(actual.effective_samples - in_one_strip.effective_samples).mean() < 2
-    image = actual.members[0, :, 0].reshape(1024, 64)
-    change = np.abs(np.diff(image, axis=0)).mean(axis=1)
-    borders = np.array([[255], [511], [767]]) + np.arange(-4, fast_lic.OVERLAP_ROWS + 4)
-    assert change[borders].mean() == pytest.approx(change.mean(), rel=0.15)
 
 
 @pytest.mark.parametrize("step", [1.0, 0.3])

@@ -16,7 +16,7 @@ from rosy_addon.color import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import EvenLines
 from rosy_addon.compositor.family_hues import line_families
-from rosy_addon.compositor.fast_lic import compute_fast_lic
+from rosy_addon.compositor.fast_lic import fast_lic
 from rosy_addon.compositor.hatching import (
     LineModulation,
     line_ink_indices,
@@ -279,12 +279,12 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     break_images = paper_grain = None
     if look.breaks or look.wobble:
         break_look = replace(look, length=break_steps(look))
-        break_images = compute_fast_lic(field, break_look, noise)
+        (break_images,) = fast_lic(field, [break_look], noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
             field.pixel, field.width, look.grain, look.seed, 1, field.line_count
         )
-    images = compute_fast_lic(field, look, noise)
+    (images,) = fast_lic(field, [look], noise)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
     _, alpha = render_hatching(
         field, images, look, tones, LineModulation(break_images, paper_grain)

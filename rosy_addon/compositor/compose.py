@@ -82,7 +82,7 @@ def compose(
         Stores what does not depend on the camera, by default `cache`.
     strips : sequence of Strip, optional
         The rows that are drawn, from `divide_into_strips`; by default all. The G-buffer has them and their
-        context.
+        context. A G-buffer of samples that are shaded one by one is a single strip.
     draws_thresholds : bool
         Whether the picture has the thresholds of its ink (`ink_thresholds`), if the look has ink. They do
         not depend on the tone.
@@ -102,7 +102,9 @@ def compose(
     camera = gbuffer.camera
     if gbuffer.coverage is not None:
         look = replace(look, supersampling=1)
-    if strips is None:
+    if look.supersampling > 1:
+        strips = [Strip(0, camera.height, camera.height)]
+    elif strips is None:
         strips = divide_into_strips(look, camera, gbuffer.instances)
     look = with_cycle_distance(look_in_pixels(look, camera, gbuffer.instances))
     pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)

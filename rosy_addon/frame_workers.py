@@ -15,9 +15,11 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 
 from .errors import RosyError
+from .worker.start import guarded
 
 #: Largest number of a frame in Blender.
 MAX_FRAME = 1_048_574
@@ -95,10 +97,14 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     process_count = max(min(process_count, len(frames)), 1)
     workers: list[_Worker] = []
     folder = Path(tempfile.mkdtemp(prefix="rosy-"))
+    stack = ExitStack()
     try:
         for index in range(process_count):
             log = folder / f"{index}.log"
             workers.append(_Worker(command, frames[index::process_count], log))
+            stack.enter_context(guarded(workers[-1].process))
+        # The files are open. Where they can, they go now, so that none stays if this process is killed.
+        shutil.rmtree(folder, ignore_errors=True)
         running = list(workers)
         while running:
             # A process that has ended prints no more, so what it printed is read after that.
@@ -110,6 +116,7 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     finally:
         for worker in workers:
             worker.stop()
+        stack.close()
         shutil.rmtree(folder, ignore_errors=True)
     failures = [
         f"frames {format_frames(worker.frames)}: {error_line(worker.lines)}"

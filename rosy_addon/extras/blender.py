@@ -31,6 +31,7 @@ from ..cli.presets import user_presets_folder
 from ..errors import RosyError
 from ..processes import run_process
 from ..turntable_video import Encoder
+from ..worker.start import guarded
 
 #: The oldest version of Blender that RoSy runs in.
 OLDEST_VERSION = (4, 2)
@@ -291,6 +292,7 @@ def run_job(program: str, job: dict[str, Any]) -> int:
             env=os.environ | {"ROSY_PRESETS": str(user_presets_folder())},
             **inheritance,
         )
+        stack.enter_context(guarded(process))
         try:
             with _signals_as_exceptions():
                 process.wait()

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import sys
 import time
 import traceback
 from collections.abc import Callable
-from multiprocessing import connection
 from typing import Any
 
 from ..cache import BAKE_CACHE
 from ..progress import listening
 from .channel import Channel
 from .pool import POOL
+from .start import own_end
 
 #: Seconds without work after which memory is given back.
 IDLE_SECONDS = 120.0
@@ -44,19 +43,17 @@ class _Reporter:
             os._exit(1)
 
 
-def main(handle: int, package: str) -> None:
+def main(handle: str, package: str) -> None:
     """Call functions until the other process ends.
 
     Parameters
     ----------
-    handle : int
+    handle : str
         Of this end of the connection.
     package : str
         The name of this package in the other process.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal
-    kind = connection.PipeConnection if sys.platform == "win32" else connection.Connection
-    channel = Channel(kind(handle), package)
+    channel = Channel(own_end(handle), package)
     reporter = _Reporter(channel)
     try:
         channel.send(("ready",))
@@ -89,4 +86,4 @@ def _answer(
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2])
+    main(*sys.argv[1:])

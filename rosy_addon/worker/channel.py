@@ -18,12 +18,10 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from .start import PACKAGE
 
 #: Immutable classes whose instances the other process keeps: they are large, and used again.
 KEPT_CLASSES = (MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
-
-#: The name of this package, which differs between Blender, a helper and an installed wheel.
-PACKAGE = __package__.rpartition(".")[0]
 
 #: Bytes of an array that are written at a time.
 CHUNK_BYTES = 1 << 20

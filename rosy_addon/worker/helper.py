@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Mapping
-from multiprocessing.connection import Connection, Pipe
-from pathlib import Path
+from multiprocessing.connection import Connection
 from typing import Any
 
-from .channel import PACKAGE, Channel
+from .channel import Channel
+from .start import PACKAGE, STARTED_PACKAGE, start_module
 
 #: Seconds that a helper may take until it is ready.
 START_SECONDS = 60.0
@@ -66,14 +64,13 @@ class Helper:
         if self._process is not None and self._process.poll() is None:
             return
         self.close()
-        connection, other_end = Pipe()
         try:
-            with other_end:
-                self._process = _start_process(other_end, self._environment)
+            self._process, connection = start_module(
+                "worker", PACKAGE, environment=self._environment
+            )
         except OSError as error:
-            connection.close()
             raise HelperLostError(f"no helper process can be started: {error}", False) from None
-        self._channel = Channel(connection, PACKAGE.rpartition(".")[2])
+        self._channel = Channel(connection, STARTED_PACKAGE)
         self._is_ready, self._start_time = False, time.monotonic()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Handle:
@@ -195,27 +192,3 @@ class Handle:
         """End the helper at once, if the call is not done."""
         if not self.is_done:
             self._helper.close()
-
-
-def _start_process(
-    connection: Connection, environment: Mapping[str, str]
-) -> subprocess.Popen[bytes]:
-    """Start this package as a program, with one end of a connection."""
-    # The helper imports what this process imports, in the same order, and this package.
-    folders = [*sys.path, str(Path(__file__).parents[2])]
-    options: dict[str, Any] = {}
-    if sys.platform == "win32":
-        os.set_handle_inheritable(connection.fileno(), True)
-        handles = {"handle_list": [connection.fileno()]}
-        options["startupinfo"] = subprocess.STARTUPINFO(lpAttributeList=handles)
-        options["creationflags"] = subprocess.CREATE_NO_WINDOW
-    else:
-        options["pass_fds"] = [connection.fileno()]
-    module = f"{PACKAGE.rpartition('.')[2]}.worker"
-    return subprocess.Popen(
-        [sys.executable, "-s", "-S", "-P", "-m", module, str(connection.fileno()), PACKAGE],
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(folders)} | environment,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        **options,
-    )

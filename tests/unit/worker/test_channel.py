@@ -10,7 +10,8 @@ from shapes import icosphere
 
 from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.worker.channel import CHUNK_BYTES, PACKAGE, Channel
+from rosy_addon.worker.channel import CHUNK_BYTES, Channel
+from rosy_addon.worker.start import PACKAGE
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 from conftest import ROOT
 
 from rosy_addon.errors import RosyError
-from rosy_addon.worker import helper as module
+from rosy_addon.worker import start as module
 from rosy_addon.worker.helper import Handle, Helper, HelperLostError
 
 sys.path.append(str(Path(__file__).parent))
@@ -128,3 +128,26 @@ time.sleep(100)
         os.kill(process.pid, number)
         process.wait()
         assert has_ended(pid, 2.0)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the list of processes")
+def test_no_frame_worker_outlives_the_command_that_started_it(tmp_path):
+    program = f"""
+import sys
+sys.path[:0] = [{str(ROOT)!r}]
+from rosy_addon.frame_workers import run_local
+code = "import os, time; print(os.getpid(), flush=True); time.sleep(100)"
+for line in run_local([sys.executable, "-c", code], range(2), 2):
+    print(line, flush=True)
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    ) as process:
+        pids = [int(process.stdout.readline()) for _ in range(2)]
+        process.kill()
+        process.wait()
+        assert all(has_ended(pid, 2.0) for pid in pids)
+    assert not list(tmp_path.iterdir())

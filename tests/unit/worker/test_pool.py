@@ -23,7 +23,7 @@ from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture, picture_groups
 from rosy_addon.rendering.view_input import ViewInput
-from rosy_addon.worker import helper as helper_module
+from rosy_addon.worker import start
 from rosy_addon.worker.pool import POOL
 
 sys.path.append(str(Path(__file__).parent))
@@ -95,7 +95,7 @@ def test_what_a_killed_helper_has_not_drawn_is_drawn_here(killed_at, expected):
 @pytest.mark.slow
 @pytest.mark.parametrize("program", ["/no/such/program", "/bin/false"])
 def test_without_helpers_all_is_drawn_here(program, expected, monkeypatch):
-    monkeypatch.setattr(helper_module.sys, "executable", program)
+    monkeypatch.setattr(start.sys, "executable", program)
     assert drawn(VIEW, 2) == expected
 
 

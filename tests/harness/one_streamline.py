@@ -11,14 +11,11 @@ import importlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
 import numpy as np
-
-from rosy_addon.progress import as_task
 
 #: The modules of `compositor` that are used here.
 MODULES = (
@@ -50,10 +47,10 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
         f"{package}.gpu.lic_stage"
     ).INTERPOLATED_CONTRAST
 
-    def lengths_task(field, looks, noise, _band, _name):
+    def draw_lengths(field, looks, noise, _band, _name):
         results = []
         for look in looks:
-            images = yield from as_task(rosy.brute_force.brute_force, field, look, noise)
+            images = rosy.brute_force.brute_force(field, look, noise)
             if _is_antialiased(rosy, look) and rosy.hatching.is_hatched(look):
                 images = _smoothed(
                     rosy, rosy.covering.build_covering(field, look, noise), field, images
@@ -61,16 +58,16 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
             results.append(images)
         return results
 
-    convolve_still_task = partial(as_task, rosy.brute_force.convolve_members)
+    convolve_still = rosy.brute_force.convolve_members
 
-    def convolve_task(field, look, *arguments):
+    def convolve(field, look, *arguments):
         if look.flow or _is_antialiased(rosy, look):
-            return (yield from _members_task(rosy, field, look, *arguments))
-        return (yield from convolve_still_task(field, look, *arguments))
+            return _members(rosy, field, look, *arguments)
+        return convolve_still(field, look, *arguments)
 
     with (
-        mock.patch.object(rosy.lic, "fast_lic_lengths", lengths_task),
-        mock.patch.object(rosy.brute_force, "convolve_members", convolve_task),
+        mock.patch.object(rosy.lic, "fast_lic_lengths", draw_lengths),
+        mock.patch.object(rosy.brute_force, "convolve_members", convolve),
     ):
         yield
 
@@ -104,17 +101,17 @@ def _smoothed(rosy: SimpleNamespace, covering: Any, field: Any, images: Any) -> 
     return replace(images, members=smooth, slopes=slopes)
 
 
-def _members_task(
+def _members(
     rosy: SimpleNamespace,
     field: Any,
     look: Any,
     noise: np.ndarray,
     neighbors: np.ndarray,
     tracers: Any,
-) -> Iterator[Any]:
+) -> Any:
     """Do the same as `lic_images.convolve_members`, by kernels that move or with interpolated noise."""
     count = len(field.pixel)
-    limit = yield from as_task(rosy.lic_images.compute_step_limits, field, look)
+    limit = rosy.lic_images.compute_step_limits(field, look)
     length = np.full(count, look.length) if limit is None else limit
     kind = rosy.filter_kernel.kernel_of(look)
     reach = rosy.flow.streamline_reach(look)
@@ -165,7 +162,7 @@ def _members_task(
         number = samples[member].astype(np.float32)
         members[member] = rosy.contrast.normalize_variance(mean, number, look)
     mean_samples = samples.mean(axis=0).astype(np.float32)
-    return (yield from as_task(rosy.lic_images.lic_images, members, mean_samples))
+    return rosy.lic_images.lic_images(members, mean_samples)
 
 
 def _sampler(

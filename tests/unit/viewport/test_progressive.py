@@ -10,11 +10,12 @@ import pytest
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
-from rosy_addon.progress import Progress
 from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport import progressive as progressive_module
 from rosy_addon.viewport.progressive import ProgressiveRenderer
+from rosy_addon.viewport.step_runner import SharedHelper
+from rosy_addon.worker.job import Step
 
 POINTERS = 1, 2
 
@@ -26,17 +27,20 @@ class NotingRenderer:
     needs_occluders = False
 
     def __init__(self):
-        self.done, self.failing = [], set()
+        self.done, self.failing, self.is_prepared = [], set(), False
 
     def _step(self, name):
         self.done.append(name)
         if name in self.failing:
             raise MemoryError
 
-    def prepare_task(self, instances, display):
+    def prepare_steps(self, instances, display):
+        if self.is_prepared:
+            return
         for name in ("compile", "compile", "upload a mesh"):
-            yield Progress(0.0, name)
+            yield Step(0.0, name)
             self._step(name)
+        self.is_prepared = True
 
     def upload(self, instances, display):
         return ["item"]
@@ -44,9 +48,9 @@ class NotingRenderer:
     def covered_pixels(self, items, camera):
         return camera.width * camera.height
 
-    def render_texture_task(self, items, view, target_key=None):
+    def texture_steps(self, items, view, target_key=None):
         for name in ("visibility", "lines"):
-            yield Progress(0.0, name)
+            yield Step(0.0, name)
             self._step(name)
         return "texture"
 
@@ -63,9 +67,15 @@ def view_input():
     return ViewInput((), camera, Look())
 
 
+def progressive_of(renderer, helper=None):
+    return ProgressiveRenderer(
+        renderer, helper or SharedHelper(), lambda seconds: None, lambda: None
+    )
+
+
 @pytest.fixture
 def progressive():
-    return ProgressiveRenderer(NotingRenderer(), lambda seconds: None)
+    return progressive_of(NotingRenderer())
 
 
 def test_each_step_of_the_first_picture_is_named_before_it_begins(progressive, view_input):
@@ -113,11 +123,11 @@ class SlowRenderer(NotingRenderer):
         super().__init__()
         self.pictures = 0
 
-    def render_texture_task(self, items, view, target_key=None):
+    def texture_steps(self, items, view, target_key=None):
         self.pictures += 1
         name = self.pictures, view.camera.width, target_key[2]
         for _ in range(30):
-            yield Progress(0.0, "lines")
+            yield Step(0.0, "lines")
         return name
 
 
@@ -128,7 +138,7 @@ def slow(monkeypatch, view_input):
     clock = SimpleNamespace(monotonic=lambda: 0.02 * next(ticks))
     monkeypatch.setattr(progressive_module, "time", clock)
     monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)
-    slow = ProgressiveRenderer(SlowRenderer(), lambda seconds: None)
+    slow = progressive_of(SlowRenderer())
     while slow.update(POINTERS, ("view", 0), view_input, "view").texture is None:
         pass
     return slow

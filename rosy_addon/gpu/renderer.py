@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..annotation.singularity_settings import shows_singularities
-from ..cache import BAKE_CACHE
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
 from ..compositor.look import Look, colors_magnitude
@@ -26,8 +24,7 @@ from ..errors import DeviceError, RosyError
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
-from ..rendering.arrowheads import with_arrowheads
-from ..rendering.singularities import with_singularities
+from ..rendering.marks import has_marks, with_marks
 from ..rendering.view_input import Background, ViewInput
 from ..worker.job import Call, Step, Steps
 from . import lookup_tables, passes
@@ -59,13 +56,6 @@ def check_method(look: Look) -> None:
             f"the graphics card cannot draw the method '{look.method}': choose another method, or the "
             "processor"
         )
-
-
-def with_marks(picture: Picture, view: ViewInput) -> Picture:
-    """Draw the arrowheads and singularities of a view over its picture, if the look has them."""
-    marked = with_singularities(with_arrowheads(picture, view, BAKE_CACHE), view, BAKE_CACHE)
-    BAKE_CACHE.evict_over_limit()
-    return marked
 
 
 class GpuRenderer:
@@ -110,7 +100,7 @@ class GpuRenderer:
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
         picture = Picture(rgba, (), color_range=self._color_range(view))
-        if look.arrows or shows_singularities(look):
+        if has_marks(look):
             return (yield Call(with_marks, (picture, view), 0.98, 1.0, "drawing marks"))
         return picture
 

@@ -16,6 +16,9 @@ from .channel import PACKAGE, Channel
 #: Seconds that a helper may take until it is ready.
 START_SECONDS = 60.0
 
+#: Seconds for which large results are received at a time.
+RECEIVE_SECONDS = 0.03
+
 
 class HelperLostError(Exception):
     """A helper has ended before its work was done, or cannot be started.
@@ -165,7 +168,7 @@ class Handle:
                     return False
                 channel.send(self._call)
                 self._call = None
-            while not self.is_done and channel.poll():
+            while not self.is_done and channel.has_received(RECEIVE_SECONDS):
                 kind, *content = channel.receive()
                 if kind == "progress":
                     self.fraction, self.label = content

@@ -846,7 +846,7 @@ CAUSES = {
     "edit mode": (_edit_mode, ("'Suzanne'", "edit mode")),
     "wireframe": (_wireframe, ("wireframe",)),
     "no field": (_no_field, ("no object with a field",)),
-    "no memory": (_raises("render_texture_task", MemoryError()), ("not enough memory",)),
+    "no memory": (_raises("texture_steps", MemoryError()), ("not enough memory",)),
     "no memory to upload": (_raises("upload", MemoryError()), ("not enough memory",)),
 }
 

@@ -58,6 +58,7 @@ class Work:
 
     Attributes
     ----------
+    view : ViewState
     request : Request
     runner : StepRunner
     is_at_once : bool
@@ -72,6 +73,7 @@ class Work:
         Seconds, monotonic: when it was worked on last.
     """
 
+    view: ViewState
     request: Request
     runner: StepRunner
     is_at_once: bool
@@ -192,9 +194,8 @@ class ProgressiveRenderer:
         self.is_prepared = False
         self._helper = helper
         self._schedule_redraw, self._schedule_poll = schedule_redraw, schedule_poll
-        #: What is being prepared, and for which view. Pictures wait until it is done.
+        #: What is being prepared. Pictures wait until it is done.
         self._preparation: Work | None = None
-        self._prepared_view: ViewState | None = None
         #: A view that waits until that of another view is done, and since when (seconds, monotonic).
         self._waiting_view: ViewState | None = None
         self._waiting_time = 0.0
@@ -228,7 +229,9 @@ class ProgressiveRenderer:
         for view in self.views.values():
             view.stop_rendering()
         self.views.clear()
-        self._stop_preparing()
+        if self._preparation is not None:
+            self._preparation.runner.close()
+            self._preparation = None
         self.renderer.release()
 
     def update(
@@ -282,27 +285,23 @@ class ProgressiveRenderer:
         are prepared.
         """
         while True:
-            if self._preparation is None:
+            work = self._preparation
+            if work is None:
                 instances, display = request.view_input.instances, request.view_input.look.display
                 runner = StepRunner(self.renderer.prepare_steps(instances, display), self._helper)
-                self._preparation = Work(request, runner, view.texture is not None)
-                self._prepared_view = view
+                work = self._preparation = Work(view, request, runner, view.texture is not None)
             try:
-                if self._continue(view, self._preparation, SLICE_SECONDS) is None:
+                if self._continue(view, work, SLICE_SECONDS) is None:
                     return None
+                self.is_prepared = True
             except Exception:
-                self._stop_preparing()
-                raise
-            self.is_prepared = True
-            prepared, is_own = self._preparation.request, self._prepared_view is view
-            self._preparation = self._prepared_view = None
-            if is_own:
-                return prepared
-
-    def _stop_preparing(self) -> None:
-        if self._preparation is not None:
-            self._preparation.runner.close()
-        self._preparation = self._prepared_view = None
+                if work.view is view:  # otherwise it is left to the other view
+                    raise
+            finally:
+                if work.runner.is_done:
+                    self._preparation = None
+            if work.view is view:
+                return work.request
 
     def _update_picture(self, view: ViewState, request: Request) -> None:
         """Bring the picture of a view up to date, with its meshes prepared."""
@@ -320,7 +319,7 @@ class ProgressiveRenderer:
                 return
             view.stop_rendering()
         seconds = self._seconds_per_megapixel * self._megapixels(view, request)
-        if not seconds:
+        if not self._seconds_per_megapixel:
             self._start(view, request, full_downscale)
         elif seconds <= FRAME_BUDGET_SECONDS:
             self._start(view, request, full_downscale, is_at_once=True)
@@ -372,7 +371,7 @@ class ProgressiveRenderer:
             (id(view), downscale, buffer if is_final else 0),
         )
         runner = StepRunner(steps, self._helper)
-        view.picture = Work(request, runner, is_at_once, downscale, buffer)
+        view.picture = Work(view, request, runner, is_at_once, downscale, buffer)
         self._render(view)
 
     def _must_wait(self, view: ViewState) -> bool:
@@ -431,7 +430,8 @@ class ProgressiveRenderer:
                 if time.monotonic() - start_time >= seconds:
                     break
         except StopIteration as end:
-            self.renderer.finish()
+            if work is not self._preparation:
+                self.renderer.finish()
             view.progress = None
             return end
         finally:

@@ -60,10 +60,12 @@ class StepRunner:
     ----------
     helper_seconds : float
         Seconds of work of the helper so far.
+    is_done : bool
+        Whether the steps have ended, with a result or an error.
     """
 
     def __init__(self, steps: Steps[Any], helper: SharedHelper) -> None:
-        self.helper_seconds = 0.0
+        self.helper_seconds, self.is_done = 0.0, False
         self._steps, self._helper = steps, helper
         self._step: Step | None = None
         #: A call that the steps wait for, the helper's handle of it, and what returns or raises its result.
@@ -97,7 +99,8 @@ class StepRunner:
             self._outcome = self._handle.result
         except HelperLostError as error:
             if error.has_started:
-                self._outcome = partial(_raise, RosyError(str(error)))
+                problem = f"{error}, as it does without enough memory: choose a smaller mesh"
+                self._outcome = partial(_raise, RosyError(problem))
             else:
                 self._helper.is_usable, self._outcome = False, self._call
         self._helper.release(self)
@@ -113,7 +116,11 @@ class StepRunner:
             With the result, if the steps are done.
         """
         outcome, self._call, self._handle, self._outcome = self._outcome, None, None, None
-        step = next(self._steps) if outcome is None else self._continued(outcome)
+        try:
+            step = next(self._steps) if outcome is None else self._continued(outcome)
+        except BaseException:
+            self.is_done = True
+            raise
         if isinstance(step, Call):
             self._call = step
             self._step = step = Step(step.start, step.label or "starting")

@@ -33,7 +33,7 @@ class SharedHelper:
             return None
         if not self.is_usable:
             raise HelperLostError("no helper process can be started", False)
-        handle = self._helper.submit(call)
+        handle = self._helper.submit(call.function, *call.arguments)
         self._runner = runner
         return handle
 
@@ -102,7 +102,7 @@ class StepRunner:
                 problem = f"{error}, as it does without enough memory: choose a smaller mesh"
                 self._outcome = partial(_raise, RosyError(problem))
             else:
-                self._helper.is_usable, self._outcome = False, self._call
+                self._helper.is_usable, self._outcome = False, self._call.__call__
         self._helper.release(self)
         self.helper_seconds += time.monotonic() - self._call_time
         return True

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ..compositor.look_units import preview_look
 from ..errors import RosyError, error_text
+from ..gpu.preparation import prepare_steps
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
-from ..worker.job import Step
+from ..worker.job import Step, Steps
 from .step_runner import SharedHelper, StepRunner
 
 #: Seconds that a redraw may take to render a picture at once, and seconds of one slice of refinement.
@@ -45,11 +46,14 @@ class Request(NamedTuple):
     still_key : hashable
         The same without how far streaks have drifted.
     view_input : ViewInput
+    lookups : sequence of callable
+        What else is prepared; see `prepare_steps`.
     """
 
     key: Hashable
     still_key: Hashable
     view_input: ViewInput
+    lookups: Sequence[Callable[[], Any]]
 
 
 @dataclass(eq=False)
@@ -240,6 +244,7 @@ class ProgressiveRenderer:
         requested_key: Hashable,
         view_input: ViewInput,
         still_key: Hashable = None,
+        lookups: Sequence[Callable[[], Any]] = (),
     ) -> ViewState:
         """Bring the picture of a view up to date, as far as there is time for it.
 
@@ -253,6 +258,8 @@ class ProgressiveRenderer:
             Its camera has the size of the region.
         still_key : hashable, optional
             The key without how far streaks have drifted.
+        lookups : sequence of callable
+            What is prepared besides the meshes; see `prepare_steps`.
 
         Raises
         ------
@@ -268,7 +275,8 @@ class ProgressiveRenderer:
             raise RosyError(view.error)
         view.error = None
         try:
-            prepared = self._prepared(view, Request(requested_key, still_key, view_input))
+            request = Request(requested_key, still_key, view_input, lookups)
+            prepared = self._prepared(view, request)
             if prepared is not None:
                 self._update_picture(view, prepared)
         except Exception as error:
@@ -287,8 +295,7 @@ class ProgressiveRenderer:
         while True:
             work = self._preparation
             if work is None:
-                instances, display = request.view_input.instances, request.view_input.look.display
-                runner = StepRunner(self.renderer.prepare_steps(instances, display), self._helper)
+                runner = StepRunner(self._preparation_steps(request), self._helper)
                 work = self._preparation = Work(view, request, runner, view.texture is not None)
             try:
                 if self._continue(view, work, SLICE_SECONDS) is None:
@@ -302,6 +309,12 @@ class ProgressiveRenderer:
                     self._preparation = None
             if work.view is view:
                 return work.request
+
+    def _preparation_steps(self, request: Request) -> Steps[None]:
+        """Do what takes long before a picture."""
+        view_input = request.view_input
+        yield from self.renderer.prepare_steps(view_input.instances, view_input.look.display)
+        yield from prepare_steps(request.lookups)
 
     def _update_picture(self, view: ViewState, request: Request) -> None:
         """Bring the picture of a view up to date, with its meshes prepared."""
@@ -394,7 +407,7 @@ class ProgressiveRenderer:
             megapixels = ratio * self._megapixels(view, picture.request)
             self._update_estimate(picture.seconds + picture.runner.helper_seconds, megapixels)
         view.texture, view.downscale, view.buffer = end.value, picture.downscale, picture.buffer
-        view.texture_key, view.texture_still_key, _ = picture.request
+        view.texture_key, view.texture_still_key = picture.request[:2]
         view.picture = None
         if view.texture_key != view.requested_key:
             self._schedule_redraw(0.0)

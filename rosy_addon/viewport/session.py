@@ -6,6 +6,7 @@ import time
 import traceback
 from collections.abc import Callable, Hashable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -31,7 +32,13 @@ from .layers import LayerState, LayerStates
 from .messages import draw_messages
 from .progressive import ProgressiveRenderer
 from .references import ReferenceImages
-from .singularity_dots import SingularityDots, draw_dots, draw_labels, singularity_dots
+from .singularity_dots import (
+    SingularityDots,
+    draw_dots,
+    draw_labels,
+    look_up_singularities,
+    singularity_dots,
+)
 from .step_runner import SharedHelper
 from .view3d import (
     clip_planes,
@@ -324,6 +331,11 @@ class ViewportSession:
                 instances,
                 replace(view_input, look=replace(view_input.look, flow_phase=0.0)),
             ),
+            [
+                partial(look_up_singularities, instance, self._marks_cache)
+                for instance in view_input.instances
+                if instance.field is not None and shows_singularities(look)
+            ],
         )
         if self.progressive.is_prepared:
             background = view_background(context, depsgraph, view_input.camera, look)
@@ -374,11 +386,12 @@ class ViewportSession:
         """Draw dots at the singularities of a view, if the look shows them."""
         if not shows_singularities(look):
             return
-        dots = [
+        found = [
             singularity_dots(instance, self._marks_cache, view_input.clip_planes)
             for instance in view_input.instances
             if instance.field is not None
         ]
+        dots = [one for one in found if one is not None]
         self._marks_cache.evict_over_limit()
         shows_hidden = look.singularity_dots == "all"
         draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden)

@@ -25,8 +25,8 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
 from rosy_addon.preset_files.store import load_preset, preset_keys
-from rosy_addon.progress import run_to_completion
 from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.worker.job import run
 
 from . import cases
 
@@ -90,7 +90,7 @@ def open_device() -> Any:
 
 def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
     """Draw a picture and leave it on the card."""
-    return run_to_completion(renderer.render_texture_task(items, ViewInput((), camera, look)))
+    return run(renderer.texture_steps(items, ViewInput((), camera, look)))
 
 
 class QueriedDevice:

@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from ..cache import Cache
 from ..errors import NothingInViewError
-from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..rendering.draw import bake_picture
 from ..rendering.view_input import Background, ViewInput
+from ..worker.job import Call, Steps
 from .background import draw_background
 from .device import Device
 from .passes import BACKGROUND, COMPOSITE
+from .preparation import compile_lookups, prepare_steps
 
 
 class CpuViewportRenderer:
     """Draws the pictures of 3D views with numpy. Implements `ViewportRenderer`.
 
-    The device only composites the finished picture over the view.
+    Each picture is one call, for a helper process. The device only composites it over the view.
 
     Parameters
     ----------
@@ -40,17 +41,15 @@ class CpuViewportRenderer:
 
     def __init__(self, device: Device) -> None:
         self._device = device
-        self._cache = Cache()
-        self._renderer = CpuRenderer(self._cache)
         # Two triangles that fill the view, in front of everything in it.
         vertices = np.zeros((6, 4), dtype=np.float32)
         vertices[:, :2] = [(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]
         vertices[:, 2] = -0.9999
         self._fullscreen_batch = device.batch(vertices)
 
-    def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
-        """As `ViewportRenderer.prepare_task`."""
-        yield from self._device.compile_task((COMPOSITE, BACKGROUND))
+    def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
+        """As `ViewportRenderer.prepare_steps`."""
+        return prepare_steps(compile_lookups(self._device, (COMPOSITE, BACKGROUND)))
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[MeshInstance]:
         """As `ViewportRenderer.upload`."""
@@ -60,16 +59,14 @@ class CpuViewportRenderer:
         """As `ViewportRenderer.covered_pixels`."""
         return camera.width * camera.height
 
-    def render_texture_task(
+    def texture_steps(
         self, items: Sequence[MeshInstance], view: ViewInput, target_key: Hashable = None
-    ) -> Task[Any]:
-        """As `ViewportRenderer.render_texture_task`. Clip planes are ignored."""
+    ) -> Steps[Any]:
+        """As `ViewportRenderer.texture_steps`. Clip planes are ignored."""
         try:
-            picture = yield from self._renderer.render_task(replace(view, instances=tuple(items)))
+            picture = yield Call(bake_picture, (replace(view, instances=tuple(items)), True, 1))
         except NothingInViewError:
             return None
-        finally:
-            self._cache.evict_over_limit()
         height, width = picture.rgba.shape[:2]
         return self._device.texture(width, height, "RGBA16F", data=picture.rgba)
 
@@ -101,4 +98,3 @@ class CpuViewportRenderer:
 
     def release(self) -> None:
         """As `ViewportRenderer.release`."""
-        self._cache.clear()

@@ -49,8 +49,8 @@ from ..projection.pixel_neighbors import DEPTH_TOLERANCE, MAX_SLOPE, SLOPE_TOLER
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.shadow_maps import PCF_WIDTH
 from ..projection.surface_sampling import MIN_FACING_COSINE
-from .line_records import MAX_TREE_DEPTH
 from .mesh_buffers import NORMAL_TEXEL, POSITION_TEXEL, ROW_BITS, VALUE_TEXEL
+from .surface_records import MAX_TREE_DEPTH
 
 #: The kernels of `filter_kernel`.
 KERNELS: dict[Kernel, int] = {"box": 0, "taper": 1, "ramp": 2}

@@ -5,14 +5,13 @@ Tests and benchmarks implement the protocol `Device` without Blender.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import DeviceError
-from ..progress import Progress, Task
 from .passes import WORKGROUP_SIZE, ComputePass, RasterPass, Uniforms
 
 NamedValues = Mapping[str, Any]
@@ -35,11 +34,11 @@ class Device(Protocol):
 
     max_texture_size: int
 
-    def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
-        """Compile shaders that are not compiled yet, each in a step. Others are compiled when used.
+    def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
+        """Return whether a shader is compiled. Those that are not are compiled when they are used."""
 
-        A shader that the driver rejects is an error only when it is used.
-        """
+    def compile(self, shader: ComputePass | RasterPass) -> None:
+        """Compile a shader. If the driver rejects it, that is an error only when it is used."""
 
     def texture(
         self,
@@ -116,13 +115,14 @@ class BlenderDevice:
         self._shaders: dict[Hashable, Any] = {}
         self.max_texture_size: int = gpu.capabilities.max_texture_size_get()
 
-    def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
-        """As `Device.compile_task`."""
-        missing = [shader for shader in shaders if shader.key not in self._shaders]
-        for index, shader in enumerate(missing):
-            yield Progress(index / len(missing), "compiling shaders")
-            with suppress(DeviceError):
-                self._program(shader)
+    def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
+        """As `Device.is_compiled`."""
+        return shader.key in self._shaders
+
+    def compile(self, shader: ComputePass | RasterPass) -> None:
+        """As `Device.compile`."""
+        with suppress(DeviceError):
+            self._program(shader)
 
     def texture(
         self,

@@ -1,12 +1,12 @@
-"""A picture that is being drawn, and how passes run on it."""
+"""A picture that is being drawn, and the passes that draw it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..compositor.target_tone import ReferenceRender
 from ..projection.camera import Camera
 from .field_kind import FieldKind
 from .mesh_buffers import MAX_TRIANGLES
-from .passes import ComputePass, clear_pass
+from .passes import ComputePass, RasterPass, clear_pass
 from .resources import DrawItem, GpuResources
 from .screen_box import Box, box_size, is_empty, screen_box, union_box
 from .uniforms import camera_uniforms, instance_uniforms
@@ -28,9 +28,28 @@ FIRST_TRIANGLE_ID = 0x00800000
 STOP_ID = 0x7F800000
 
 
+class FramePass(NamedTuple):
+    """A pass of a picture that is still to be run.
+
+    Attributes
+    ----------
+    shader : ComputePass or RasterPass
+        With the constants of its switches.
+    run : callable
+    pause : float or None
+        If other work may be done before the pass, the fraction of the stage that is drawn until then.
+    """
+
+    shader: ComputePass | RasterPass
+    run: Callable[[], None]
+    pause: float | None
+
+
 @dataclass(eq=False)
 class Frame:
     """A picture that is being drawn.
+
+    The stages add passes to it, which the renderer then runs; see `take_passes`.
 
     Attributes
     ----------
@@ -48,6 +67,10 @@ class Frame:
         The samples of the pixels, if these have several. The pixels are shaded once.
     textures : dict of str to texture
         Results of the passes so far, by their names in shaders.
+    prepared : dict
+        What was computed from the meshes for this picture, by the keys of the stages.
+    passes : list of FramePass
+        Those that are still to be run, also on the samples.
     """
 
     resources: GpuResources
@@ -59,6 +82,8 @@ class Frame:
     clip_planes: np.ndarray
     samples: Frame | None = None
     textures: dict[str, Any] = field(default_factory=dict)
+    prepared: dict[Hashable, Any] = field(default_factory=dict)
+    passes: list[FramePass] = field(default_factory=list)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -106,6 +131,12 @@ class Frame:
                 if not is_empty(box):
                     yield instance_id, item, box
 
+    def take_passes(self) -> list[FramePass]:
+        """Remove and return the passes that are to be run."""
+        passes = self.passes.copy()
+        self.passes.clear()
+        return passes
+
     def run_on_instance(
         self,
         shader: ComputePass,
@@ -114,7 +145,7 @@ class Frame:
         images: dict[str, Any],
         uniforms: dict[str, Any],
     ) -> None:
-        """Run a compute pass over the pixels of one instance.
+        """Add a compute pass over the pixels of one instance.
 
         The pass can read all ``textures`` and the triangle records of the instance.
 
@@ -161,8 +192,9 @@ class Frame:
         images: dict[str, Any],
         uniforms: dict[str, Any],
         layers: int = 1,
+        pause: float | None = None,
     ) -> None:
-        """Run a compute pass over the pixels of a box.
+        """Add a compute pass over the pixels of a box.
 
         Parameters
         ----------
@@ -173,6 +205,31 @@ class Frame:
         uniforms : dict
         layers : int
             Layers of array images.
+        pause : float, optional
+            See `FramePass`.
         """
         uniforms = {**uniforms, "box_origin": box[:2]}
-        self.resources.device.compute(shader, (*box_size(box), layers), textures, images, uniforms)
+        self.compute(shader, (*box_size(box), layers), textures, images, uniforms, pause)
+
+    def compute(
+        self,
+        shader: ComputePass,
+        size: Sequence[int],
+        textures: dict[str, Any],
+        images: dict[str, Any],
+        uniforms: dict[str, Any],
+        pause: float | None = None,
+    ) -> None:
+        """Add a compute pass; see `Device.compute`."""
+        run = partial(self.resources.device.compute, shader, size, dict(textures), images, uniforms)
+        self.passes.append(FramePass(shader.variant(uniforms), run, pause))
+
+    def draw(
+        self,
+        shader: RasterPass,
+        batches: Sequence[tuple[Any, dict[str, Any]]],
+        target: tuple[Any, Any],
+    ) -> None:
+        """Add a pass that draws triangles; see `Device.draw`."""
+        run = partial(self.resources.device.draw, shader, batches, target, {})
+        self.passes.append(FramePass(shader, run, None))

@@ -9,15 +9,8 @@ import numpy as np
 from ..compositor.hatching import has_outline
 from . import passes
 from .frame import Frame
-from .passes import ComputePass
 from .resources import DrawItem
 from .uniforms import NO_CLIP_PLANES, clip_uniforms, uniform_scale
-
-
-def gbuffer_shaders(frame: Frame) -> list[ComputePass]:
-    """Return the shaders of `render_gbuffer` that depend on the frame."""
-    items = [item for item in frame.items if item.field is not None]
-    return [passes.RESOLVE.variant(_surface_uniforms(frame, item)) for item in items]
 
 
 def render_gbuffer(frame: Frame) -> None:
@@ -55,7 +48,7 @@ def _visibility(frame: Frame) -> Any:
     shader = passes.VISIBILITY_CLIPPED if is_clipped else passes.VISIBILITY
     visibility = frame.resources.image("visibility", *frame.size, "R32F")
     depth = frame.resources.depth_image(*frame.size)
-    frame.resources.device.draw(shader, batches, (visibility, depth), {})
+    frame.draw(shader, batches, (visibility, depth))
     return visibility
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
 from ..compositor.look import Look, is_hatched
-from ..progress import Progress, Task
 from . import lookup_tables, passes
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
 from .field_kind import FieldKind
@@ -32,7 +32,7 @@ INTERPOLATED_CONTRAST = 0.96
 MAX_DISPATCH_STEPS = 1 << 29
 
 
-def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None]:
+def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None:
     """Draw the fields of one kind into a picture, with the textures of the earlier stages.
 
     Parameters
@@ -43,17 +43,12 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         Pixels to draw.
     picture : texture
         Of the size of the frame.
-
-    Yields
-    ------
-    Progress
     """
     look, resources = frame.look, frame.resources
     covering = covering_uniforms(kind, look)
     is_antialiased = int(frame.samples is not None)
     uniforms = {**covering, **look_uniforms(kind, look), "is_antialiased": is_antialiased}
-    textures = {**frame.textures, **(yield from _unfold_task(frame, kind, box, covering))}
-    yield Progress(0.0, "measuring streaks")
+    textures = {**frame.textures, **_unfold(frame, kind, box, covering)}
     textures |= {
         "noise_gradients": textures["directions"],
         "max_magnitude": _max_magnitude(frame, textures, kind, look),
@@ -64,20 +59,16 @@ def lic_task(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> Task[None
         textures["noise_gradients"] = _noise_gradients(frame, box, textures)
         uniforms["gain"] *= INTERPOLATED_CONTRAST
     if not is_hatched(look):
-        yield from _trace_task(
-            frame, kind, box, passes.LIC, textures, {"picture": picture}, uniforms
-        )
+        _trace(frame, kind, box, passes.LIC, textures, {"picture": picture}, uniforms)
         return
-    textures["line_means"] = yield from _streaks_task(frame, kind, box, textures, uniforms)
+    textures["line_means"] = _streaks(frame, kind, box, textures, uniforms)
     textures |= _ink_textures(frame, kind, textures)
-    yield Progress(1.0, "drawing the ink")
-    yield from resources.device.compile_task([passes.INK.variant(uniforms)])
-    frame.run(passes.INK, box, textures, {"picture": picture}, uniforms)
+    frame.run(passes.INK, box, textures, {"picture": picture}, uniforms, pause=1.0)
 
 
-def _streaks_task(
+def _streaks(
     frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
-) -> Task[Any]:
+) -> Any:
     """Return the means along the lines of a look with ink; another texture if it needs none."""
     image, layers = frame.resources.image, kind.line_count
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
@@ -85,7 +76,7 @@ def _streaks_task(
         return textures["directions"]
     means = image("line_means", *frame.size, "RGBA16F", layers)
     images = {"line_means": means}
-    yield from _trace_task(frame, kind, box, passes.STREAKS, textures, images, uniforms, layers)
+    _trace(frame, kind, box, passes.STREAKS, textures, images, uniforms, layers)
     if frame.samples is None or not has_streaks:
         return means
     smooth = image("smooth_means", *frame.size, "RGBA16F", layers)
@@ -113,7 +104,7 @@ def _ink_textures(frame: Frame, kind: FieldKind, textures: dict[str, Any]) -> di
     return result
 
 
-def _trace_task(
+def _trace(
     frame: Frame,
     kind: FieldKind,
     box: Box,
@@ -122,11 +113,8 @@ def _trace_task(
     images: dict[str, Any],
     uniforms: dict[str, Any],
     layers: int = 1,
-) -> Task[None]:
-    """Run a pass that traces streamlines, in bands: all lines of a pixel, or a layer for each line."""
-    yield Progress(0.0, "measuring streaks")
-    yield from frame.resources.device.compile_task([shader.variant(uniforms)])
-    yield Progress(0.0, "tracing streamlines")
+) -> None:
+    """Trace streamlines by passes over bands: all lines of a pixel, or a layer for each line."""
     left, bottom, right, top = box
     half_steps = streamline_reach(frame.look) if uniforms["half_length"] else 0
     row_steps = (right - left) * kind.line_count * 2 * half_steps
@@ -135,21 +123,16 @@ def _trace_task(
     band_rows = groups * WORKGROUP_SIZE[1]
     for start in range(bottom, top, band_rows):
         band = left, start, right, min(start + band_rows, top)
-        frame.run(shader, band, textures, images, uniforms, layers)
-        yield Progress((start + band_rows - bottom) / (top - bottom), "tracing streamlines")
+        done = (start - bottom) / (top - bottom)
+        frame.run(shader, band, textures, images, uniforms, layers, pause=done)
 
 
-def _unfold_task(
-    frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]
-) -> Task[dict[str, Any]]:
+def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -> dict[str, Any]:
     """Return the images of the covering: its cells, and directions without and with their gradients."""
-    yield Progress(0.0, "finding directions")
     image, lines = frame.resources.image, kind.line_count
     has_color_noise = noise_args(frame.look)["channels"] > 1
     shader = passes.COLOR_DIRECTIONS if has_color_noise else passes.DIRECTIONS
     uniforms = {**covering, **direction_uniforms(kind, frame.look, frame.camera)}
-    variants = [shader.variant(uniforms), passes.ANGLE_GRADIENT.variant(covering)]
-    yield from frame.resources.device.compile_task(variants)
     cells = image("cells", *frame.size, dict(shader.images)["cells"])
     directions = image("directions", *frame.size, "RGBA16F", lines)
     frame.run(
@@ -159,10 +142,9 @@ def _unfold_task(
         {"cells": cells, "directions": directions},
         {**camera_uniforms(frame.camera), **uniforms},
     )
-    yield Progress(0.0, "finding directions")
     textures = {"cells": cells, "directions": directions}
     images = {"angle_gradients": image("angle_gradients", *frame.size, "RGBA16F", lines)}
-    frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, layers=lines)
+    frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, lines, pause=0.0)
     return {**textures, **images}
 
 
@@ -182,18 +164,23 @@ def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look
     """
     if not MAGNITUDE_MODES[look.magnitude] or look.magnitude_range:
         return textures["cells"]
-    return largest_magnitude(frame.resources, textures["field_values"], kind.degree)
+    return largest_magnitude(frame.resources, textures["field_values"], kind.degree, frame.compute)
 
 
-def largest_magnitude(resources: GpuResources, field_values: Any, degree: int) -> Any:
-    """Return a texture of one texel: the largest magnitude of the visible fields of a degree."""
+def largest_magnitude(
+    resources: GpuResources, field_values: Any, degree: int, compute: Callable[..., None]
+) -> Any:
+    """Return a texture of one texel: the largest magnitude of the visible fields of a degree.
+
+    Passes are run by a function as `Device.compute` or `Frame.compute`.
+    """
     source = field_values
     width, height = source.width, source.height
     level, is_first = 0, 1
     while (width, height) != (1, 1) or is_first:
         width, height = -(-width // REDUCE_BLOCK), -(-height // REDUCE_BLOCK)
         tiles = resources.image(f"tiles {level}", width, height)
-        resources.device.compute(
+        compute(
             passes.MAX_REDUCE,
             (width, height),
             {"source_values": source},

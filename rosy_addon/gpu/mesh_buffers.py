@@ -13,7 +13,6 @@ from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, box_corners
-from ..progress import Progress, Task, as_task, subtask
 from ..projection.corner_field import CornerField, field_at_corners
 from ..projection.face_values import SIMILARITY_EPS
 from ..projection.field_channel import FieldChannel, rotation_order
@@ -25,8 +24,8 @@ from ..projection.surface_tone import SurfaceTone
 ROW_BITS = 13
 ROW_TEXELS = 1 << ROW_BITS
 
-#: Triangles whose records are written in one step.
-RECORDS_PER_STEP = 1 << 17
+#: Triangles whose records are written at once: more would not stay in the processor's cache.
+RECORDS_PER_BLOCK = 1 << 17
 
 #: Maximum triangles of a mesh: shaders handle their ids in single precision.
 MAX_TRIANGLES = 1 << 24
@@ -48,7 +47,7 @@ class MeshBuffers:
         Origin of all positions, so that surfaces far from the origin keep their precision.
     triangle_records : (rows, ROW_TEXELS, 4) float32 ndarray or None
         The record of each triangle: `texels_per_record` consecutive texels, see
-        `_write_records_task`. None without a field.
+        `_write_records`. None without a field.
     texels_per_record : int
     bounds : (8, 3) float64 ndarray
         Corners of the bounding box, relative to `center`.
@@ -124,7 +123,7 @@ def field_channels(field: RosyField) -> list[FieldChannel]:
     return channels
 
 
-def mesh_buffers_task(
+def mesh_buffers(
     surface: Surface,
     linear: np.ndarray,
     field: RosyField | None,
@@ -132,7 +131,7 @@ def mesh_buffers_task(
     channels: Sequence[FieldChannel] = (),
     tone: SurfaceTone | None = None,
     color_values: np.ndarray | None = None,
-) -> Task[MeshBuffers]:
+) -> MeshBuffers:
     """Return a surface with its field, tone and numbers in the layout of the shaders.
 
     Parameters
@@ -149,10 +148,6 @@ def mesh_buffers_task(
     color_values : (C,) float32 ndarray, optional
         As of `MeshInstance`.
 
-    Yields
-    ------
-    Progress
-
     Raises
     ------
     RosyError
@@ -164,7 +159,6 @@ def mesh_buffers_task(
             f"{surface.name}: has {len(surface.triangles)} triangles, but the graphics card draws at "
             f"most {MAX_TRIANGLES}: choose the processor"
         )
-    yield Progress(0.0, "preparing the mesh")
     points = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
     bounds = box_corners(points[:, surface.used_vertices].T)
     center = bounds.mean(axis=0)
@@ -178,16 +172,14 @@ def mesh_buffers_task(
     if field is not None:
         matrix = np.eye(4)
         matrix[:3, :3] = linear
-        task = as_task(field_at_corners, surface, matrix, field, display)
-        corner_field = yield from subtask(task, 0.2, 0.7)
+        corner_field = field_at_corners(surface, matrix, field, display)
         tone_values = None if tone is None else tone.values[surface.triangles]
         texels = record_texels(len(channels), tone is not None, values is not None)
         rows, records = _empty_records(count, texels)
-        task = _write_records_task(
+        _write_records(
             records, corners, rest_positions(surface), surface, corner_field, field.degree, channels,
             tone_values, None if values is None else values[surface.triangles],
         )  # fmt: skip
-        yield from subtask(task, 0.7, 1.0, "preparing the mesh")
     has_tone = field is not None and tone is not None
     return MeshBuffers(
         corners.reshape(-1, 4),
@@ -208,7 +200,7 @@ def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
     return flat.reshape(row_count, ROW_TEXELS, 4), flat[: count * texels].reshape(count, texels, 4)
 
 
-def _write_records_task(
+def _write_records(
     records: np.ndarray,
     corners: np.ndarray,
     rest: np.ndarray,
@@ -218,8 +210,8 @@ def _write_records_task(
     channels: Sequence[FieldChannel],
     tone: np.ndarray | None,
     numbers: np.ndarray | None,
-) -> Task[None]:
-    """Fill the (T, texels, 4) float32 records, in steps of some triangles.
+) -> None:
+    """Fill the (T, texels, 4) float32 records, some triangles at a time.
 
     Texels 0 to 2 are the positions of the corners, 3 to 5 their normals, 6 and 7 the values of
     `CornerField.representation` with the order of its rotation. Each channel has two texels, with
@@ -229,9 +221,8 @@ def _write_records_task(
     last texel (z).
     """
     channel_values = [corner_field.channels.get(channel) for channel in channels]
-    for start in range(0, len(records), RECORDS_PER_STEP):
-        yield Progress(start / len(records), "preparing the mesh")
-        extent = slice(start, start + RECORDS_PER_STEP)
+    for start in range(0, len(records), RECORDS_PER_BLOCK):
+        extent = slice(start, start + RECORDS_PER_BLOCK)
         part = records[extent]
         rest_corners = rest.take(surface.triangle_vertex[extent], axis=0)
         part[:, POSITION_TEXEL:NORMAL_TEXEL, :3] = corners[extent, :, :3]

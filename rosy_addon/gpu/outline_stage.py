@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..compositor.hatching import has_outline
-from ..progress import Progress, Task
 from . import passes
 from .defines import CREASE_SLICES, CREASES_PER_ROW
 from .frame import Frame
@@ -15,11 +16,20 @@ from .resources import DrawItem, OutlineTextures
 from .screen_box import Box
 from .uniforms import clip_uniforms
 
-#: Label of all steps of this stage.
-STEP_LABEL = "drawing outlines"
+
+def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
+    """Return what looks up the creases of the instances, by the keys of `Frame.prepared`."""
+    if not has_outline(frame.look):
+        return {}
+    drawn = frame if frame.samples is None else frame.samples
+    angle = _crease_angle(drawn)
+    return {
+        ("outline", instance_id): partial(frame.resources.outline_textures, item, angle)
+        for instance_id, item, _ in drawn.fields_in_view()
+    }
 
 
-def outline_task(frame: Frame) -> Task[None]:
+def render_outline(frame: Frame) -> None:
     """Render the outline of a look that has one: the share of pixels that it covers.
 
     It is ``frame.textures["outline_coverage"]``. The method is that of `compositor.outline`. If pixels
@@ -28,9 +38,9 @@ def outline_task(frame: Frame) -> Task[None]:
     if not has_outline(frame.look):
         return
     if frame.samples is None:
-        frame.textures["outline_coverage"] = yield from _coverage_task(frame)
+        frame.textures["outline_coverage"] = _coverage(frame, frame.prepared)
         return
-    coverage = yield from _coverage_task(frame.samples)
+    coverage = _coverage(frame.samples, frame.prepared)
     mean = frame.resources.image("outline_coverage", *frame.size, "R32F")
     frame.run(
         passes.OUTLINE_MEAN,
@@ -42,7 +52,11 @@ def outline_task(frame: Frame) -> Task[None]:
     frame.textures["outline_coverage"] = mean
 
 
-def _coverage_task(frame: Frame) -> Task[Any]:
+def _crease_angle(frame: Frame) -> float | None:
+    return None if frame.look.cross_creases else frame.look.crease_angle
+
+
+def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
     """Return the share of each pixel, or sample, that outlines cover."""
     look = frame.look
     image, size = frame.resources.image, frame.size
@@ -52,14 +66,11 @@ def _coverage_task(frame: Frame) -> Task[Any]:
     )
     frame.clear(crease_marks, "R32F")
     frame.clear(edges, "RG32F")
-    crease_angle = None if look.cross_creases else look.crease_angle
     for instance_id, item, box in frame.fields_in_view():
-        yield Progress(0.01, STEP_LABEL)
-        found = yield from frame.resources.outline_textures_task(item, crease_angle)
+        found = prepared["outline", instance_id]
         if found.crease_count:
             _mark_creases(frame, instance_id, item, found, crease_marks)
         _render_edges(frame, instance_id, box, found, crease_marks, edges)
-    yield Progress(0.02, STEP_LABEL)
     block_side = look.supersampling
     width, height = (side // block_side for side in size)
     blocks, widths = (
@@ -69,7 +80,7 @@ def _coverage_task(frame: Frame) -> Task[Any]:
     box = 0, 0, width, height
     textures = {"outline_edges": edges, "outline_blocks": blocks}
     uniforms = {"outline": look.outline, "supersampling": block_side}
-    frame.run(passes.OUTLINE_BLOCKS, box, textures, {"outline_blocks": blocks}, uniforms)
+    frame.run(passes.OUTLINE_BLOCKS, box, textures, {"outline_blocks": blocks}, uniforms, pause=0.5)
     frame.run(passes.OUTLINE_WIDTHS, box, textures, {"outline_widths": widths}, uniforms)
     coverage = image("outline_coverage", *size, "R32F")
     textures = {**frame.textures, "outline_widths": widths}
@@ -83,7 +94,7 @@ def _mark_creases(
 ) -> None:
     """Mark the pixels next to the visible creases of an instance."""
     columns = min(found.crease_count, CREASES_PER_ROW)
-    frame.resources.device.compute(
+    frame.compute(
         passes.OUTLINE_CREASES,
         (columns, -(-found.crease_count // columns), CREASE_SLICES),
         {**frame.textures, "crease_points": found.crease_points},

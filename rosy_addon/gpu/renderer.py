@@ -6,13 +6,13 @@ is traced from every pixel and line: unlike `fast_lic`, no averages are shared b
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..cache import Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
 from ..compositor.look import Look, colors_magnitude
@@ -21,32 +21,29 @@ from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
 from ..errors import DeviceError, RosyError
-from ..progress import Progress, Task, as_task, run_to_completion, subtask
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
-from ..rendering.arrowheads import with_arrowheads
-from ..rendering.singularities import with_singularities
+from ..rendering.marks import has_marks, with_marks
 from ..rendering.view_input import Background, ViewInput
+from ..worker.job import Call, Step, Steps
 from . import lookup_tables, passes
 from .background import draw_background
 from .device import Device
-from .even_lines_stage import even_lines_task
+from .even_lines_stage import even_line_lookups, render_even_lines
 from .frame import Frame
-from .gbuffer_stage import gbuffer_shaders, render_gbuffer
-from .lic_stage import largest_magnitude, lic_task
-from .noise_stage import noise_task
-from .outline_stage import outline_task
+from .gbuffer_stage import render_gbuffer
+from .lic_stage import largest_magnitude, render_fields
+from .noise_stage import feature_lookups, render_noise
+from .outline_stage import outline_lookups, render_outline
+from .preparation import compile_lookups, prepare_steps
 from .resources import DrawItem, GpuResources
 from .screen_box import box_size, is_empty, screen_box, union_box
-from .tone_stage import render_target_tones, tone_shaders
+from .tone_stage import render_target_tones
 from .uniforms import NO_CLIP_PLANES, clip_uniforms
 
 #: How much closer to the eye than the surface its picture is drawn, in normalized depth.
 COMPOSITE_DEPTH_BIAS = 2e-5
-
-#: Bytes of the places of arrowheads, and of what their directions are found with, that are kept.
-MAX_ARROWHEAD_BYTES = 1 << 26
 
 #: LIC methods that the card does not have, and those that it draws in 3D views instead.
 STAND_INS = {"members": "brute", "ibfv": "sheets"}
@@ -62,7 +59,7 @@ def check_method(look: Look) -> None:
 
 
 class GpuRenderer:
-    """Draws pictures on a graphics card. Implements `Renderer` and `ViewportRenderer`.
+    """Draws pictures on a graphics card. Implements `ViewportRenderer`.
 
     Parameters
     ----------
@@ -70,11 +67,10 @@ class GpuRenderer:
 
     Attributes
     ----------
-    device_name, downscale_factors, needs_occluders, stand_ins
-        See `Renderer` and `ViewportRenderer`.
+    downscale_factors, needs_occluders, stand_ins
+        See `ViewportRenderer`.
     """
 
-    device_name = "gpu"
     downscale_factors = 2, 1
     needs_occluders = False
     stand_ins: Mapping[str, str] = STAND_INS
@@ -82,16 +78,14 @@ class GpuRenderer:
     def __init__(self, device: Device) -> None:
         self.device = device
         self.resources = GpuResources(device)
-        #: Stores the places of arrowheads.
-        self._arrowhead_cache = Cache(MAX_ARROWHEAD_BYTES)
 
-    def render_task(self, view: ViewInput) -> Task[Picture]:
-        """As `Renderer.render_task`. The picture has no layers.
+    def picture_steps(self, view: ViewInput) -> Steps[Picture]:
+        """Draw a picture into memory, as `draw_picture`. It has no layers.
 
         Raises
         ------
         RosyError
-            As `Renderer.render_task`. Also if the driver rejects the shaders or the size.
+            As `draw_picture`. Also if the driver rejects the shaders or the size.
         DeviceError
             If the card does not have the look's method.
         """
@@ -100,36 +94,36 @@ class GpuRenderer:
         check_tone(look, [instance.tone for instance in instances], view.reference)
         check_color_values(look, instances)
         check_instances(instances, view.sample_camera, look.display)
-        items = self.upload(instances, look.display)
-        texture = yield from self.render_texture_task(items, view)
+        yield from prepare_steps(self.resources.mesh_lookups(instances, look.display))
+        texture = yield from self.texture_steps(self.upload(instances, look.display), view)
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
         picture = Picture(rgba, (), color_range=self._color_range(view))
-        picture = yield from as_task(with_arrowheads, picture, view, self._arrowhead_cache)
-        self._arrowhead_cache.evict_over_limit()
-        return (yield from as_task(with_singularities, picture, view))
+        if has_marks(look):
+            return (yield Call(with_marks, (picture, view), 0.98, 1.0, "drawing marks"))
+        return picture
 
-    def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
-        """As `ViewportRenderer.prepare_task`."""
+    def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
+        """As `ViewportRenderer.prepare_steps`."""
         # Those with switches are compiled when their values are known.
         shaders = [shader for shader in passes.ALL_PASSES if not shader.switches]
-        yield from self.device.compile_task(shaders)
-        yield from self.resources.upload_task(instances, display)
+        meshes = self.resources.mesh_lookups(instances, display)
+        return prepare_steps([*compile_lookups(self.device, shaders), *meshes])
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
         """As `ViewportRenderer.upload`."""
-        return run_to_completion(self.resources.upload_task(instances, display))
+        return self.resources.upload(instances, display)
 
     def covered_pixels(self, items: Sequence[DrawItem], camera: Camera) -> int:
         """As `ViewportRenderer.covered_pixels`."""
         width, height = box_size(union_box([screen_box(item, camera) for item in items]))
         return width * height
 
-    def render_texture_task(
+    def texture_steps(
         self, items: Sequence[DrawItem], view: ViewInput, target_key: Hashable = None
-    ) -> Task[Any]:
-        """As `ViewportRenderer.render_texture_task`.
+    ) -> Steps[Any]:
+        """As `ViewportRenderer.texture_steps`.
 
         The streamlines of the covering are traced, whatever the look's method is. The texture is reused by
         later pictures.
@@ -146,30 +140,54 @@ class GpuRenderer:
                 f"too large for this graphics card (at most {self.device.max_texture_size}): choose "
                 "a smaller size, or the processor"
             )
-        yield Progress(0.0, "finding visible pixels")
+        yield Step(0.0, "finding visible pixels")
         frame = self._frame(items, view)
-        shaders = [*gbuffer_shaders(frame), *tone_shaders(frame)]
-        yield from subtask(self.device.compile_task(shaders), 0.0, 0.0)
+        lookups = outline_lookups(frame) | feature_lookups(frame) | even_line_lookups(frame)
+        handles = yield from prepare_steps(lookups.values())
+        frame.prepared.update(zip(lookups, handles, strict=True))
+        texture, stages = self._stages(frame, target_key)
+        for (start, label, stage), stop in zip(
+            stages, [*(start for start, _, _ in stages[1:]), 1.0], strict=True
+        ):
+            yield Step(start, label)
+            stage()
+            for shader, run, pause in frame.take_passes():
+                fraction = start + (stop - start) * (pause or 0.0)
+                if not self.device.is_compiled(shader):
+                    yield Step(fraction, "compiling shaders")
+                    self.device.compile(shader)
+                if pause is not None:
+                    yield Step(fraction, label)
+                run()
+        return texture
+
+    def _stages(
+        self, frame: Frame, target_key: Hashable
+    ) -> tuple[Any, list[tuple[float, str, Callable[[], None]]]]:
+        """Return the texture of a picture, and the stages that add the passes which draw it.
+
+        Each stage has the fraction of the picture that is drawn before it, and a label.
+        """
         name = ("picture", target_key) if frame.samples is None else "shaded_picture"
-        picture = self.resources.image(name, *frame.size)
-        render_gbuffer(frame)
-        yield from outline_task(frame)
-        frame.clear(picture)
-        yield from noise_task(frame)
-        yield from even_lines_task(frame)
-        yield Progress(0.15, "finding tones")
-        render_target_tones(frame)
-        kinds = frame.kinds
-        for index, kind in enumerate(kinds):
-            box = frame.box_of_kind(kind)
-            if is_empty(box):
-                continue
-            task = lic_task(frame, kind, box, picture)
-            start, stop = index / len(kinds), (index + 1) / len(kinds)
-            yield from subtask(task, 0.2 + 0.8 * start, 0.2 + 0.8 * stop)
+        texture = self.resources.image(name, *frame.size)
+        stages: list[tuple[float, str, Callable[[], None]]] = [
+            (0.0, "finding visible pixels", partial(render_gbuffer, frame)),
+            (0.01, "drawing outlines", partial(render_outline, frame)),
+            (0.02, "clearing the picture", partial(frame.clear, texture)),
+            (0.02, "making noise", partial(render_noise, frame)),
+            (0.13, "drawing lines", partial(render_even_lines, frame)),
+            (0.15, "finding tones", partial(render_target_tones, frame)),
+        ]
+        kinds = [(kind, frame.box_of_kind(kind)) for kind in frame.kinds]
+        kinds = [(kind, box) for kind, box in kinds if not is_empty(box)]
+        for index, (kind, box) in enumerate(kinds):
+            stage = partial(render_fields, frame, kind, box, texture)
+            stages.append((0.2 + 0.8 * index / len(kinds), "tracing streamlines", stage))
         if frame.samples is None:
-            return picture
-        return self._blended(frame, picture, target_key)
+            return texture, stages
+        picture = self.resources.image(("picture", target_key), *frame.size)
+        blend = partial(self._blend, frame, texture, picture)
+        return picture, [*stages, (1.0, "averaging samples", blend)]
 
     def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
         """Return the frame of the pixels, and of their samples, if these are several."""
@@ -237,18 +255,17 @@ class GpuRenderer:
         }
         tops = set()
         for degree in sorted(degrees):
-            texture = largest_magnitude(self.resources, field_values, degree)
+            compute = self.device.compute
+            texture = largest_magnitude(self.resources, field_values, degree, compute)
             tops.add(float(self.read(texture, 1, 1)[0, 0, 0]))
         return common_color_range(tops - {0.0})  # 0: no field of this degree is visible
 
-    def _blended(self, frame: Frame, shaded_picture: Any, target_key: Hashable) -> Any:
-        """Return the picture of pixels that have several samples."""
-        picture = self.resources.image(("picture", target_key), *frame.size)
-        self.device.compute(
+    def _blend(self, frame: Frame, shaded_picture: Any, picture: Any) -> None:
+        """Draw the picture of pixels that have several samples."""
+        frame.compute(
             passes.BLEND_SAMPLES,
             frame.size,
             {**frame.textures, "shaded_picture": shaded_picture},
             {"picture": picture},
             {"samples_per_side": frame.samples_per_side},
         )
-        return picture

@@ -5,34 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ..cache import Cache
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
-from ..field.feature_curvature import feature_curvature
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import Task, as_task, subtask
-from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import MeshInstance
 from ..projection.mip_map import MipMap
-from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.rest_coordinates import matrix_scale
-from ..projection.surface_lines import cached_surface_lines, rest_matrix
+from ..projection.surface_lines import rest_matrix
+from ..worker.job import Call, run
 from .device import Device
 from .field_kind import FieldKind, field_kinds
-from .line_records import line_records
 from .mesh_buffers import (
     MeshBuffers,
-    mesh_buffers_task,
+    mesh_buffers,
     mip_atlas,
     split_matrix,
-    to_texture_rows,
     translation_matrix,
 )
+from .preparation import Preparation, prepare_steps
+from .surface_records import feature_records, line_records, outline_records
 
 #: Uploads, of all views together, after which images and meshes that were not used are freed. Each
 #: frame of an animation has new meshes.
@@ -41,8 +38,8 @@ IMAGE_LIFETIME_UPLOADS, MESH_LIFETIME_UPLOADS = 32, 2
 #: Textures of even lines that are kept for each mesh: two for each distance.
 MAX_LINE_TEXTURES = 6
 
-#: Size limit of what was computed from meshes in memory: even lines, creases and parts.
-MAX_MESH_CACHE_BYTES = 1 << 28
+#: Seconds for each triangle of a mesh: of its buffers and outlines, of even lines, and of features.
+BUFFER_SECONDS, LINE_SECONDS, FEATURE_SECONDS = 1e-6, 6e-6, 1e-5
 
 #: Maximum side, in texels, of an image that tones are sampled from.
 MAX_TONE_IMAGE_SIDE = 2048
@@ -92,7 +89,7 @@ class GpuMesh:
     last_used : int
         Number of the upload that used it last.
     line_textures : dict
-        The latest textures of `GpuResources.line_records_task`, by their settings.
+        The latest results of `GpuResources.line_records`, by their settings.
     """
 
     buffers: MeshBuffers
@@ -164,7 +161,6 @@ class GpuResources:
         self._last_used: dict[tuple, int] = {}
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
-        self._mesh_cache = Cache(MAX_MESH_CACHE_BYTES)
 
     @property
     def meshes(self) -> list[GpuMesh]:
@@ -186,9 +182,15 @@ class GpuResources:
         """Free all resources."""
         for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
             cache.clear()
-        self._mesh_cache.clear()
 
-    def upload_task(self, instances: Sequence[MeshInstance], display: str) -> Task[list[DrawItem]]:
+    def mesh_lookups(
+        self, instances: Sequence[MeshInstance], display: str
+    ) -> list[Callable[[], GpuMesh | Preparation]]:
+        """Return a function for each mesh instance that looks its mesh up; see `prepare_steps`."""
+        kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
+        return [partial(self._mesh, instance, display, kinds) for instance in instances]
+
+    def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
         """Return draw items of mesh instances. Meshes on the device are not sent again.
 
         Raises
@@ -199,60 +201,73 @@ class GpuResources:
         self._upload_count += 1
         self._evict_images()
         kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
+        meshes = run(prepare_steps(self.mesh_lookups(instances, display)))
         items = []
-        for instance in instances:
-            items.append((yield from self._draw_item_task(instance, display, kinds)))
+        for instance, mesh in zip(instances, meshes, strict=True):
+            mesh.last_used = self._upload_count
+            kind = None if instance.field is None else kinds[instance.field.degree]
+            _, model_matrix = split_matrix(instance.matrix)
+            model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
+            scale = matrix_scale(instance.matrix)
+            items.append(DrawItem(mesh, instance.field, model_matrix, scale, kind, instance))
         oldest_kept = self._upload_count - MESH_LIFETIME_UPLOADS
         for key in [key for key, mesh in self._meshes.items() if mesh.last_used < oldest_kept]:
             del self._meshes[key]
         return items
 
-    def feature_curvature_task(self, surface: Surface) -> Task[Any]:
-        """Return the curvature of features at the corners of each triangle of a surface, as a texture.
+    def feature_curvature(self, surface: Surface) -> Any:
+        """Look up the curvature of features at the corners of each triangle of a surface.
 
-        See `field.feature_curvature`.
+        See `field.feature_curvature`. It is a texture, or a `Preparation` of it.
         """
         key = "feature curvature", surface.rest_shape_key
         if key not in self._images:
-            curvature = yield from as_task(feature_curvature, surface)
-            self._images[key] = self._texture_of(to_texture_rows(curvature))
+
+            def send(rows: np.ndarray) -> Any:
+                return self._cached(key, partial(self._texture_of, rows))
+
+            call = Call(feature_records, (surface,), label="measuring features")
+            return Preparation(call, FEATURE_SECONDS * len(surface.triangles), send)
         self._last_used[key] = self._upload_count
         return self._images[key]
 
-    def outline_textures_task(
+    def outline_textures(
         self, item: DrawItem, crease_angle: float | None
-    ) -> Task[OutlineTextures]:
-        """Return the creases and parts of the mesh of an item. They stay on the device with it.
+    ) -> OutlineTextures | Preparation:
+        """Look up the creases and parts of the mesh of an item. They stay on the device with it.
 
         Raises
         ------
         RosyError
-            If there are too many for the device.
+            When they are sent: if there are too many for the device.
         """
         mesh, surface = item.mesh, item.instance.surface
         current = mesh.outline_textures
         if current is not None and current.crease_angle == crease_angle:
             return current
+
+        def send(records: tuple[np.ndarray | None, int, np.ndarray | None]) -> OutlineTextures:
+            points, crease_count, parts = records
+            textures = []
+            for rows in (points, parts):
+                if rows is not None and len(rows) > self.device.max_texture_size:
+                    raise RosyError(
+                        f"{surface.name}: has too many creases for this graphics card: choose the "
+                        "processor"
+                    )
+                textures.append(None if rows is None else self._texture_of(rows))
+            mesh.outline_textures = OutlineTextures(
+                crease_angle, textures[0], crease_count, textures[1]
+            )
+            return mesh.outline_textures
+
         linear, _ = split_matrix(item.instance.matrix)
-        found = yield from as_task(
-            cached_outline_mesh, surface, linear, crease_angle, self._mesh_cache
+        call = Call(
+            outline_records,
+            (surface, linear, mesh.buffers.center, crease_angle),
+            label="finding outlines",
         )
-        self._mesh_cache.evict_over_limit()
-        points = found.crease_points(surface, linear).reshape(-1, 3) - mesh.buffers.center
-        parts = np.empty((0, 4)) if found.triangle_part is None else found.triangle_part
-        parts = np.pad(parts.ravel(), (0, -parts.size % 4)).reshape(-1, 4)
-        textures = []
-        for values in (points, parts):
-            rows = to_texture_rows(values)
-            if len(rows) > self.device.max_texture_size:
-                raise RosyError(
-                    f"{surface.name}: has too many creases for this graphics card: choose the processor"
-                )
-            textures.append(self._texture_of(rows) if len(values) else None)
-        mesh.outline_textures = OutlineTextures(
-            crease_angle, textures[0], len(points) // 2, textures[1]
-        )
-        return mesh.outline_textures
+        return Preparation(call, BUFFER_SECONDS * len(surface.triangles), send)
 
     def image(
         self,
@@ -302,10 +317,10 @@ class GpuResources:
         self._lookup_textures[name] = key, (texture, size)
         return texture
 
-    def line_records_task(
+    def line_records(
         self, item: DrawItem, display: str, spacing: float
-    ) -> Task[tuple[Any, int]]:
-        """Return the texture of `line_records.line_records` for an instance, and its node count.
+    ) -> tuple[Any, int] | Preparation:
+        """Look up the texture of `surface_records.line_rows` for an instance, and its node count.
 
         Parameters
         ----------
@@ -318,32 +333,32 @@ class GpuResources:
         Raises
         ------
         RosyError
-            If the lines do not fit into a texture.
+            When it is sent: if the lines do not fit into a texture.
         """
         instance, textures = item.instance, item.mesh.line_textures
+        surface = instance.surface
         key = rest_matrix(instance.matrix).tobytes(), display, spacing
-        if key not in textures:
-            surface = instance.surface
-            lines = yield from as_task(
-                cached_surface_lines,
-                surface,
-                instance.matrix,
-                instance.field,
-                display,
-                spacing,
-                self._mesh_cache,
-            )
-            self._mesh_cache.evict_over_limit()
-            rows, node_count = line_records(lines)
+        if key in textures:
+            return textures[key]
+
+        def send(records: tuple[np.ndarray, int, int]) -> tuple[Any, int]:
+            rows, node_count, triangle_count = records
             if len(rows) > self.device.max_texture_size:
                 raise RosyError(
-                    f"{surface.name}: even lines on {len(lines.tree.leaf_root)} triangles are too many "
+                    f"{surface.name}: even lines on {triangle_count} triangles are too many "
                     "for this graphics card: choose wider lines, or the processor"
                 )
             while len(textures) >= MAX_LINE_TEXTURES:
                 del textures[next(iter(textures))]
             textures[key] = self._texture_of(rows), node_count
-        return textures[key]
+            return textures[key]
+
+        call = Call(
+            line_records,
+            (surface, instance.matrix, instance.field, display, spacing),
+            label="spacing lines",
+        )
+        return Preparation(call, LINE_SECONDS * len(surface.triangles), send)
 
     def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
         """Return the image that the tone "picture" is sampled from."""
@@ -368,57 +383,46 @@ class GpuResources:
         for key in [key for key, last_used in self._last_used.items() if last_used < oldest_kept]:
             del self._images[key], self._last_used[key]
 
-    def _draw_item_task(
+    def _mesh(
         self, instance: MeshInstance, display: str, kinds: dict[int, FieldKind]
-    ) -> Task[DrawItem]:
-        linear, model_matrix = split_matrix(instance.matrix)
-        kind = None if instance.field is None else kinds[instance.field.degree]
-        channels = () if kind is None else kind.channels
-        key = (
-            id(instance.surface),
-            id(instance.field),
-            id(instance.tone),
-            id(instance.color_values),
-            linear.tobytes(),
-            display,
-            channels,
-        )
-        if key not in self._meshes:
-            self._meshes[key] = yield from self._upload_mesh_task(
-                instance, linear, display, channels
-            )
-        mesh = self._meshes[key]
-        mesh.last_used = self._upload_count
-        model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
-        return DrawItem(
-            mesh, instance.field, model_matrix, matrix_scale(instance.matrix), kind, instance
-        )
+    ) -> GpuMesh | Preparation:
+        """Look up the mesh of an instance."""
+        surface, field = instance.surface, instance.field
+        linear, _ = split_matrix(instance.matrix)
+        channels = () if field is None else kinds[field.degree].channels
+        sources = surface, field, instance.tone, instance.color_values
+        key = (*map(id, sources), linear.tobytes(), display, channels)
+        if key in self._meshes:
+            return self._meshes[key]
 
-    def _upload_mesh_task(
-        self,
-        instance: MeshInstance,
-        linear: np.ndarray,
-        display: str,
-        channels: Sequence[FieldChannel],
-    ) -> Task[GpuMesh]:
-        surface, field, tone = instance.surface, instance.field, instance.tone
-        values = instance.color_values
-        task = mesh_buffers_task(surface, linear, field, display, channels, tone, values)
-        buffers = yield from subtask(task, 0.0, 1.0, f"preparing the mesh of {surface.name}")
-        records_texture = None
-        if buffers.triangle_records is not None:
-            if len(buffers.triangle_records) > self.device.max_texture_size:
+        def send(buffers: MeshBuffers) -> GpuMesh:
+            mesh = self._meshes[key] = self._send_mesh(instance, buffers)
+            return mesh
+
+        call = Call(
+            mesh_buffers,
+            (surface, linear, field, display, channels, instance.tone, instance.color_values),
+            label=f"preparing the mesh of {surface.name}",
+        )
+        return Preparation(call, BUFFER_SECONDS * len(surface.triangles), send)
+
+    def _send_mesh(self, instance: MeshInstance, buffers: MeshBuffers) -> GpuMesh:
+        surface, tone, rows = instance.surface, instance.tone, buffers.triangle_records
+        records_texture = tone_atlas = None
+        if rows is not None:
+            if len(rows) > self.device.max_texture_size:
                 raise RosyError(
                     f"{surface.name}: {len(surface.triangles)} triangles are too many for this "
                     "graphics card: choose the processor"
                 )
-            records_texture = self._texture_of(buffers.triangle_records)
-        tone_atlas = None
+            records_texture = self._texture_of(rows)
         if buffers.has_tone and tone.image is not None:
             tone_atlas = self._upload_atlas(tone.mip_map)
         batch = self.device.batch(buffers.corners)
-        sources = surface, field, tone, values
-        return GpuMesh(buffers, batch, records_texture, sources, tone_atlas)
+        sources = surface, instance.field, tone, instance.color_values
+        return GpuMesh(
+            buffers, batch, records_texture, sources, tone_atlas, last_used=self._upload_count
+        )
 
     def _upload_atlas(self, mip_map: MipMap) -> MipAtlas:
         max_side = min(MAX_TONE_IMAGE_SIDE, self.device.max_texture_size // 2)

@@ -7,11 +7,10 @@ from dataclasses import replace
 from ..compositor.look import Look
 from ..compositor.picture import Picture
 from ..errors import DeviceError
-from ..progress import subtask
 from ..rendering.draw import bake_picture
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
-from ..worker.job import Call, Steps
+from ..worker.job import Call, Step, Steps
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer, check_method
@@ -75,17 +74,25 @@ def picture_steps(
     part : (float, float)
         Fractions of the job at which the drawing begins and ends.
 
-    Yields
-    ------
-    Call or Step
-
     Returns
     -------
     Picture
     """
     if device == "cpu":
         return (yield Call(bake_picture, (view, keep_gbuffers, workers), *part))
-    return (yield from subtask(GpuRenderer(blender_device()).render_task(view), *part))
+    (start, stop), answer = part, None
+    steps = GpuRenderer(blender_device()).picture_steps(view)
+    while True:
+        try:
+            step = steps.send(answer)
+        except StopIteration as end:
+            return end.value
+        if isinstance(step, Step):
+            step = Step(start + (stop - start) * step.fraction, step.label)
+        else:
+            ends = (start + (stop - start) * end for end in (step.start, step.stop))
+            step = Call(step.function, step.arguments, *ends, step.label)
+        answer = yield step
 
 
 def automatic_device(look: Look) -> str:

@@ -24,17 +24,6 @@ from .uniforms import (
 )
 
 
-def tone_shaders(frame: Frame) -> list[ComputePass]:
-    """Return the shaders of `render_target_tones` that depend on the frame."""
-    shared_uniforms = tone_uniforms(frame.look, frame.camera, frame.reference)
-    sources = {_tone_source(frame, item) for item in frame.items if item.field is not None}
-    shader = _tone_pass(frame)
-    return [
-        *(passes.LIGHTING.variant(light) for light in _lights(frame)),
-        *(shader.variant({**shared_uniforms, "tone_source": source}) for source in sources),
-    ]
-
-
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel, as ``frame.textures["tones"]``.
 
@@ -125,7 +114,7 @@ def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
         shadow_map = image("shadow_map", *map_size)
         target = shadow_map, frame.resources.depth_image(*map_size)
         batches = [(item.mesh.batch, shadow_uniforms(item, light_view)) for item in frame.items]
-        frame.resources.device.draw(passes.SHADOW_MAP, batches, target, {})
+        frame.draw(passes.SHADOW_MAP, batches, target)
         uniforms = {
             **camera_uniforms(frame.camera),
             **light_view_uniforms(light_view, frame.camera),

@@ -1,38 +1,14 @@
-"""The protocols that renderers implement: one for pictures, one for views."""
+"""`ViewportRenderer`: the protocol of the renderers of 3D views."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
-from ..compositor.picture import Picture
-from ..progress import Task
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..worker.job import Steps
 from .view_input import Background, ViewInput
-
-
-class Renderer(Protocol):
-    """Draws pictures into memory.
-
-    Attributes
-    ----------
-    device_name : {"cpu", "gpu"}
-        Part of cache keys: the pixels of the two differ slightly.
-    """
-
-    device_name: str
-
-    def render_task(self, view: ViewInput) -> Task[Picture]:
-        """Draw a picture of the size of `view.camera`.
-
-        Raises
-        ------
-        RosyError
-            If an input is invalid, the tone has no source, or the device cannot draw this picture.
-        NothingInViewError
-            If no mesh with a field is visible.
-        """
 
 
 class ViewportRenderer(Protocol):
@@ -55,10 +31,10 @@ class ViewportRenderer(Protocol):
     needs_occluders: bool
     stand_ins: Mapping[str, str]
 
-    def prepare_task(self, instances: Sequence[MeshInstance], display: str) -> Task[None]:
-        """Do what takes long before the first picture: compile shaders, and `upload`.
+    def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
+        """Do what takes long before a picture: compile shaders, prepare meshes and upload them.
 
-        Each step is named before it begins.
+        Each step is named before it begins. There are none if everything is prepared.
         """
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[Any]:
@@ -74,9 +50,9 @@ class ViewportRenderer(Protocol):
     def covered_pixels(self, items: Sequence[Any], camera: Camera) -> int:
         """Return an upper bound of the number of pixels that must be drawn."""
 
-    def render_texture_task(
+    def texture_steps(
         self, items: Sequence[Any], view: ViewInput, target_key: Hashable = None
-    ) -> Task[Any]:
+    ) -> Steps[Any]:
         """Draw a picture into a texture. Other pictures may be drawn between two steps.
 
         Parameters
@@ -102,7 +78,7 @@ class ViewportRenderer(Protocol):
         Parameters
         ----------
         texture : texture or None
-            From `render_texture_task`, of any size.
+            From `texture_steps`, of any size.
         items : sequence
         view : ViewInput
             Its camera and clip planes are those of the 3D view.

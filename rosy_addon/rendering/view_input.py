@@ -49,7 +49,7 @@ class ViewInput:
     clip_planes : (6, 4) float64 ndarray or None
         World space. The negative side of each plane is cut away.
     draws_thresholds : bool
-        Whether the picture has the thresholds of its ink; see `compose`. Only `CpuRenderer` draws
+        Whether the picture has the thresholds of its ink; see `compose`. Only numpy draws
         them.
     """
 
@@ -68,10 +68,10 @@ class ViewInput:
 
     @property
     def samples_per_side(self) -> int:
-        """Samples along each side of a pixel that `CpuRenderer` shades once; 1 if it shades each."""
+        """Samples along each side of a pixel that numpy shades once; 1 if it shades each."""
         return self.look.supersampling if is_shaded_by_pixel(self.look) else 1
 
     @property
     def shaded_camera(self) -> Camera:
-        """The camera of the frame that `CpuRenderer` shades: of pixels, or of samples."""
+        """The camera of the frame that numpy shades: of pixels, or of samples."""
         return self.camera if self.samples_per_side > 1 else self.sample_camera

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..compositor.look_units import preview_look
 from ..errors import RosyError, error_text
-from ..progress import Progress, Task, run_to_completion
+from ..gpu.preparation import prepare_steps
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
+from ..worker.job import Step, Steps
+from .step_runner import SharedHelper, StepRunner
 
 #: Seconds that a redraw may take to render a picture at once, and seconds of one slice of refinement.
 FRAME_BUDGET_SECONDS, SLICE_SECONDS = 0.06, 0.08
@@ -35,6 +36,57 @@ PREVIEW_COST_RATIO = 0.2
 _MIN_MEGAPIXELS = 0.02
 
 
+class Request(NamedTuple):
+    """A picture that is wanted.
+
+    Attributes
+    ----------
+    key : hashable
+        Everything that the picture depends on.
+    still_key : hashable
+        The same without how far streaks have drifted.
+    view_input : ViewInput
+    lookups : sequence of callable
+        What else is prepared; see `prepare_steps`.
+    """
+
+    key: Hashable
+    still_key: Hashable
+    view_input: ViewInput
+    lookups: Sequence[Callable[[], Any]]
+
+
+@dataclass(eq=False)
+class Work:
+    """Work for a view that goes on from redraw to redraw: a picture, or its preparation.
+
+    Attributes
+    ----------
+    view : ViewState
+    request : Request
+    runner : StepRunner
+    is_at_once : bool
+        Whether it is done in one redraw, except for what the helper does.
+    downscale : int
+        View pixels per pixel of the picture, each way.
+    buffer : int
+        The image of a final picture.
+    seconds : float
+        Seconds of work so far, without that of the helper.
+    time : float
+        Seconds, monotonic: when it was worked on last.
+    """
+
+    view: ViewState
+    request: Request
+    runner: StepRunner
+    is_at_once: bool
+    downscale: int = 1
+    buffer: int = 0
+    seconds: float = 0.0
+    time: float = 0.0
+
+
 @dataclass(eq=False)
 class ViewState:
     """The picture of one region of a 3D view, and the work on its next one.
@@ -54,23 +106,15 @@ class ViewState:
         View pixels per picture pixel, each way, of the picture that is shown.
     buffer : int
         Which of the two images for final pictures is shown, or was shown last.
+    items : list
+        Draw items of the meshes that are prepared.
     requested_key, requested_still_key : hashable
         The keys of the picture that was requested last.
     requested_time : float
         Seconds, monotonic: when its still key was requested first.
-    items : list
-        Draw items of the picture that is shown.
-    task : generator or None
-        The final picture, being rendered.
-    task_key, task_still_key : hashable
-        The keys of the picture that is being rendered.
-    task_buffer : int
-        Its image.
-    task_time : float
-        Seconds, monotonic: when it was worked on last.
-    task_seconds : float
-        Seconds of work on it so far.
-    progress : Progress or None
+    picture : Work or None
+        The picture that is being rendered.
+    progress : Step or None
         The next step, while there is no picture yet.
     error : str or None
         Why the picture of `error_key` could not be rendered.
@@ -83,33 +127,42 @@ class ViewState:
     texture_still_key: Hashable = None
     downscale: int = 1
     buffer: int = 0
+    items: list[Any] = field(default_factory=list)
     requested_key: Hashable = None
     requested_still_key: Hashable = None
     requested_time: float = 0.0
-    items: list[Any] = field(default_factory=list)
-    task: Task[Any] | None = None
-    task_key: Hashable = None
-    task_still_key: Hashable = None
-    task_buffer: int = 0
-    task_time: float = 0.0
-    task_seconds: float = 0.0
-    progress: Progress | None = None
+    picture: Work | None = None
+    progress: Step | None = None
     error: str | None = None
     error_key: Hashable = None
 
     @property
     def is_rendering(self) -> bool:
         """Whether a picture is being rendered. Views that left the screen have stopped."""
-        return self.task is not None and time.monotonic() < self.task_time + ABANDON_SECONDS
+        picture = self.picture
+        return picture is not None and (
+            not picture.runner.poll() or time.monotonic() < picture.time + ABANDON_SECONDS
+        )
+
+    def stop_rendering(self) -> None:
+        """Abandon the picture that is being rendered."""
+        if self.picture is not None:
+            self.picture.runner.close()
+        self.picture = self.progress = None
 
 
 class ProgressiveRenderer:
     """Keeps the pictures of views up to date, as far as the time budget of a redraw allows.
 
-    The first picture of a session is prepared and rendered in steps, so that the view can name each
-    step before it begins. After that, a picture that fits into the budget is rendered at once.
-    Otherwise a preview is rendered while the view changes, and the final picture in slices of time
-    once it is at rest. A picture that could not be rendered is not tried again.
+    Before a picture is rendered, its shaders are compiled and its meshes prepared and uploaded. Until
+    the first picture of a view this is done in steps, so that the view can name each step before it
+    begins. A picture that fits into the budget is rendered at once. Otherwise a preview is rendered
+    while the view changes, and the final picture in slices of time once it is at rest. A picture that
+    could not be rendered is not tried again.
+
+    What a helper process can do, it does; the views then show their last pictures until it is done.
+    What it has begun for a picture that is no longer wanted is finished for previews and preparations,
+    whose pictures are then shown, and abandoned for final pictures.
 
     If only streaks drift, there are no previews, which would flicker between the final pictures. These
     are rendered one after the other, and none is abandoned for the next one.
@@ -117,26 +170,36 @@ class ProgressiveRenderer:
     Parameters
     ----------
     renderer : ViewportRenderer
+    helper : SharedHelper
+        Not closed here.
     schedule_redraw : callable
         Called with a number of seconds, after which the views must be redrawn.
+    schedule_poll : callable
+        Called when a helper has begun to work. `poll` must be called from then on until it returns True,
+        and the views be redrawn then.
 
     Attributes
     ----------
     views : dict of (int, int) to ViewState
         By the pointers of space and region.
+    is_prepared : bool
+        Whether the shaders are compiled, and the meshes of a first picture uploaded.
     """
 
     def __init__(
-        self, renderer: ViewportRenderer, schedule_redraw: Callable[[float], None]
+        self,
+        renderer: ViewportRenderer,
+        helper: SharedHelper,
+        schedule_redraw: Callable[[float], None],
+        schedule_poll: Callable[[], None],
     ) -> None:
         self.renderer = renderer
         self.views: dict[tuple[int, int], ViewState] = {}
-        self._schedule_redraw = schedule_redraw
-        #: What must be done before the first picture; None if it is done, or not begun.
-        self._preparation: Task[None] | None = None
-        self._is_prepared = False
-        #: The view whose final picture is being rendered.
-        self._refining_view: ViewState | None = None
+        self.is_prepared = False
+        self._helper = helper
+        self._schedule_redraw, self._schedule_poll = schedule_redraw, schedule_poll
+        #: What is being prepared. Pictures wait until it is done.
+        self._preparation: Work | None = None
         #: A view that waits until that of another view is done, and since when (seconds, monotonic).
         self._waiting_view: ViewState | None = None
         self._waiting_time = 0.0
@@ -144,24 +207,35 @@ class ProgressiveRenderer:
         self._seconds_per_megapixel = 0.0
 
     @property
-    def is_prepared(self) -> bool:
-        """Whether the shaders are compiled and the meshes uploaded."""
-        return self._is_prepared
-
-    @property
     def is_rendering(self) -> bool:
         """Whether the picture of a view is being rendered."""
         return any(view.is_rendering for view in self.views.values())
 
+    def poll(self) -> bool:
+        """Return whether the views must be redrawn, as the helper has done its work or begun another."""
+        works = [self._preparation, *(view.picture for view in self.views.values())]
+        waiting = [work for work in works if work is not None and not work.runner.poll()]
+        if not waiting or any(work is not None and work.runner.has_answer for work in works):
+            return True
+        labels = [work.runner.step.label for work in waiting if work.runner.step is not None]
+        return any(
+            view.progress is not None and view.progress.label not in labels
+            for view in self.views.values()
+        )
+
     def remove_space(self, space_pointer: int) -> None:
         """Drop the pictures of one 3D view."""
         for key in [key for key in self.views if key[0] == space_pointer]:
-            del self.views[key]
+            self.views.pop(key).stop_rendering()
 
     def release(self) -> None:
         """Free all resources."""
+        for view in self.views.values():
+            view.stop_rendering()
         self.views.clear()
-        self._preparation = None
+        if self._preparation is not None:
+            self._preparation.runner.close()
+            self._preparation = None
         self.renderer.release()
 
     def update(
@@ -170,6 +244,7 @@ class ProgressiveRenderer:
         requested_key: Hashable,
         view_input: ViewInput,
         still_key: Hashable = None,
+        lookups: Sequence[Callable[[], Any]] = (),
     ) -> ViewState:
         """Bring the picture of a view up to date, as far as there is time for it.
 
@@ -183,6 +258,8 @@ class ProgressiveRenderer:
             Its camera has the size of the region.
         still_key : hashable, optional
             The key without how far streaks have drifted.
+        lookups : sequence of callable
+            What is prepared besides the meshes; see `prepare_steps`.
 
         Raises
         ------
@@ -198,64 +275,69 @@ class ProgressiveRenderer:
             raise RosyError(view.error)
         view.error = None
         try:
-            if self._is_prepared or self._prepare(view, view_input):
-                view.items = self.renderer.upload(view_input.instances, view_input.look.display)
-                self._update_picture(view, view_input)
+            request = Request(requested_key, still_key, view_input, lookups)
+            prepared = self._prepared(view, request)
+            if prepared is not None:
+                self._update_picture(view, prepared)
         except Exception as error:
             view.error, view.error_key = error_text(error), still_key
-            view.task = view.progress = view.texture = None
-            view.texture_key = view.texture_still_key = None
+            view.stop_rendering()
+            view.texture = view.texture_key = view.texture_still_key = None
             raise
         return view
 
-    def _prepare(self, view: ViewState, view_input: ViewInput) -> bool:
-        """Continue to prepare the first picture for one step. Return whether it is prepared."""
-        if self._preparation is None:
-            self._preparation = self.renderer.prepare_task(
-                view_input.instances, view_input.look.display
-            )
-        try:
-            view.progress = next(self._preparation)
-        except StopIteration:
-            self._preparation, self._is_prepared, view.progress = None, True, None
-            return True
-        except Exception:
-            self._preparation = None
-            raise
-        self._schedule_redraw(0.0)
-        return False
+    def _prepared(self, view: ViewState, request: Request) -> Request | None:
+        """Continue what is done before a picture. Return the request that is prepared, if one is.
 
-    def _update_picture(self, view: ViewState, view_input: ViewInput) -> None:
-        """Bring the picture of a view up to date, with its items uploaded."""
+        It is an older one if the view has changed in the meantime: meshes may change faster than they
+        are prepared.
+        """
+        while True:
+            work = self._preparation
+            if work is None:
+                runner = StepRunner(self._preparation_steps(request), self._helper)
+                work = self._preparation = Work(view, request, runner, view.texture is not None)
+            try:
+                if self._continue(view, work, SLICE_SECONDS) is None:
+                    return None
+                self.is_prepared = True
+            except Exception:
+                if work.view is view:  # otherwise it is left to the other view
+                    raise
+            finally:
+                if work.runner.is_done:
+                    self._preparation = None
+            if work.view is view:
+                return work.request
+
+    def _preparation_steps(self, request: Request) -> Steps[None]:
+        """Do what takes long before a picture."""
+        view_input = request.view_input
+        yield from self.renderer.prepare_steps(view_input.instances, view_input.look.display)
+        yield from prepare_steps(request.lookups)
+
+    def _update_picture(self, view: ViewState, request: Request) -> None:
+        """Bring the picture of a view up to date, with its meshes prepared."""
+        view_input = request.view_input
         preview_downscale, full_downscale = self.renderer.downscale_factors
-        if view.texture_key == view.requested_key and view.downscale == full_downscale:
+        view.items = self.renderer.upload(view_input.instances, view_input.look.display)
+        if view.texture_key == request.key and view.downscale == full_downscale:
             return
-        items = view.items
-        megapixels = (
-            self.renderer.covered_pixels(items, view_input.camera)
-            * view_input.look.supersampling**2
-            / (1e6 * full_downscale**2)
-        )
-
-        def render_at(downscale: int, buffer: int) -> Task[Any]:
-            return self.renderer.render_texture_task(
-                items, downscaled(view_input, downscale), (id(view), downscale, buffer)
-            )
-
-        is_first = not self._seconds_per_megapixel
-        if is_first:
-            self._refine(view, partial(render_at, full_downscale), megapixels)
-        elif self._seconds_per_megapixel * megapixels <= FRAME_BUDGET_SECONDS:
-            self._render_now(
-                view, render_at(full_downscale, view.buffer), full_downscale, megapixels
-            )
-        elif view.texture_still_key != view.requested_still_key:
-            self._render_now(
-                view,
-                render_at(preview_downscale, 0),
-                preview_downscale,
-                megapixels * PREVIEW_COST_RATIO,
-            )
+        picture = view.picture
+        if picture is not None:
+            is_outdated = picture.request.still_key != request.still_key
+            # The first picture is completed even if the view has changed: its cost must be known.
+            if picture.is_at_once or view.texture is None or not is_outdated:
+                self._render(view)
+                return
+            view.stop_rendering()
+        seconds = self._seconds_per_megapixel * self._megapixels(view, request)
+        if not self._seconds_per_megapixel:
+            self._start(view, request, full_downscale)
+        elif seconds <= FRAME_BUDGET_SECONDS:
+            self._start(view, request, full_downscale, is_at_once=True)
+        elif view.texture_still_key != request.still_key:
+            self._start(view, request, preview_downscale, is_at_once=True)
             self._schedule_redraw(IDLE_SECONDS)
         elif (
             view.downscale != full_downscale
@@ -263,20 +345,72 @@ class ProgressiveRenderer:
         ):
             self._schedule_redraw(IDLE_SECONDS)
         else:
-            self._refine(view, partial(render_at, full_downscale), megapixels)
+            self._start(view, request, full_downscale)
 
-    def _render_now(
-        self, view: ViewState, task: Task[Any], downscale: int, megapixels: float
+    def _megapixels(self, view: ViewState, request: Request) -> float:
+        """Return the size of the final picture of a view, as far as surfaces cover it."""
+        pixels = self.renderer.covered_pixels(view.items, request.view_input.camera)
+        samples = request.view_input.look.supersampling**2
+        return pixels * samples / (1e6 * self.renderer.downscale_factors[1] ** 2)
+
+    def _start(
+        self, view: ViewState, request: Request, downscale: int, *, is_at_once: bool = False
     ) -> None:
-        """Render a picture at once, and update the estimate of the cost."""
-        self._refining_view = None
-        start_time = time.monotonic()
-        view.texture = run_to_completion(task)
-        self.renderer.finish()
-        self._update_estimate(time.monotonic() - start_time, megapixels)
-        view.texture_key, view.downscale = view.requested_key, downscale
-        view.texture_still_key = view.requested_still_key
-        view.task = view.progress = None
+        """Begin a picture of a view, at once or in slices of time, when its turn has come.
+
+        Pictures are rendered one at a time: they share the renderer's images. Those that are rendered at
+        once go first.
+        """
+        others = [other for other in self.views.values() if other is not view]
+        for other in others:
+            if other.is_rendering and (other.picture.is_at_once or not is_at_once):
+                self._schedule(other.picture)
+                if not is_at_once:
+                    self._waiting_view, self._waiting_time = view, time.monotonic()
+                return
+        if not is_at_once:
+            if self._must_wait(view):
+                self._schedule_redraw(0.0)
+                return
+            self._waiting_view = None
+        for other in others:
+            other.stop_rendering()
+        is_final = downscale == self.renderer.downscale_factors[1]
+        # The picture that is shown stays as it is.
+        buffer = 1 - view.buffer if _shows(view, downscale) and not is_at_once else view.buffer
+        steps = self.renderer.texture_steps(
+            view.items,
+            downscaled(request.view_input, downscale),
+            (id(view), downscale, buffer if is_final else 0),
+        )
+        runner = StepRunner(steps, self._helper)
+        view.picture = Work(view, request, runner, is_at_once, downscale, buffer)
+        self._render(view)
+
+    def _must_wait(self, view: ViewState) -> bool:
+        """Whether another view has waited for the picture of this one, whose turn it then is."""
+        return (
+            self._waiting_view in self.views.values()
+            and self._waiting_view is not view
+            and time.monotonic() < self._waiting_time + ABANDON_SECONDS
+        )
+
+    def _render(self, view: ViewState) -> None:
+        """Continue the picture of a view, in one of its two images, and show it once it is done."""
+        picture, full_downscale = view.picture, self.renderer.downscale_factors[1]
+        shows_final = _shows(view, full_downscale)
+        end = self._continue(view, picture, DRIFT_SLICE_SECONDS if shows_final else SLICE_SECONDS)
+        if end is None:
+            return
+        if picture.is_at_once or not self._seconds_per_megapixel:
+            ratio = 1.0 if picture.downscale == full_downscale else PREVIEW_COST_RATIO
+            megapixels = ratio * self._megapixels(view, picture.request)
+            self._update_estimate(picture.seconds + picture.runner.helper_seconds, megapixels)
+        view.texture, view.downscale, view.buffer = end.value, picture.downscale, picture.buffer
+        view.texture_key, view.texture_still_key = picture.request[:2]
+        view.picture = None
+        if view.texture_key != view.requested_key:
+            self._schedule_redraw(0.0)
 
     def _update_estimate(self, seconds: float, megapixels: float) -> None:
         """Update the estimate of the cost after a picture."""
@@ -288,72 +422,50 @@ class ProgressiveRenderer:
             else min(cost, 0.5 * (self._seconds_per_megapixel + cost))
         )
 
-    def _refine(
-        self, view: ViewState, start_task: Callable[[int], Task[Any]], megapixels: float
-    ) -> None:
-        """Continue the final picture of a view, in one of its two images, for one slice of time.
+    def _continue(self, view: ViewState, work: Work, seconds: float) -> StopIteration | None:
+        """Continue work for a view, and return its end if it is done.
 
-        The first picture is completed even if the view has changed: its cost must be known.
+        It goes on for some seconds, or without a limit if it is to be done at once; up to a step that the
+        view has not named yet; or until the helper has a call to make.
         """
-        other, full_downscale = self._refining_view, self.renderer.downscale_factors[1]
-        shows_final = view.texture is not None and view.downscale == full_downscale
-        if other in self.views.values() and other is not view and other.is_rendering:
-            self._schedule_redraw(0.0)  # one at a time: they share the renderer's images
-            self._waiting_view, self._waiting_time = view, time.monotonic()
-            return
-        is_outdated = view.task_still_key != view.requested_still_key and view.texture is not None
-        if other is not view or view.task is None or is_outdated:
-            if self._must_wait(view):
-                self._schedule_redraw(0.0)
-                return
-            # The picture that is shown stays as it is.
-            view.task_buffer = 1 - view.buffer if shows_final else view.buffer
-            view.task, view.task_seconds = start_task(view.task_buffer), 0.0
-            view.task_key, view.task_still_key = view.requested_key, view.requested_still_key
-            self._refining_view, self._waiting_view = view, None
         start_time = time.monotonic()
         try:
-            seconds = DRIFT_SLICE_SECONDS if shows_final else SLICE_SECONDS
-            self._run_slice(view, start_time + seconds)
-        except StopIteration as done:
-            if not self._seconds_per_megapixel:
-                total_seconds = view.task_seconds + time.monotonic() - start_time
-                self._update_estimate(total_seconds, megapixels)
-            view.texture, view.texture_key = done.value, view.task_key
-            view.texture_still_key, view.buffer = view.task_still_key, view.task_buffer
-            view.downscale = full_downscale
-            view.task = view.progress = self._refining_view = None
-            if view.texture_key != view.requested_key:
-                self._schedule_redraw(0.0)
-            return
-        view.task_time = time.monotonic()
-        view.task_seconds += view.task_time - start_time
-        self._schedule_redraw(0.0)
+            while work.runner.poll():
+                step = work.runner.advance()
+                if work.is_at_once:
+                    continue
+                self.renderer.finish()
+                if view.texture is None:
+                    is_named = view.progress is not None and view.progress.label == step.label
+                    view.progress = step
+                    if not is_named:
+                        break
+                if time.monotonic() - start_time >= seconds:
+                    break
+        except StopIteration as end:
+            if work is not self._preparation:
+                self.renderer.finish()
+            view.progress = None
+            return end
+        finally:
+            work.time = time.monotonic()
+            work.seconds += work.time - start_time
+        if view.texture is None:
+            view.progress = work.runner.step
+        self._schedule(work)
+        return None
 
-    def _must_wait(self, view: ViewState) -> bool:
-        """Whether another view has waited for the picture of this one, whose turn it then is."""
-        return (
-            self._waiting_view in self.views.values()
-            and self._waiting_view is not view
-            and time.monotonic() < self._waiting_time + ABANDON_SECONDS
-        )
+    def _schedule(self, work: Work) -> None:
+        """Let the views be redrawn when work can go on."""
+        if work.runner.poll():
+            self._schedule_redraw(0.0)
+        else:
+            self._schedule_poll()
 
-    def _run_slice(self, view: ViewState, deadline: float) -> None:
-        """Continue the task of a view until a deadline, or a step that the view has not named yet.
 
-        Raises
-        ------
-        StopIteration
-            If the task is done.
-        """
-        while time.monotonic() < deadline:
-            progress = next(view.task)
-            self.renderer.finish()
-            if view.texture is None:
-                named = view.progress is not None and view.progress.label == progress.label
-                view.progress = progress
-                if not named:
-                    return
+def _shows(view: ViewState, downscale: int) -> bool:
+    """Return whether a view shows a picture of a size."""
+    return view.texture is not None and view.downscale == downscale
 
 
 def downscaled(view_input: ViewInput, downscale: int) -> ViewInput:

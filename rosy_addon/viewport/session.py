@@ -6,6 +6,7 @@ import time
 import traceback
 from collections.abc import Callable, Hashable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -31,7 +32,14 @@ from .layers import LayerState, LayerStates
 from .messages import draw_messages
 from .progressive import ProgressiveRenderer
 from .references import ReferenceImages
-from .singularity_dots import SingularityDots, draw_dots, draw_labels, singularity_dots
+from .singularity_dots import (
+    SingularityDots,
+    draw_dots,
+    draw_labels,
+    look_up_singularities,
+    singularity_dots,
+)
+from .step_runner import SharedHelper
 from .view3d import (
     clip_planes,
     is_timeline_playing,
@@ -44,6 +52,9 @@ from .view3d import (
 
 #: Seconds between two checks for views that were closed.
 CLOSED_VIEWS_INTERVAL_SECONDS = 1.0
+
+#: Seconds between two questions to the helper process, whether it is done.
+POLL_SECONDS = 0.02
 
 #: Seconds for which a view shows why the CPU draws it.
 MESSAGE_SECONDS = 10.0
@@ -61,6 +72,7 @@ MAX_EXACT_TRIANGLES = 200_000
 TIMER_METHODS = (
     "_drop_closed_views",
     "_tag_redraw",
+    "_poll_helper",
     "_resolve_topologies",
     "_load_reference_images",
     "_redraw_sidebars",
@@ -74,7 +86,7 @@ ViewPointers = tuple[int, int]
 class ViewportSession:
     """All live views, and everything that is registered with Blender for them.
 
-    `stop` removes all handlers and timers and frees all textures.
+    `stop` removes all handlers and timers, frees all textures and ends the helper process.
 
     Parameters
     ----------
@@ -96,9 +108,8 @@ class ViewportSession:
     """
 
     def __init__(self, device: str = "auto") -> None:
-        self.progressive = ProgressiveRenderer(
-            select_viewport_renderer(device), self._schedule_redraw
-        )
+        self._helper = SharedHelper()
+        self.progressive = self._new_progressive(device)
         self.spaces: set[int] = set()
         self.fallback_reason: str | None = None
         self._fallback_time = 0.0
@@ -136,6 +147,15 @@ class ViewportSession:
         self._timers = {name: getattr(self, name) for name in TIMER_METHODS}
         self._schedule(CLOSED_VIEWS_INTERVAL_SECONDS, "_drop_closed_views")
 
+    def _new_progressive(self, device: str) -> ProgressiveRenderer:
+        """Return what draws the views, with a device."""
+        return ProgressiveRenderer(
+            select_viewport_renderer(device),
+            self._helper,
+            self._schedule_redraw,
+            lambda: self._schedule(POLL_SECONDS, "_poll_helper"),
+        )
+
     # --- switching -------------------------------------------------------------------------------
 
     def add(self, space: bpy.types.SpaceView3D) -> None:
@@ -165,6 +185,7 @@ class ViewportSession:
         self.layers.clear()
         self.spaces.clear()
         self.progressive.release()
+        self._helper.close()
         redraw()
 
     def play_flow(self, plays: bool) -> None:
@@ -203,6 +224,13 @@ class ViewportSession:
     def _tag_redraw(self) -> None:
         """Tag the live views for a redraw, in which rendering continues."""
         redraw(self.spaces)
+
+    def _poll_helper(self) -> float | None:
+        """Tag the live views for a redraw once the helper process has done something for them."""
+        if not self.progressive.poll():
+            return POLL_SECONDS
+        redraw(self.spaces)
+        return None
 
     def _resolve_topologies(self) -> float | None:
         """Read the data that cannot be read while Blender draws, in slices of time."""
@@ -277,8 +305,8 @@ class ViewportSession:
 
     def _fall_back_to_cpu(self, error: DeviceError) -> None:
         """Continue with the CPU when the graphics card rejects a shader."""
-        renderer = select_viewport_renderer("cpu")
-        self.progressive = ProgressiveRenderer(renderer, self._schedule_redraw)
+        self.progressive.release()
+        self.progressive = self._new_progressive("cpu")
         self.fallback_reason, self._fallback_time = str(error), time.monotonic()
         self.layers.mark_all_stale()
         self._schedule_redraw(0.0)
@@ -291,7 +319,8 @@ class ViewportSession:
     ) -> None:
         """Update the picture of a view and composite it."""
         depsgraph = context.evaluated_depsgraph_get()
-        instances, view_input = self._read_view(context, depsgraph, space, region)
+        look = read_look(context.scene.rosy)
+        instances, view_input = self._read_view(context, depsgraph, space, region, look)
         if view_input is None:
             return
         view = self.progressive.update(
@@ -302,18 +331,22 @@ class ViewportSession:
                 instances,
                 replace(view_input, look=replace(view_input.look, flow_phase=0.0)),
             ),
+            [
+                partial(look_up_singularities, instance, self._marks_cache)
+                for instance in view_input.instances
+                if instance.field is not None and shows_singularities(look)
+            ],
         )
         if self.progressive.is_prepared:
-            look, camera = view_input.look, view_input.camera
-            background = view_background(context, depsgraph, camera, look)
+            background = view_background(context, depsgraph, view_input.camera, look)
             if background is not None:
                 self.progressive.renderer.draw_background(background)
         if view.texture is not None:
             editing = context.mode.startswith("EDIT")
             opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
             self.progressive.renderer.composite(view.texture, view.items, view_input, opacity)
-            self._draw_arrowheads(context, space, region, instances, view_input)
-            self._draw_singularities(context, space, region, view_input)
+            self._draw_arrowheads(context, space, region, instances, view_input, look)
+            self._draw_singularities(context, space, region, view_input, look)
 
     def _draw_arrowheads(
         self,
@@ -322,13 +355,14 @@ class ViewportSession:
         region: bpy.types.Region,
         instances: list[InstanceState],
         view_input: ViewInput,
+        look: Look,
     ) -> None:
         """Draw arrowheads over the lines of a view, if the look has them."""
-        look = replace(read_look(context.scene.rosy), flow_phase=0.0)
         pointers = space.as_pointer(), region.as_pointer()
         if not look.arrows:
             self._arrowheads.pop(pointers, None)
             return
+        look = replace(look, flow_phase=0.0)
         view = replace(view_input, look=look, lights=(), reference=None)
         key = _picture_key(instances, view)
         if pointers not in self._arrowheads or self._arrowheads[pointers][0] != key:
@@ -347,16 +381,17 @@ class ViewportSession:
         space: bpy.types.SpaceView3D,
         region: bpy.types.Region,
         view_input: ViewInput,
+        look: Look,
     ) -> None:
         """Draw dots at the singularities of a view, if the look shows them."""
-        look = read_look(context.scene.rosy)
         if not shows_singularities(look):
             return
-        dots = [
+        found = [
             singularity_dots(instance, self._marks_cache, view_input.clip_planes)
             for instance in view_input.instances
             if instance.field is not None
         ]
+        dots = [one for one in found if one is not None]
         self._marks_cache.evict_over_limit()
         shows_hidden = look.singularity_dots == "all"
         draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden)
@@ -369,6 +404,7 @@ class ViewportSession:
         depsgraph: bpy.types.Depsgraph,
         space: bpy.types.SpaceView3D,
         region: bpy.types.Region,
+        look: Look,
     ) -> tuple[list[InstanceState], ViewInput | None]:
         """Read what a view shows; no input if there is nothing to draw yet.
 
@@ -379,7 +415,7 @@ class ViewportSession:
             source.
         """
         # Dots and arrowheads are drawn over the picture.
-        look = replace(read_look(context.scene.rosy), singularity_dots="none", arrows=0.0)
+        look = replace(look, singularity_dots="none", arrows=0.0)
         look, message = look_in_view(look, self.progressive.renderer)
         if message is not None:
             self._problems[space.as_pointer(), region.as_pointer()] = message

@@ -20,13 +20,15 @@ from ..annotation.singularity_marks import (
     HIDDEN_OPACITY,
     OUTLINE,
     OUTLINE_COLOR,
-    cached_singularities,
     dot_diameters,
 )
 from ..cache import Cache
 from ..color import from_hex
+from ..field.singularities import find_singularities
+from ..gpu.preparation import Preparation
 from ..projection.clip_planes import is_cut_away
 from ..projection.gbuffer import MeshInstance
+from ..worker.job import Call
 from .pixel_frames import pixel_frames
 
 #: Number of sides of the polygon that approximates a disc.
@@ -37,6 +39,9 @@ NEAR_SURFACE = 1e-3
 
 #: Height of labels, in diameters of a dot of index 1 / N.
 LABEL_SIZE = 4 / 3
+
+#: Seconds for each triangle of a mesh that finding its singularities takes.
+SINGULARITY_SECONDS = 1.2e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +63,27 @@ class SingularityDots:
     degree: int
 
 
+def look_up_singularities(
+    instance: MeshInstance, cache: Cache
+) -> tuple[np.ndarray, np.ndarray] | Preparation:
+    """Look up the singularities of an instance with a field; see `field.find_singularities`.
+
+    They are the same for all deformations of a mesh.
+    """
+    surface, field = instance.surface, instance.field
+    key = "singularities", surface.rest_shape_key, field
+    found = cache.get(key)
+    if found is not None:
+        return found
+    arguments = surface.in_rest_shape(), field
+    call = Call(find_singularities, arguments, label="finding singularities")
+    return Preparation(call, SINGULARITY_SECONDS * len(surface.triangles), partial(cache.put, key))
+
+
 def singularity_dots(
     instance: MeshInstance, cache: Cache, clip_planes: np.ndarray | None
-) -> SingularityDots:
-    """Find the singularities of an instance with a field, without those that are cut away.
+) -> SingularityDots | None:
+    """Return the singularities of an instance with a field, without those that are cut away.
 
     Parameters
     ----------
@@ -70,8 +92,16 @@ def singularity_dots(
         Stores the singularities of fields.
     clip_planes : (6, 4) float64 ndarray or None
         See `rendering.view_input.ViewInput`.
+
+    Returns
+    -------
+    SingularityDots or None
+        None if they are not found yet.
     """
-    vertex, index = cached_singularities(instance, cache)
+    found = look_up_singularities(instance, cache)
+    if isinstance(found, Preparation):
+        return None
+    vertex, index = found
     points = instance.world_points()[vertex]
     kept = ~is_cut_away(points, clip_planes)
     return SingularityDots(points[kept], index[kept], instance.field.degree)

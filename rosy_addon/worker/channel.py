@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import io
 import pickle
+import time
 from collections.abc import Callable
 from dataclasses import fields
 from multiprocessing.connection import Connection
 from typing import Any
+
+import numpy as np
 
 from ..compositor.target_tone import ReferenceRender
 from ..field.rosy_field import RosyField
@@ -45,10 +48,26 @@ class Channel:
         self._last_number = 0
         #: What this process keeps for the other one, by number.
         self._kept: dict[int, Any] = {}
+        self._incoming = _Incoming()
 
     def poll(self, timeout: float = 0.0) -> bool:
         """Return whether there is something to receive, an end of the connection included."""
         return self.connection.poll(timeout)
+
+    def has_received(self, seconds: float) -> bool:
+        """Receive parts of the next object that are there, for some seconds. Return whether it is complete.
+
+        Raises
+        ------
+        EOFError, OSError
+            If the other process has ended.
+        """
+        deadline = time.monotonic() + seconds
+        while not self._incoming.is_complete and self.connection.poll():
+            self._incoming.receive_part(self.connection)
+            if time.monotonic() > deadline:
+                break
+        return self._incoming.is_complete
 
     def send(self, message: Any) -> None:
         """Send an object. What the last message had and this one has not is no longer kept.
@@ -79,20 +98,64 @@ class Channel:
         EOFError, OSError
             If the other process has ended.
         """
-        forgotten, sizes = self.connection.recv()
-        stream, buffers = self.connection.recv_bytes(), []
-        for size in sizes:
-            buffer = bytearray(size)
-            for start in range(0, size, CHUNK_BYTES):
-                self.connection.recv_bytes_into(buffer, start)
-            buffers.append(buffer)
-        for number in forgotten:
+        while not self._incoming.is_complete:
+            self._incoming.receive_part(self.connection)
+        message, self._incoming = self._incoming, _Incoming()
+        for number in message.forgotten:
             del self._kept[number]
-        return _Unpickler(stream, buffers, self._kept, self._package).load()
+        return _Unpickler(message.stream, message.buffers, self._kept, self._package).load()
 
     def close(self) -> None:
         """Close this end. The other process ends."""
         self.connection.close()
+
+
+class _Incoming:
+    """A message that is being received, in parts of up to `CHUNK_BYTES`.
+
+    Attributes
+    ----------
+    forgotten : list of int
+        Numbers of what is no longer kept.
+    stream : bytes or None
+        The pickle.
+    buffers : list of (n,) uint8 ndarray
+        Its arrays.
+    """
+
+    def __init__(self) -> None:
+        self.forgotten: list[int] = []
+        self.stream: bytes | None = None
+        self.buffers: list[np.ndarray] = []
+        self._sizes: list[int] | None = None
+        self._position = 0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all parts are here."""
+        return self.stream is not None and not self._sizes
+
+    def receive_part(self, connection: Connection) -> None:
+        """Wait for the next part."""
+        if self._sizes is None:
+            self.forgotten, self._sizes = connection.recv()
+        elif self.stream is None:
+            self.stream = connection.recv_bytes()
+            self._skip_empty()
+        else:
+            if not self._position:
+                self.buffers.append(np.empty(self._sizes[0], dtype=np.uint8))
+            self._position += connection.recv_bytes_into(self.buffers[-1], self._position)
+            if self._position == self._sizes[0]:
+                self._position = 0
+                del self._sizes[0]
+                self._skip_empty()
+
+    def _skip_empty(self) -> None:
+        """Add arrays without elements, of which nothing is sent."""
+        while self._sizes and not self._sizes[0]:
+            self.buffers.append(np.empty(0, dtype=np.uint8))
+            del self._sizes[0]
 
 
 class _Pickler(pickle.Pickler):
@@ -145,7 +208,7 @@ class _Unpickler(pickle.Unpickler):
     """Finds what is kept, and the classes of this package by the name that it has here."""
 
     def __init__(
-        self, stream: bytes, buffers: list[bytearray], kept: dict[int, Any], package: str
+        self, stream: bytes, buffers: list[np.ndarray], kept: dict[int, Any], package: str
     ) -> None:
         super().__init__(io.BytesIO(stream), buffers=buffers)
         self._kept, self._package = kept, package

@@ -14,6 +14,9 @@ from .start import PACKAGE, STARTED_PACKAGE, start_module
 #: Seconds that a helper may take until it is ready.
 START_SECONDS = 60.0
 
+#: Seconds for which large results are received at a time.
+RECEIVE_SECONDS = 0.03
+
 
 class HelperLostError(Exception):
     """A helper has ended before its work was done, or cannot be started.
@@ -167,7 +170,7 @@ class Handle:
                     return False
                 channel.send(self._call)
                 self._call = None
-            while not self.is_done and channel.poll():
+            while not self.is_done and channel.has_received(RECEIVE_SECONDS):
                 kind, *content = channel.receive()
                 if kind == "progress":
                     self.fraction, self.label = content

@@ -694,7 +694,10 @@ def fallback_to_the_processor():
         yield from wait_for_final_pictures()
         seen, drawn = capture("live-processor-turned", view()[2]), bake_of_view(method="sheets")
         check_agreement("processor", seen, drawn, -1.0, max_difference=0.02)
+        helper = session._helper._helper
+        assert helper.connection is not None, "no other process has drawn"
         switch("OFF")
+        assert helper.connection is None
     finally:
         sources.source = original_source
         rosy("rosy_addon.gpu.device").release()
@@ -846,7 +849,7 @@ CAUSES = {
     "edit mode": (_edit_mode, ("'Suzanne'", "edit mode")),
     "wireframe": (_wireframe, ("wireframe",)),
     "no field": (_no_field, ("no object with a field",)),
-    "no memory": (_raises("render_texture_task", MemoryError()), ("not enough memory",)),
+    "no memory": (_raises("texture_steps", MemoryError()), ("not enough memory",)),
     "no memory to upload": (_raises("upload", MemoryError()), ("not enough memory",)),
 }
 
@@ -1032,8 +1035,11 @@ def the_first_field_is_shown():
             preferences().live_first_field = wanted
             with in_view():
                 make_field("First", how)
-            yield 0.5
-            assert is_live() == wanted
+            if wanted:
+                yield from wait_until(is_live)
+            else:
+                yield 0.5
+                assert not is_live()
         preferences().live_first_field = True
         with in_view():
             make_field("Second")

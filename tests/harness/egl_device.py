@@ -5,7 +5,7 @@ It has the same interface as `rosy_addon.gpu.device.BlenderDevice`.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import moderngl
@@ -13,7 +13,6 @@ import numpy as np
 
 from rosy_addon.gpu.device import NamedValues
 from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
-from rosy_addon.progress import Progress, Task
 
 #: Components and data type of each texel format.
 FORMATS = {"RGBA32F": (4, "f4"), "RGBA16F": (4, "f2"), "RG32F": (2, "f4"), "R32F": (1, "f4")}
@@ -35,12 +34,13 @@ class EglDevice:
         """The name of the renderer that the driver reports."""
         return self.context.info["GL_RENDERER"]
 
-    def compile_task(self, shaders: Iterable[ComputePass | RasterPass]) -> Task[None]:
-        """As `Device.compile_task`."""
-        for shader in shaders:
-            if shader.key not in self._programs:
-                yield Progress(0.0, "compiling shaders")
-                self._programs[shader.key] = self._compile(shader)
+    def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
+        """As `Device.is_compiled`."""
+        return shader.key in self._programs
+
+    def compile(self, shader: ComputePass | RasterPass) -> None:
+        """As `Device.compile`."""
+        self._programs[shader.key] = self._compile(shader)
 
     def texture(
         self,

@@ -57,7 +57,7 @@ def rooms(package: str = "rosy_addon") -> SimpleNamespace:
         generate=of("field.generate").generate,
         orbit_camera=of("projection.camera").orbit_camera,
         project=of("projection.project").project,
-        run_to_completion=of("progress").run_to_completion,
+        run=of("worker.job").run,
         read_mesh=of("field.mesh_io").read_mesh,
     )
 
@@ -126,7 +126,7 @@ def draw_pair(
         tuple(instances), camera.resized(width, height), look, tuple(lights), reference
     )
     items = card.upload(instances, look.display)
-    texture = rosy.run_to_completion(card.render_texture_task(items, view))
+    texture = rosy.run(card.texture_steps(items, view))
     card_picture = card.read(texture, width, height)
     images = card.read_gbuffer(view.camera)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
@@ -156,7 +156,7 @@ def draw_on_card(
     """Draw a picture on the card: (H, W, 4), without supersampling."""
     view = rosy.ViewInput(tuple(instances), camera, look)
     items = card.upload(instances, look.display)
-    texture = rosy.run_to_completion(card.render_texture_task(items, view))
+    texture = rosy.run(card.texture_steps(items, view))
     return card.read(texture, camera.width, camera.height)
 
 

@@ -69,7 +69,7 @@ MAY_IMPORT = {
     "animation": BASE_ROOMS
     | {"projection", "annotation", "compositor", "worker", "rendering", "scene", "gpu"},
     "viewport": BASE_ROOMS
-    | {"field", "projection", "annotation", "compositor", "rendering", "scene", "gpu"},
+    | {"field", "projection", "annotation", "compositor", "rendering", "worker", "scene", "gpu"},
     "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "worker", "scene"},
     "frame_workers": BASE_ROOMS,
     "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},

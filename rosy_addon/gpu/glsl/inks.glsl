@@ -126,7 +126,7 @@ float ink_above_threshold(float streak, float threshold, float slope)
   return smooth_unit_step((streak - threshold) / (2.0 * half_width) + 0.5);
 }
 
-// The mean of the noise over a disc around a pixel, around 0, as `undirected_texture_task`.
+// The mean of the noise over a disc around a pixel, around 0, as `undirected_texture`.
 vec3 disc_mean(ivec2 pixel)
 {
   ivec2 last = textureSize(cells, 0) - 1;

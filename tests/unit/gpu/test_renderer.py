@@ -6,6 +6,7 @@ skipped without moderngl or without a context (EGL; software OpenGL is enough).
 
 from __future__ import annotations
 
+import pickle
 import re
 from dataclasses import replace
 from functools import lru_cache
@@ -28,24 +29,28 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
-from rosy_addon.gpu import lic_stage, mesh_buffers, passes, resources, uniforms
+from rosy_addon.gpu import lic_stage, mesh_buffers, passes, preparation, resources, uniforms
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
 from rosy_addon.gpu.field_kind import field_kinds
-from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, mesh_buffers_task, split_matrix
+from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, split_matrix
+from rosy_addon.gpu.mesh_buffers import mesh_buffers as build_mesh_buffers
+from rosy_addon.gpu.preparation import prepare_steps
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.screen_box import is_empty, screen_box, union_box
 from rosy_addon.preset_files.store import load_preset
-from rosy_addon.progress import run_to_completion
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_tone import SurfaceTone
+from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.worker.job import Call, Step, run
 
 AXIS = (0.3, 0.2, 1.0)
 
 
-def build_mesh_buffers(*arguments):
-    return run_to_completion(mesh_buffers_task(*arguments))
+def draw(renderer, view_input):
+    """Draw a picture on a card, or with numpy if it is None."""
+    return draw_picture(view_input) if renderer is None else run(renderer.picture_steps(view_input))
 
 
 # --- input data ----------------------------------------------------------------------------------
@@ -215,13 +220,11 @@ def test_channels_are_in_their_layers():
     np.testing.assert_array_equal(records[:, 14], np.tile([0, 0, 0, 0], (count, 1)))
 
 
-def test_records_are_written_in_steps_of_some_triangles(monkeypatch):
+def test_records_that_are_written_in_blocks(monkeypatch):
     surface = icosphere(1)
     arguments = surface, np.eye(3), smooth_field(surface, 4), "smooth"
     at_once = build_mesh_buffers(*arguments)
-    monkeypatch.setattr(mesh_buffers, "RECORDS_PER_STEP", 7)
-    step_count = sum(1 for _ in mesh_buffers_task(*arguments))
-    assert step_count > len(surface.triangles) / 7
+    monkeypatch.setattr(mesh_buffers, "RECORDS_PER_BLOCK", 7)
     assert np.array_equal(build_mesh_buffers(*arguments).triangle_records, at_once.triangle_records)
 
 
@@ -510,7 +513,7 @@ def assert_parity(
 def render_texture(card, items, camera, look, lights=(), clip_planes=None):
     """Render a picture, and return its texture on the card."""
     view_input = ViewInput((), camera, look, tuple(lights), None, clip_planes)
-    return run_to_completion(card.render_texture_task(items, view_input))
+    return run(card.texture_steps(items, view_input))
 
 
 @lru_cache(maxsize=64)
@@ -804,10 +807,7 @@ def test_samples_show_what_numpy_draws(card, preset):
     """Tone and contrast of the default method, whose streaks are smooth in another way."""
     look = replace(load_preset(preset).look, supersampling=2)
     view_input = ViewInput((ball(),), view((240, 216)), look)
-    drawn = [
-        run_to_completion(renderer.render_task(view_input)).rgba
-        for renderer in (card, CpuRenderer())
-    ]
+    drawn = [draw(renderer, view_input).rgba for renderer in (card, None)]
     inside = np.logical_and(*(rgba[..., 3] == 1 for rgba in drawn))
     of_card, of_numpy = (rgba[inside][:, :3] for rgba in drawn)
     assert inside.sum() > 10_000
@@ -1103,7 +1103,8 @@ def test_creases_on_the_device_are_found_again_for_another_angle(card):
     item = card.upload([instance], "smooth")[0]
 
     def textures(crease_angle):
-        return run_to_completion(card.resources.outline_textures_task(item, crease_angle))
+        (found,) = run(prepare_steps([lambda: card.resources.outline_textures(item, crease_angle)]))
+        return found
 
     first = textures(0.7)
     assert first.crease_count == 24 and first.triangle_parts is not None
@@ -1496,11 +1497,9 @@ def test_clip_planes(card):
 def test_singularities_and_arrowheads_are_drawn_over_the_picture(card, degree, settings):
     """At the same pixels as numpy's."""
     changed = []
-    for renderer in (card, CpuRenderer()):
+    for renderer in (card, None):
         marked, plain = (
-            run_to_completion(
-                renderer.render_task(ViewInput((ball(degree),), view(), replace(LOOK, **shown)))
-            ).rgba
+            draw(renderer, ViewInput((ball(degree),), view(), replace(LOOK, **shown))).rgba
             for shown in (settings, {})
         )
         changed.append((marked != plain).any(axis=2))
@@ -1551,7 +1550,7 @@ def test_meshes_stay_on_the_card(device):
 def test_nothing_is_compiled_or_sent_after_the_preparation(device):
     card = GpuRenderer(device)
     instance = ball(4)
-    labels = [progress.label for progress in card.prepare_task([instance], "smooth")]
+    labels = [step.label for step in card.prepare_steps([instance], "smooth")]
     assert any("preparing the mesh" in label for label in labels)
     (mesh,) = card.resources.meshes
     prepared = {shader.key for shader in passes.ALL_PASSES if not shader.switches}
@@ -1561,7 +1560,31 @@ def test_nothing_is_compiled_or_sent_after_the_preparation(device):
     programs = dict(device._programs)  # now with the switches of this look
     render_texture(card, items, view(), replace(LOOK, gain=2.0))
     assert items[0].mesh is mesh and device._programs == programs
-    assert not list(card.prepare_task([instance], "smooth"))
+    assert not list(card.prepare_steps([instance], "smooth"))
+
+
+def test_what_takes_long_is_left_to_others(device, monkeypatch):
+    """Meshes, outlines, features and lines are calls that a helper can make; the picture is the same."""
+    look = replace(load_preset("engraving").look, anchor="surface", detail=0.5, outline=2.0)
+    view_input = ViewInput((ball(4),), view(), look)
+    expected = draw(GpuRenderer(device), view_input).rgba
+    monkeypatch.setattr(preparation, "IN_PLACE_SECONDS", 0.0)
+    steps, calls, answer = GpuRenderer(device).picture_steps(view_input), [], None
+    while True:
+        try:
+            step = steps.send(answer)
+        except StopIteration as end:
+            picture = end.value
+            break
+        answer = None
+        if isinstance(step, Call):
+            sent = pickle.loads(pickle.dumps(step, 5))
+            calls.append(sent.function.__name__)
+            answer = sent()
+        else:
+            assert isinstance(step, Step)
+    assert set(calls) == {"mesh_buffers", "outline_records", "feature_records", "line_records"}
+    assert picture.rgba.tobytes() == expected.tobytes()
 
 
 def test_cameras_of_odd_sizes(card):
@@ -1588,15 +1611,14 @@ def test_the_range_of_the_colors(card, supersampling, top):
     look = replace(LOOK, magnitude="colour", magnitude_range=top, supersampling=supersampling)
     instances = [ball(4), MeshInstance(BALL, placed(shift=(0, 0, -9)), axis_field(BALL, 2))]
     drawn, expected = (
-        run_to_completion(renderer.render_task(ViewInput(tuple(instances), view(), look)))
-        for renderer in (card, CpuRenderer())
+        draw(renderer, ViewInput(tuple(instances), view(), look)) for renderer in (card, None)
     )
     # Numpy finds the field of several samples at the centers of pixels.
     tolerance = 1e-4 if supersampling == 1 else 5e-3
     assert drawn.color_range == pytest.approx(expected.color_range, rel=tolerance)
     assert (drawn.color_range == (0.0, 0.7)) == bool(top)
     fixed = replace(look, magnitude_range=drawn.color_range[1])
-    again = run_to_completion(card.render_task(ViewInput(tuple(instances), view(), fixed)))
+    again = draw(card, ViewInput(tuple(instances), view(), fixed))
     np.testing.assert_allclose(again.rgba, drawn.rgba, atol=1e-6)
 
 
@@ -1604,9 +1626,9 @@ def test_no_common_range_of_the_colors(card):
     """Fields of several degrees have ranges of their own."""
     look = replace(LOOK, magnitude="colour")
     instances = ball(4), MeshInstance(BALL, placed(shift=(0.7, 0, 0)), axis_field(BALL, 2))
-    for renderer in (card, CpuRenderer()):
-        picture = run_to_completion(renderer.render_task(ViewInput(instances, view(), look)))
+    for renderer in (card, None):
+        picture = draw(renderer, ViewInput(instances, view(), look))
         assert picture.color_range is None
     look = replace(look, magnitude="length")
-    picture = run_to_completion(card.render_task(ViewInput(instances[:1], view(), look)))
+    picture = draw(card, ViewInput(instances[:1], view(), look))
     assert picture.color_range is None

@@ -8,8 +8,9 @@ from rosy_addon.compositor.look import Look, has_flow
 from rosy_addon.gpu import select
 from rosy_addon.gpu.cpu_viewport import CpuViewportRenderer
 from rosy_addon.gpu.renderer import GpuRenderer
-from rosy_addon.progress import run_to_completion
+from rosy_addon.rendering.draw import bake_picture
 from rosy_addon.rendering.view_input import ViewInput
+from rosy_addon.worker.job import Call, Step, Steps, run
 
 REFUSED = {"members": "brute", "ibfv": "sheets"}
 
@@ -24,19 +25,40 @@ def unused_card(monkeypatch):
 @pytest.mark.parametrize("device", ["gpu", "auto"])
 @pytest.mark.parametrize("method", ["sheets", "brute"])
 def test_methods_that_the_card_draws(method, device):
-    assert isinstance(select.select_renderer(device, Look(method=method)), GpuRenderer)
+    assert select.select_device(device, Look(method=method)) == "gpu"
 
 
 @pytest.mark.usefixtures("unused_card")
 @pytest.mark.parametrize("method", REFUSED)
 def test_methods_that_the_processor_draws_instead(method, error_of):
     look = Look(method=method)
-    message = error_of(select.select_renderer, "gpu", look)
+    message = error_of(select.select_device, "gpu", look)
     assert f"'{method}'" in message and "processor" in message
-    assert isinstance(select.select_renderer("auto", look), CpuRenderer)
-    assert select.automatic_device(look) == "cpu"
-    task = GpuRenderer(None).render_task(ViewInput((), None, look))
-    assert error_of(run_to_completion, task) == message
+    assert select.select_device("auto", look) == "cpu"
+    steps = GpuRenderer(None).picture_steps(ViewInput((), None, look))
+    assert error_of(run, steps) == message
+
+
+def test_pictures_are_a_part_of_a_job(monkeypatch):
+    """The processor draws in one call; the card in steps, with calls of its own."""
+    view = ViewInput((), None, Look())
+    (call,) = select.picture_steps(view, "cpu", workers=3, part=(0.2, 0.6))
+    assert call == Call(bake_picture, (view, True, 3), 0.2, 0.6)
+
+    class Card:
+        def __init__(self, device):
+            pass
+
+        def picture_steps(self, view):
+            yield Step(0.5, "drawing")
+            return (yield Call(len, ([1, 2],), 0.5, 1.0, "counting"))
+
+    monkeypatch.setattr(select, "blender_device", lambda: None)
+    monkeypatch.setattr(select, "GpuRenderer", Card)
+    steps: Steps = select.picture_steps(view, "gpu", part=(0.2, 0.6))
+    assert next(steps) == Step(pytest.approx(0.4), "drawing")
+    assert next(steps)[2:] == (pytest.approx(0.4), pytest.approx(0.6), "counting")
+    assert run(select.picture_steps(view, "gpu")) == 2
 
 
 @pytest.mark.parametrize("method", REFUSED)

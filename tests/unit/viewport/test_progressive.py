@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from itertools import count, pairwise
 from types import SimpleNamespace
 
@@ -10,11 +12,13 @@ import pytest
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import RosyError
-from rosy_addon.progress import Progress
 from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport import progressive as progressive_module
 from rosy_addon.viewport.progressive import ProgressiveRenderer
+from rosy_addon.viewport.step_runner import SharedHelper
+from rosy_addon.worker.helper import Helper, HelperLostError
+from rosy_addon.worker.job import Call, Step
 
 POINTERS = 1, 2
 
@@ -26,17 +30,20 @@ class NotingRenderer:
     needs_occluders = False
 
     def __init__(self):
-        self.done, self.failing = [], set()
+        self.done, self.failing, self.is_prepared = [], set(), False
 
     def _step(self, name):
         self.done.append(name)
         if name in self.failing:
             raise MemoryError
 
-    def prepare_task(self, instances, display):
+    def prepare_steps(self, instances, display):
+        if self.is_prepared:
+            return
         for name in ("compile", "compile", "upload a mesh"):
-            yield Progress(0.0, name)
+            yield Step(0.0, name)
             self._step(name)
+        self.is_prepared = True
 
     def upload(self, instances, display):
         return ["item"]
@@ -44,9 +51,9 @@ class NotingRenderer:
     def covered_pixels(self, items, camera):
         return camera.width * camera.height
 
-    def render_texture_task(self, items, view, target_key=None):
+    def texture_steps(self, items, view, target_key=None):
         for name in ("visibility", "lines"):
-            yield Progress(0.0, name)
+            yield Step(0.0, name)
             self._step(name)
         return "texture"
 
@@ -63,9 +70,15 @@ def view_input():
     return ViewInput((), camera, Look())
 
 
+def progressive_of(renderer, helper=None):
+    return ProgressiveRenderer(
+        renderer, helper or SharedHelper(), lambda seconds: None, lambda: None
+    )
+
+
 @pytest.fixture
 def progressive():
-    return ProgressiveRenderer(NotingRenderer(), lambda seconds: None)
+    return progressive_of(NotingRenderer())
 
 
 def test_each_step_of_the_first_picture_is_named_before_it_begins(progressive, view_input):
@@ -113,11 +126,11 @@ class SlowRenderer(NotingRenderer):
         super().__init__()
         self.pictures = 0
 
-    def render_texture_task(self, items, view, target_key=None):
+    def texture_steps(self, items, view, target_key=None):
         self.pictures += 1
         name = self.pictures, view.camera.width, target_key[2]
         for _ in range(30):
-            yield Progress(0.0, "lines")
+            yield Step(0.0, "lines")
         return name
 
 
@@ -128,7 +141,7 @@ def slow(monkeypatch, view_input):
     clock = SimpleNamespace(monotonic=lambda: 0.02 * next(ticks))
     monkeypatch.setattr(progressive_module, "time", clock)
     monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)
-    slow = ProgressiveRenderer(SlowRenderer(), lambda seconds: None)
+    slow = progressive_of(SlowRenderer())
     while slow.update(POINTERS, ("view", 0), view_input, "view").texture is None:
         pass
     return slow
@@ -165,3 +178,117 @@ def test_views_with_streaks_that_drift_take_turns(slow, view_input):
             slow.update(pointers, ("view", frame), view_input, "view")
     views = slow.views.values()
     assert all(view.texture_key[1] > 80 for view in views), [view.texture_key for view in views]
+
+
+class HelpedRenderer(NotingRenderer):
+    """A renderer whose pictures, and whose meshes if they are long, are calls that a helper makes."""
+
+    def __init__(self, picture=time.sleep, arguments=(0.2,)):
+        super().__init__()
+        self.picture, self.arguments, self.long_meshes = picture, arguments, set()
+
+    def prepare_steps(self, instances, display):
+        for mesh in instances:
+            if mesh in self.long_meshes:
+                yield Call(time.sleep, (0.1,), label=f"preparing {mesh}")
+                self.long_meshes.discard(mesh)
+
+    def texture_steps(self, items, view, target_key=None):
+        yield Call(self.picture, self.arguments, label="drawing")
+        return view.instances, view.camera.width
+
+
+@pytest.fixture
+def helper():
+    helper = SharedHelper()
+    yield helper
+    helper.close()
+
+
+def updated(progressive, key, view_input, until=lambda view: view.picture is None):
+    """Update a view as Blender redraws, until something is so, and return it."""
+    for _ in range(500):
+        start = time.process_time()
+        view = progressive.update(POINTERS, key, view_input)
+        assert time.process_time() - start < 0.1
+        if until(view):
+            return view
+        while not progressive.poll():
+            time.sleep(0.005)
+    raise AssertionError("it was never so")
+
+
+def test_what_the_helper_does_is_named(helper, view_input):
+    progressive, shown = progressive_of(HelpedRenderer(), helper), []
+
+    def has_picture(view):
+        shown.append(view.progress.label if view.progress else "")
+        return view.texture is not None
+
+    view = updated(progressive, "key", view_input, has_picture)
+    assert view.texture == ((), 32) and view.progress is None and "drawing" in shown
+
+
+def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, monkeypatch):
+    monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)
+    progressive = progressive_of(HelpedRenderer(), helper)
+    updated(progressive, "first", view_input)
+    progressive.update(POINTERS, "second", view_input)
+    view = updated(progressive, "third", view_input, lambda view: view.texture_key == "second")
+    assert view.texture == ((), 16), "a preview is shown, though the view has changed again"
+    view = updated(progressive, "third", view_input, lambda view: view.texture_key == "third")
+    assert view.downscale == 2
+    updated(progressive, "third", view_input, lambda view: view.picture is not None)
+    final = view.picture
+    assert final.downscale == 1
+    view = updated(progressive, "fourth", view_input, lambda view: view.picture is not final)
+    assert view.texture_key == "third" and view.picture.downscale == 2
+    view = updated(progressive, "fourth", view_input, lambda view: view.downscale == 1)
+    assert view.texture == ((), 32) and view.texture_key == "fourth"
+
+
+def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view_input):
+    renderer = HelpedRenderer(len, ("ab",))
+    progressive = progressive_of(renderer, helper)
+    updated(progressive, "still", view_input)
+    shown = []
+    for frame in range(200):
+        mesh = f"mesh {frame}"
+        renderer.long_meshes = {mesh}
+        moving = ViewInput((mesh,), view_input.camera, Look())
+        view = progressive.update(POINTERS, mesh, moving)
+        if view.texture not in shown:
+            shown.append(view.texture)
+        progressive.poll()
+        time.sleep(0.01)
+    assert len(shown) > 4
+
+
+def test_two_views_share_the_helper(helper, view_input):
+    progressive = progressive_of(HelpedRenderer(), helper)
+    for _ in range(500):
+        views = [progressive.update(pointers, "key", view_input) for pointers in (POINTERS, (1, 3))]
+        if all(view.texture == ((), 32) for view in views):
+            break
+        progressive.poll()
+        time.sleep(0.005)
+    assert all(view.texture == ((), 32) for view in views)
+    progressive.remove_space(POINTERS[0])
+    assert not progressive.views and progressive.poll()
+
+
+def test_without_a_helper_pictures_are_drawn_in_place(monkeypatch, view_input, helper):
+    def fail(self):
+        raise HelperLostError("no helper process can be started", False)
+
+    monkeypatch.setattr(Helper, "start", fail)
+    view = updated(progressive_of(HelpedRenderer(len, ("abc",)), helper), "key", view_input)
+    assert view.texture == ((), 32)
+
+
+def test_a_helper_that_ends_is_an_error(helper, view_input):
+    progressive = progressive_of(HelpedRenderer(os._exit, (3,)), helper)
+    with pytest.raises(RosyError, match="has ended"):
+        updated(progressive, "key", view_input)
+    progressive.renderer.picture, progressive.renderer.arguments = len, ("abc",)
+    assert updated(progressive, "another", view_input).texture == ((), 32)

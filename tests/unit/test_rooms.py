@@ -71,7 +71,7 @@ MAY_IMPORT = {
     "viewport": BASE_ROOMS
     | {"field", "projection", "annotation", "compositor", "rendering", "worker", "scene", "gpu"},
     "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "worker", "scene"},
-    "frame_workers": BASE_ROOMS,
+    "frame_workers": BASE_ROOMS | {"worker"},
     "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
     "ui": BASE_ROOMS
     | {
@@ -132,6 +132,7 @@ MAY_IMPORT = {
         "external",
         "api",
         "cli",
+        "worker",
         "frame_workers",
     },
     "__main__": {"extras"},

@@ -14,13 +14,14 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from ..compositor.target_tone import ReferenceRender
+from ..field.guided_system import GuidedSystem
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 
 #: Immutable classes whose instances the other process keeps: they are large, and used again.
-KEPT_CLASSES = (MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
+KEPT_CLASSES = (GuidedSystem, MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
 
 #: The name of this package, which differs between Blender, a helper and an installed wheel.
 PACKAGE = __package__.rpartition(".")[0]

@@ -214,3 +214,7 @@ def _start_process(
         stdout=subprocess.DEVNULL,
         **options,
     )
+
+
+#: The helper of Blender's windows; see `ui.helper_start`.
+HELPER = Helper()

@@ -1,0 +1,48 @@
+"""Running another program as part of a job."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from collections.abc import Sequence
+
+from .job import Step, Steps
+
+#: Seconds for which each step waits.
+WAIT_SECONDS = 0.02
+
+
+def program_steps(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
+    """Run a program and wait for its end. It is killed if the job is cancelled.
+
+    Parameters
+    ----------
+    command : sequence of str
+        The program and its arguments.
+    label : str
+        For the progress.
+
+    Returns
+    -------
+    status : int
+        Exit status.
+    output : str
+        What the program printed, errors included.
+    """
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
+        )
+        try:
+            while process.poll() is None:
+                yield Step(0.0, label)
+                try:
+                    process.wait(WAIT_SECONDS)
+                except subprocess.TimeoutExpired:
+                    continue
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.wait()
+        log.seek(0)
+        return process.returncode, log.read().decode(errors="replace")

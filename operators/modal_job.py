@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing.connection import wait
 from typing import Any
 
 import bpy
@@ -152,8 +151,8 @@ class Job:
         while self.stop_reason is None:
             if self.advance(context):
                 return True
-            if self._pending is not None and HELPER.connection is not None:
-                wait([HELPER.connection], SLICE_SECONDS)
+            if self._pending is not None:
+                HELPER.wait(SLICE_SECONDS)
         return False
 
     def _next_step(self, context: bpy.types.Context) -> None:

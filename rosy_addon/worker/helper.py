@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping
-from multiprocessing.connection import Connection, Pipe
+from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +102,11 @@ class Helper:
             process.wait()
         if channel is not None:
             channel.close()
+
+    def wait(self, seconds: float) -> None:
+        """Wait until the process has something to say, or ends, at most for some time."""
+        if self.connection is not None:
+            wait([self.connection], seconds)
 
     @property
     def connection(self) -> Connection | None:

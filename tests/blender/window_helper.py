@@ -24,7 +24,9 @@ from conftest import add_camera, contents
 from window_steps import (
     RESULTS,
     SHOTS,
+    descendants,
     in_view,
+    is_running,
     preferences,
     rosy,
     run_steps,
@@ -76,31 +78,6 @@ def helper_id():
     """Return the number of the helper process; None if there is none."""
     process = rosy("rosy_addon.worker.helper").HELPER._process
     return None if process is None else process.pid
-
-
-def is_running(process):
-    """Return whether a process runs, given its number."""
-    try:
-        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state != "Z"
-
-
-def descendants():
-    """Return the numbers of all processes that this one has started, directly or not."""
-    parents = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        parents[int(path.parent.name)] = int(fields[1])
-    found, new = set(), {os.getpid()}
-    while new:
-        new = {child for child, parent in parents.items() if parent in new}
-        found |= new
-    return sorted(found)
 
 
 def start_bake():

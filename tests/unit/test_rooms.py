@@ -32,7 +32,7 @@ MAY_IMPORT = {
     "errors": set(),
     "progress": set(),
     "memory": {"errors"},
-    "cache": {"progress"},
+    "cache": set(),
     "processes": {"progress"},
     "deterministic_trig": set(),
     "color": {"errors"},
@@ -43,11 +43,14 @@ MAY_IMPORT = {
     "annotation": BASE_ROOMS | {"field", "projection"},
     "compositor": BASE_ROOMS | {"field", "projection", "annotation"},
     "line_drawing": BASE_ROOMS | {"field", "projection", "annotation"},
-    "surface_texture": BASE_ROOMS | {"field", "projection", "compositor", "line_drawing"},
     "image_io": BASE_ROOMS,
-    "rendering": BASE_ROOMS | {"field", "projection", "annotation", "compositor", "cache"},
+    "surface_texture": BASE_ROOMS
+    | {"field", "projection", "compositor", "line_drawing", "image_io"},
+    "worker": BASE_ROOMS | {"field", "projection", "compositor"},
+    "rendering": BASE_ROOMS
+    | {"field", "projection", "annotation", "compositor", "worker", "image_io"},
     "presets": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "cache"},
+    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "worker", "image_io"},
     "scene": BASE_ROOMS
     | {
         "field",
@@ -56,20 +59,23 @@ MAY_IMPORT = {
         "compositor",
         "line_drawing",
         "surface_texture",
+        "worker",
         "rendering",
-        "cache",
         "image_io",
         "presets",
     },
-    "bake": BASE_ROOMS | {"compositor", "rendering", "scene", "gpu", "cache"},
-    "comb_field": BASE_ROOMS | {"field", "scene", "cache"},
-    "bake_texture": BASE_ROOMS | {"compositor", "surface_texture", "scene", "image_io", "cache"},
+    "bake": BASE_ROOMS | {"compositor", "worker", "rendering", "scene", "gpu"},
+    "comb_field": BASE_ROOMS | {"field", "worker", "scene"},
+    "bake_texture": BASE_ROOMS
+    | {"compositor", "surface_texture", "worker", "rendering", "scene", "image_io"},
     "animation": BASE_ROOMS
-    | {"projection", "annotation", "compositor", "rendering", "scene", "gpu", "cache"},
+    | {"projection", "annotation", "compositor", "worker", "rendering", "scene", "gpu"},
     "viewport": BASE_ROOMS
     | {"field", "projection", "annotation", "compositor", "rendering", "scene", "gpu"},
-    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "scene", "cache"},
+    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "worker", "scene"},
     "frame_workers": BASE_ROOMS,
+    "render_turntable": BASE_ROOMS
+    | {"rendering", "image_io", "worker", "scene", "gpu", "turntable_video"},
     "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
     "ui": BASE_ROOMS
     | {
@@ -79,6 +85,7 @@ MAY_IMPORT = {
         "compositor",
         "line_drawing",
         "surface_texture",
+        "worker",
         "scene",
         "gpu",
         "bake",
@@ -93,6 +100,7 @@ MAY_IMPORT = {
         "compositor",
         "line_drawing",
         "surface_texture",
+        "worker",
         "rendering",
         "image_io",
         "presets",
@@ -142,6 +150,7 @@ NUMPY_ROOMS = (
     "surface_texture",
     "image_io",
     "presets",
+    "worker",
     "rendering",
 )
 
@@ -154,6 +163,7 @@ BLENDER_ROOMS = (
         "bake_texture",
         "comb_field",
         "draw_strokes",
+        "render_turntable",
         "viewport",
         "cli",
         "animation",

@@ -244,7 +244,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         if self.kind == "prescribed":
             target = self._first_object(context, mesh)
             points = read_singularity_points(context.scene, target, self.degree, self.singularities)
-            vectors = guide_vectors(mesh, self.vectors) if self.vectors else None
+            vectors = guide_vectors(mesh, self.vectors, surface) if self.vectors else None
             if self.vectors == GUIDE_ATTRIBUTE:
                 vectors[np.linalg.norm(vectors, axis=1) < STROKE_FIRMNESS] = 0
             return replace(
@@ -274,7 +274,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             name = self.vectors or GUIDE_ATTRIBUTE
             settings = replace(
                 settings,
-                vectors=guide_vectors(mesh, name),
+                vectors=guide_vectors(mesh, name, surface),
                 vectors_have_firmness=name == GUIDE_ATTRIBUTE,
             )
         return settings

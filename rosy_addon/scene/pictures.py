@@ -207,7 +207,7 @@ def is_beside_blend(folder: Path) -> bool:
 
 
 def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:
-    """Check that pictures can be applied to objects. Call this before a long task.
+    """Check that pictures can be applied to objects. Call this before a long job.
 
     Raises
     ------

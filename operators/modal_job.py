@@ -181,7 +181,10 @@ class Job:
             self._pending = None
             self._call_here(context, pending.call)
             return True
-        except REPORTED_ERRORS as error:  # the helper has ended twice
+        except (
+            REPORTED_ERRORS
+        ) as error:  # the helper has ended twice, or its answer takes too much memory
+            pending.cancel()
             self._error = error
         else:
             try:

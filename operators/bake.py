@@ -6,20 +6,20 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..rosy_addon.bake import BakeResult, bake_task
+from ..rosy_addon.bake import BakeResult, bake
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.progress import Task
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
 from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
-from .modal_task import ModalTaskMixin
+from ..rosy_addon.worker.job import Steps
+from .modal_job import ModalJobMixin
 from .poll import poll_has_field
 from .reports import report_warnings
 
 
-class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
     """Draw the fields of the scene from the chosen camera, and apply the picture to the meshes"""
 
     bl_idname = "rosy.bake"
@@ -34,8 +34,8 @@ class ROSY_OT_bake(ModalTaskMixin, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_has_field(cls, context)
 
-    def make_task(self, context: bpy.types.Context) -> Task[list[BakeResult]]:
-        return bake_task(
+    def begin(self, context: bpy.types.Context) -> Steps[list[BakeResult]]:
+        return bake.begin(
             context.scene, cameras=self._cameras(context), workers=worker_count(context)
         )
 

@@ -7,19 +7,19 @@ from dataclasses import replace
 
 import bpy
 
-from ..rosy_addon.animation import SequenceResult, bake_animation_task
+from ..rosy_addon.animation import SequenceResult, bake_animation
 from ..rosy_addon.errors import RosyError, counted
-from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
 from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.ui.preferences import worker_count
-from .modal_task import DialogTaskMixin
+from ..rosy_addon.worker.job import Steps
+from .modal_job import DialogJobMixin
 from .poll import poll_has_field
 from .reports import report_warnings
 
 
-class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
+class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
     """Draw the fields at every frame, save the pictures to a folder, and play them back on the meshes. Frames that are up to date are kept, so a run that was stopped with ESC can be continued"""
 
     bl_idname = "rosy.bake_animation"
@@ -62,7 +62,7 @@ class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
     def take_answer(self, context: bpy.types.Context) -> None:
         context.scene.rosy.directory = self.directory
 
-    def make_task(self, context: bpy.types.Context) -> Task[list[SequenceResult]]:
+    def begin(self, context: bpy.types.Context) -> Steps[list[SequenceResult]]:
         scene = context.scene
         frame_settings = self._frame_settings(scene)
         frames = range(frame_settings["first"], frame_settings["last"] + 1, frame_settings["step"])
@@ -74,7 +74,7 @@ class ROSY_OT_bake_animation(DialogTaskMixin, bpy.types.Operator):
         cameras = scene_cameras(scene) if self.all_cameras else None
         # Frames are saved in the scene's folder, even if single pictures are packed.
         settings = replace(read_output_settings(scene), folder=output_folder(scene))
-        return bake_animation_task(
+        return bake_animation.begin(
             scene,
             frames,
             cameras=cameras,

@@ -6,15 +6,15 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..rosy_addon.progress import Task, as_task
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
 from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.scene_reader import field_objects
-from .modal_task import ModalTaskMixin
+from ..rosy_addon.worker.job import Steps
+from .modal_job import ModalJobMixin
 from .poll import poll_has_field
 
 
-class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
     """Compute the ambient occlusion of all meshes with a field, store it as an attribute, and use it as the tone"""
 
     bl_idname = "rosy.occlusion"
@@ -34,10 +34,10 @@ class ROSY_OT_occlusion(ModalTaskMixin, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_has_field(cls, context)
 
-    def make_task(self, context: bpy.types.Context) -> Task[None]:
+    def begin(self, context: bpy.types.Context) -> Steps[None]:
         depsgraph = context.evaluated_depsgraph_get()
         objects = field_objects(context.view_layer)
-        return as_task(store_occlusion, depsgraph, objects, direction_count=self.directions)
+        return store_occlusion.begin(depsgraph, objects, direction_count=self.directions)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return field_objects(context.view_layer)

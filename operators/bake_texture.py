@@ -6,16 +6,16 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..rosy_addon.bake_texture import TextureResult, bake_texture_task
-from ..rosy_addon.progress import Task
+from ..rosy_addon.bake_texture import TextureResult, bake_texture
 from ..rosy_addon.scene.field_attributes import has_field
-from .modal_task import DialogTaskMixin
+from ..rosy_addon.worker.job import Steps
+from .modal_job import DialogJobMixin
 from .poll import poll_active_field, poll_idle, selected_mesh_objects
 from .reports import report_warnings
-from .unwrap import unwrapping_task
+from .unwrap import unwrapped
 
 
-class ROSY_OT_bake_texture(DialogTaskMixin, bpy.types.Operator):
+class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
     """Draw the field of the selected meshes as a texture for their UV map, which stays on the surface from all sides"""
 
     bl_idname = "rosy.bake_texture"
@@ -47,10 +47,10 @@ class ROSY_OT_bake_texture(DialogTaskMixin, bpy.types.Operator):
         column.label(text=f"No UV map: {names}", icon="ERROR")
         column.label(text="Unwrap with Smart UV Project, and bake the texture?")
 
-    def make_task(self, context: bpy.types.Context) -> Task[list[TextureResult]]:
+    def begin(self, context: bpy.types.Context) -> Steps[list[TextureResult]]:
         missing = self._without_uv_map(context) if self.unwrap else []
-        task = bake_texture_task(context.scene, self._objects(context))
-        return unwrapping_task(context, missing, task) if missing else task
+        steps = bake_texture.begin(context.scene, self._objects(context))
+        return unwrapped(context, missing, steps) if missing else steps
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return self._objects(context)

@@ -8,12 +8,12 @@ from contextlib import suppress
 import bpy
 import numpy as np
 
-from ..rosy_addon.comb_field import CombStroke, comb_stroke_task
+from ..rosy_addon.comb_field import CombStroke, start_stroke
 from ..rosy_addon.errors import REPORTED_ERRORS, RosyError
 from ..rosy_addon.field.guide_brush import EFFECTS, GuideBrush
-from ..rosy_addon.progress import Task, run_to_completion, subtask
 from ..rosy_addon.ui import comb_brush, overlay
-from .modal_task import Job, ModalTaskMixin
+from ..rosy_addon.worker.job import Steps, part
+from .modal_job import Job, ModalJobMixin
 from .poll import poll_active_field, poll_idle, selected_mesh_objects
 from .reports import report_error
 
@@ -38,7 +38,7 @@ class RosyStrokePoint(bpy.types.PropertyGroup):
     )
 
 
-class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
     """Turn the field of the active mesh along a stroke, and keep the stroke as guides on the mesh"""
 
     bl_idname = "rosy.field_comb"
@@ -113,17 +113,17 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return [selected_mesh_objects(context)[0].data]
 
-    def make_task(self, context: bpy.types.Context) -> Task[None]:
+    def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Draw the whole stroke."""
         if not len(self.stroke):
             raise RosyError("the stroke has no points: give some, or drag in the 3D view")
-        line = yield from subtask(self._stroke_task(context), 0.0, 0.4)
+        line = self._start_line(context)
         for point in self.stroke:
             if point.is_start:
                 line.lift()
             line.extend(np.array([point.location]), np.array([point.pressure]))
         line.lift()
-        yield from subtask(self._settle_task(context, line), 0.4, 1.0)
+        yield from part(self._settle(context, line), 0.4, 1.0)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if len(self.stroke) or context.region_data is None:
@@ -167,7 +167,7 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
                     return {"CANCELLED"}
                 self._line.lift()
                 self._line.show()
-                self._job = Job(context, self._settle_task(context, self._line), [self._line.mesh])
+                self._job = Job(context, self._settle(context, self._line), [self._line.mesh])
         except REPORTED_ERRORS as error:
             self._take_back()
             return report_error(self, error)
@@ -200,14 +200,14 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
         if self._line is None:
             comb = context.scene.rosy.comb
             self.radius, self.strength = self._mouse.radius(place, comb.size), comb.strength
-            self._line = run_to_completion(self._stroke_task(context))
+            self._line = self._start_line(context)
         point = self.stroke.add()
         point.location, point.pressure = place, event.pressure
         point.is_start = len(self.stroke) > 1 and self._is_away
         self._is_away = False
         return self._line.extend(np.array([point.location]), np.array([point.pressure]))
 
-    def _stroke_task(self, context: bpy.types.Context) -> Task[CombStroke]:
+    def _start_line(self, context: bpy.types.Context) -> CombStroke:
         brush = GuideBrush(
             self.radius,
             self.strength,
@@ -217,23 +217,24 @@ class ROSY_OT_field_comb(ModalTaskMixin, bpy.types.Operator):
             self.mirror,
         )
         (mesh,) = self.required_data(context)
-        return comb_stroke_task(mesh, brush, self.reach)
+        return start_stroke(mesh, brush, self.reach)
 
-    def _settle_task(self, context: bpy.types.Context, line: CombStroke) -> Task[None]:
+    def _settle(self, context: bpy.types.Context, line: CombStroke) -> Steps[None]:
         """Solve for the whole field, and store it."""
-        yield from line.settle_task()
+        yield from line.settle()
         field = line.store()
         overlay.refresh(context, {line.mesh: field})
 
     def _settle_now(self, context: bpy.types.Context) -> set[str]:
         """Run the rest of the job. Return the result of the operator."""
         try:
-            run_to_completion(self._job.task)
-            self._job.stop("done")
+            if self._job.finish(context):
+                return {"FINISHED"}
         except REPORTED_ERRORS as error:
             self._take_back()
             return report_error(self, error)
-        return {"FINISHED"}
+        self._take_back()
+        return {"CANCELLED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop. Blender calls this if the window is closed or a file is opened."""

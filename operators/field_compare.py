@@ -10,14 +10,14 @@ import numpy as np
 
 from ..rosy_addon.errors import counted
 from ..rosy_addon.field.analysis import format_degrees
-from ..rosy_addon.progress import Task, as_task
 from ..rosy_addon.scene.field_difference import (
     DIFFERENCE_ATTRIBUTE,
     FieldDifference,
     other_field_names,
     store_difference,
 )
-from .modal_task import ModalTaskMixin
+from ..rosy_addon.worker.job import Steps
+from .modal_job import ModalJobMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects
 
 
@@ -27,7 +27,7 @@ def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> l
     ]
 
 
-class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_field_compare(ModalJobMixin, bpy.types.Operator):
     """Compute the angle between the field of the active mesh and another one, store it as an attribute, and color the lines by it"""
 
     bl_idname = "rosy.field_compare"
@@ -53,9 +53,9 @@ class ROSY_OT_field_compare(ModalTaskMixin, bpy.types.Operator):
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return [selected_mesh_objects(context)[0].data]
 
-    def make_task(self, context: bpy.types.Context) -> Task[FieldDifference]:
+    def begin(self, context: bpy.types.Context) -> Steps[FieldDifference]:
         (mesh,) = self.required_data(context)
-        return as_task(store_difference, mesh, self.other)
+        return store_difference.begin(mesh, self.other)
 
     def finish(self, context: bpy.types.Context, result: FieldDifference) -> None:
         if self.use_as_color:

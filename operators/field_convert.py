@@ -13,14 +13,14 @@ from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert
 from ..rosy_addon.field.curvature import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
-from ..rosy_addon.progress import Progress, Task, as_task, subtask
 from ..rosy_addon.scene.face_values import read_face_scalars
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
-from .modal_task import ModalTaskMixin
+from ..rosy_addon.worker.job import Call, Step, Steps, part
+from .modal_job import ModalJobMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
 
 _Result = TypeVar("_Result")
@@ -70,19 +70,19 @@ class _FieldOperator:
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
 
-    def each_mesh_task(
-        self, context: bpy.types.Context, mesh_task: Callable[[bpy.types.Mesh], Task[_Result]]
-    ) -> Task[dict[bpy.types.Mesh, _Result]]:
-        """Run a task for each mesh, and return the results."""
+    def each_mesh(
+        self, context: bpy.types.Context, begin: Callable[[bpy.types.Mesh], Steps[_Result]]
+    ) -> Steps[dict[bpy.types.Mesh, _Result]]:
+        """Run a job for each mesh, and return the results."""
         meshes, results = list(self.required_data(context)), {}
         for index, mesh in enumerate(meshes):
             start, stop = index / len(meshes), (index + 1) / len(meshes)
-            results[mesh] = yield from subtask(mesh_task(mesh), start, stop)
-        yield Progress(1.0, "storing the fields")
+            results[mesh] = yield from part(begin(mesh), start, stop)
+        yield Step(1.0, "storing the fields")
         return results
 
 
-class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_field_convert(_FieldOperator, ModalJobMixin, bpy.types.Operator):
     """Change the degree of the fields of the selected meshes, rotate or smooth them, cancel singularities, or replace their magnitudes"""
 
     bl_idname = "rosy.field_convert"
@@ -152,16 +152,15 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         search=_search_values,
     )
 
-    def make_task(self, context: bpy.types.Context) -> Task[int]:
+    def begin(self, context: bpy.types.Context) -> Steps[int]:
         """Convert all fields, then store them. Return the number of meshes."""
-        converted = yield from self.each_mesh_task(context, self._converted_task)
+        converted = yield from self.each_mesh(context, self._converted)
         store_fields(self, context, converted)
         return len(converted)
 
-    def _converted_task(self, mesh: bpy.types.Mesh) -> Task[RosyField]:
+    def _converted(self, mesh: bpy.types.Mesh) -> Steps[RosyField]:
         """Return the converted field of a mesh."""
-        surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.0)
-        yield Progress(0.0, "reading the field")
+        surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
         values = read_face_scalars(mesh, self.values) if self.magnitude == "values" else None
         if values is not None and values.min() < 0:
@@ -172,7 +171,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         conversion = Conversion(
             self.degree or None, self.angle, self.smooth, self.pair_distance, magnitude
         )
-        field = yield from as_task(convert, surface, field, conversion)
+        field = yield Call(convert, (surface, field, conversion))
         return replace(field, source_directions=None)
 
     def finish(self, context: bpy.types.Context, result: int) -> None:
@@ -188,7 +187,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
             layout.prop(self, "values")
 
 
-class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_field_store(_FieldOperator, ModalJobMixin, bpy.types.Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
     bl_idname = "rosy.field_store"
@@ -206,16 +205,17 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         "'rosy_tangent' for tangents",
     )
 
-    def make_task(self, context: bpy.types.Context) -> Task[int]:
+    def begin(self, context: bpy.types.Context) -> Steps[int]:
         """Read all fields, then store them. Return the number of meshes."""
         if self.form == "TANGENT":
             guiding_angle = context.scene.rosy.look.guiding_angle
-            tangents = yield from self.each_mesh_task(
-                context, lambda mesh: as_task(mesh_tangents, mesh, guiding_angle, self.attribute)
+            tangents = yield from self.each_mesh(
+                context, lambda mesh: mesh_tangents.begin(mesh, guiding_angle, self.attribute)
             )
             assign_tangents(tangents, self.attribute)
             return len(tangents)
-        fields = yield from self.each_mesh_task(context, _field_task)
+        yield Step(0.0, "reading the fields")
+        fields = {mesh: read_mesh_field(mesh) for mesh in self.required_data(context)}
         assign_fields(fields, self.attribute, self.form)
         return len(fields)
 
@@ -229,13 +229,6 @@ class ROSY_OT_field_store(_FieldOperator, ModalTaskMixin, bpy.types.Operator):
         layout.prop(self, "form")
         if self.form != "DIRECTIONS":
             layout.prop(self, "attribute")
-
-
-def _field_task(mesh: bpy.types.Mesh) -> Task[RosyField]:
-    """Return the field of a mesh."""
-    surface = yield from as_task(mesh_surface, mesh)
-    yield Progress(1.0, "reading the field")
-    return read_mesh_field(mesh, surface=surface)
 
 
 CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

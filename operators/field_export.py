@@ -9,14 +9,15 @@ import bpy
 from bpy_extras.io_utils import ExportHelper
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.field.field_io import write_field
+from ..rosy_addon.field.field_io import field_file
 from ..rosy_addon.field.rosy_field import RosyField
-from ..rosy_addon.progress import Task, as_task, subtask
+from ..rosy_addon.file_io import check_writable, write_bytes
 from ..rosy_addon.scene.combed_guides import read_combed_guides
 from ..rosy_addon.scene.field_attributes import field_degree
 from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
-from .modal_task import DialogTaskMixin
+from ..rosy_addon.worker.job import Call, Steps
+from .modal_job import DialogJobMixin
 from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
 
 #: File formats by suffix: label and description in the user interface.
@@ -33,7 +34,7 @@ FIELD_FORMATS = {
 GUIDE_FORMATS = (".rosy", ".rawfield", ".txt", ".npy")
 
 
-class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
+class ROSY_OT_field_export(DialogJobMixin, bpy.types.Operator, ExportHelper):
     """Write the field of the active mesh to a file"""
 
     bl_idname = "rosy.field_export"
@@ -84,7 +85,7 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
     def take_answer(self, context: bpy.types.Context) -> None:
         self.skip_browser = True
 
-    def make_task(self, context: bpy.types.Context) -> Task[Path]:
+    def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))
         is_guides = self.content == "GUIDES"
         if is_guides and path.suffix.lower() not in GUIDE_FORMATS:
@@ -92,7 +93,7 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
                 f"{path}: cannot keep the firmness of guides: write a {', '.join(GUIDE_FORMATS[:-1])} or "
                 f"{GUIDE_FORMATS[-1]} file"
             )
-        return _export_task(selected_mesh_objects(context)[0].data, path, is_guides)
+        return _export(selected_mesh_objects(context)[0].data, path, is_guides)
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         obj = selected_mesh_objects(context)[0]
@@ -102,16 +103,17 @@ class ROSY_OT_field_export(DialogTaskMixin, bpy.types.Operator, ExportHelper):
         self.report({"INFO"}, f"Wrote {result}")
 
 
-def _export_task(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Task[Path]:
+def _export(mesh: bpy.types.Mesh, path: Path, is_guides: bool) -> Steps[Path]:
     """Read the field or the combed guides of a mesh, and write them to a file."""
-    surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.2)
+    surface = mesh_surface(mesh)
     if is_guides:
         field = RosyField(field_degree(mesh), read_combed_guides(mesh, surface))
         if not field.vectors.any():
             raise RosyError(f"{mesh_label(mesh)}: its field has no combed guides: comb it first")
     else:
-        field = yield from subtask(as_task(read_mesh_field, mesh, surface=surface), 0.2, 0.4)
-    yield from subtask(as_task(write_field, path, field, surface), 0.4, 1.0)
+        field = read_mesh_field(mesh, surface=surface)
+    check_writable(path)
+    write_bytes(path, (yield Call(field_file, (path, field, surface))))
     return path
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from math import pi
 from typing import Any
 
@@ -13,10 +14,9 @@ import numpy as np
 from ..rosy_addon.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate
 from ..rosy_addon.field.guides import feature_edges
-from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
+from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface, orientation_warning
-from ..rosy_addon.progress import Progress, Task, as_task, subtask
 from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..rosy_addon.scene.guides import (
     annotation_strokes,
@@ -32,7 +32,8 @@ from ..rosy_addon.scene.singularity_points import (
     read_singularity_points,
 )
 from ..rosy_addon.ui.generator_settings import generator_setting_names
-from .modal_task import ModalTaskMixin
+from ..rosy_addon.worker.job import Call, Steps
+from .modal_job import ModalJobMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
 from .reports import report_warning
 
@@ -72,7 +73,7 @@ def _search_attributes(_operator: Any, context: bpy.types.Context, _typed: str) 
     return [attribute.name for obj in objects for attribute in obj.data.attributes]
 
 
-class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     """Generate a field on the selected meshes"""
 
     bl_idname = "rosy.field_generate"
@@ -180,7 +181,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
     def poll(cls, context: bpy.types.Context) -> bool:
         return poll_editable(cls, context)
 
-    def make_task(self, context: bpy.types.Context) -> Task[str]:
+    def begin(self, context: bpy.types.Context) -> Steps[str]:
         """Generate all fields, then store them. Return what was made, for a message.
 
         Meshes without features to follow, or without a direction on any face, are reported and left
@@ -188,7 +189,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         """
         inputs, fields, errors = [], {}, []
         for mesh in self.required_data(context):
-            surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.0)
+            surface = mesh_surface(mesh)
             try:
                 settings = self._generator_settings(context, mesh, surface)
             except NoFeaturesError as error:
@@ -196,9 +197,9 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 continue
             inputs.append((mesh, surface, settings))
         for index, (mesh, surface, settings) in enumerate(inputs):
-            task = as_task(generate, surface, settings, self.degree)
+            start, stop = (0.9 * done / len(inputs) for done in (index, index + 1))
             try:
-                field = yield from subtask(task, index / len(inputs), (index + 1) / len(inputs))
+                field = yield Call(generate, (surface, settings, self.degree), start, stop)
             except NoFeaturesError as error:
                 errors.append(error)
                 continue
@@ -206,18 +207,20 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
                 errors.append(self._no_direction_error(surface))
                 continue
             fields[mesh] = field
-            yield Progress((index + 1) / len(inputs), "checking orientations")
-            if note := orientation_warning(surface):
+            label = "checking orientations"
+            if note := (yield Call(orientation_warning, (surface,), stop, stop, label)):
                 report_warning(self, note)
         if not fields:
             raise errors[0]
         for error in errors:
             report_warning(self, str(error))
-        yield Progress(1.0, "counting singularities")
         surfaces = {mesh: surface for mesh, surface, _ in inputs}
         fields_on_surfaces = [(surfaces[mesh], field) for mesh, field in fields.items()]
-        notes = yield from subtask(self._notes_task(fields_on_surfaces), 1.0, 1.0)
-        yield Progress(1.0, "storing the fields")
+        # Counting must not take long.
+        face_count = sum(surface.face_count for surface, _ in fields_on_surfaces)
+        is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
+        describe = partial(description, count_singularities=is_cheap)
+        notes = yield Call(describe, (fields_on_surfaces,), 0.9)
         store_fields(self, context, fields, self.attribute)
         names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
@@ -231,12 +234,6 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
             "Form"
         )
 
-    def _notes_task(self, fields: list[tuple[Surface, RosyField]]) -> Task[str]:
-        """Return what the message says about the fields. Counting must not take long."""
-        face_count = sum(surface.face_count for surface, _ in fields)
-        is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
-        return (yield from as_task(description, fields, count_singularities=is_cheap))
-
     def _generator_settings(
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
     ) -> GeneratorSettings:
@@ -247,7 +244,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
         if self.kind == "prescribed":
             target = self._first_object(context, mesh)
             points = read_singularity_points(context.scene, target, self.degree, self.singularities)
-            vectors = guide_vectors(mesh, self.vectors) if self.vectors else None
+            vectors = guide_vectors(mesh, self.vectors, surface) if self.vectors else None
             if self.vectors == GUIDE_ATTRIBUTE:
                 vectors[np.linalg.norm(vectors, axis=1) < STROKE_FIRMNESS] = 0
             return replace(
@@ -277,7 +274,7 @@ class ROSY_OT_field_generate(ModalTaskMixin, bpy.types.Operator):
             name = self.vectors or GUIDE_ATTRIBUTE
             settings = replace(
                 settings,
-                vectors=guide_vectors(mesh, name),
+                vectors=guide_vectors(mesh, name, surface),
                 vectors_have_firmness=name == GUIDE_ATTRIBUTE,
             )
         return settings

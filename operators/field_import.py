@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 
 import bpy
 from bpy_extras.io_utils import ImportHelper
@@ -12,14 +13,14 @@ from ..rosy_addon.errors import counted
 from ..rosy_addon.field.directional_field import field_directions
 from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
-from ..rosy_addon.progress import Progress, Task, as_task, subtask
 from ..rosy_addon.scene.meshes import mesh_surface
-from .modal_task import DialogTaskMixin
+from ..rosy_addon.worker.job import Call, Steps
+from .modal_job import DialogJobMixin
 from .poll import poll_editable, selected_mesh_objects, store_fields
 from .reports import report_warning
 
 
-class ROSY_OT_field_import(DialogTaskMixin, bpy.types.Operator, ImportHelper):
+class ROSY_OT_field_import(DialogJobMixin, bpy.types.Operator, ImportHelper):
     """Read the field of the active mesh from a file"""
 
     bl_idname = "rosy.field_import"
@@ -75,23 +76,19 @@ class ROSY_OT_field_import(DialogTaskMixin, bpy.types.Operator, ImportHelper):
     def take_answer(self, context: bpy.types.Context) -> None:
         self.skip_browser = True
 
-    def make_task(self, context: bpy.types.Context) -> Task[LoadedField]:
+    def begin(self, context: bpy.types.Context) -> Steps[LoadedField]:
         """Read the field, then store it."""
         mesh = selected_mesh_objects(context)[0].data
-        surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.2)
-        loading = as_task(
-            load_field,
-            bpy.path.abspath(self.filepath),
-            surface,
-            self.degree or None,
-            self.undefined,
-            mesh=bpy.path.abspath(self.mesh_file) if self.mesh_file else None,
-        )
-        field, note = yield from subtask(loading, 0.2, 1.0)
+        surface = mesh_surface(mesh)
+        mesh_file = bpy.path.abspath(self.mesh_file) if self.mesh_file else None
+        path = bpy.path.abspath(self.filepath)
+        inputs = path, surface, self.degree or None, self.undefined
+        field, note = yield Call(partial(load_field, mesh=mesh_file), inputs, 0.0, 0.9)
         if field.direction_ratios is not None and field.source_directions is None:
-            yield Progress(1.0, "computing directions")
-            field = replace(field, source_directions=field_directions(surface, field))
-        yield Progress(1.0, "storing the field")
+            directions = yield Call(
+                field_directions, (surface, field), 0.9, label="computing directions"
+            )
+            field = replace(field, source_directions=directions)
         store_fields(self, context, {mesh: field}, self.attribute)
         return LoadedField(field, note)
 

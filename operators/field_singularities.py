@@ -9,11 +9,11 @@ import bpy
 
 from ..rosy_addon.errors import REPORTED_ERRORS
 from ..rosy_addon.field.singularity_moves import OUTSIDE, move_index
-from ..rosy_addon.progress import Progress, Task, as_task, subtask
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.ui import singularity_handles
-from .modal_task import ModalTaskMixin
+from ..rosy_addon.worker.job import Call, Steps
+from .modal_job import ModalJobMixin
 from .poll import (
     poll_active_field,
     poll_editable,
@@ -37,7 +37,7 @@ REACH = {
 }
 
 
-class ROSY_OT_field_singularities(ModalTaskMixin, bpy.types.Operator):
+class ROSY_OT_field_singularities(ModalJobMixin, bpy.types.Operator):
     """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
 
     bl_idname = "rosy.field_singularities"
@@ -73,22 +73,14 @@ class ROSY_OT_field_singularities(ModalTaskMixin, bpy.types.Operator):
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return [selected_mesh_objects(context)[0].data]
 
-    def make_task(self, context: bpy.types.Context) -> Task[None]:
+    def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Change the field of the active mesh."""
         (mesh,) = self.required_data(context)
-        surface = yield from subtask(as_task(mesh_surface, mesh), 0.0, 0.0)
-        yield Progress(0.0, "reading the field")
+        surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
-        task = as_task(
-            move_index,
-            surface,
-            field,
-            self.source,
-            self.target,
-            self.index,
-            self.reach * surface.extent,
-        )
-        field = yield from subtask(task, 0.0, 1.0)
+        reach = self.reach * surface.extent
+        inputs = surface, field, self.source, self.target, self.index, reach
+        field = yield Call(move_index, inputs)
         store_fields(self, context, {mesh: replace(field, source_directions=None)})
 
     def draw(self, context: bpy.types.Context) -> None:

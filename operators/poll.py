@@ -42,7 +42,7 @@ def poll_editable(operator: type[bpy.types.Operator], context: bpy.types.Context
 
 
 def poll_idle(operator: type[bpy.types.Operator]) -> bool:
-    """Return whether no modal task is running. Set the poll message if one is."""
+    """Return whether no job is running in a window. Set the poll message if one is."""
     if job_status.current is not None:
         operator.poll_message_set("RoSy is busy: wait, or press ESC to cancel")
         return False
@@ -67,7 +67,7 @@ def poll_active_field(operator: type[bpy.types.Operator], context: bpy.types.Con
 
 
 def poll_has_field(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Return whether there is a field to draw, and no modal task. Set the poll message if not."""
+    """Return whether there is a field to draw, and no job is running. Set the poll message if not."""
     if not poll_idle(operator):
         return False
     if not field_objects(context.view_layer):

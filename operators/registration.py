@@ -23,7 +23,7 @@ from . import (
     field_import,
     field_singularities,
     flow_play,
-    modal_task,
+    modal_job,
     preset_apply,
     preset_export,
     preset_import,
@@ -76,8 +76,8 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Stop the current task and the live view, and unregister the tools and the operators."""
-    modal_task.stop_current_job()
+    """Stop the current job and the live view, and unregister the tools and the operators."""
+    modal_job.stop_current_job()
     session.stop()
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb_sculpt)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)

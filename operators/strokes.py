@@ -6,10 +6,9 @@ from collections.abc import Iterable
 
 import bpy
 
-from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes_task
+from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes
 from ..rosy_addon.errors import counted
 from ..rosy_addon.line_drawing.polyline_files import DRAWING_SUFFIXES
-from ..rosy_addon.progress import Task
 from ..rosy_addon.scene.cameras import CameraSource, render_camera
 from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.scene.stroke_objects import (
@@ -19,13 +18,14 @@ from ..rosy_addon.scene.stroke_objects import (
     target_objects,
 )
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
+from ..rosy_addon.worker.job import Steps
 from .bake import view_camera
-from .modal_task import DialogTaskMixin
+from .modal_job import DialogJobMixin
 from .poll import poll_has_field, poll_idle, sync_suffix
 from .reports import report_warnings
 
 
-class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
+class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
     """Draw evenly spaced strokes along the fields of the meshes, as seen from the camera"""
 
     bl_idname = "rosy.strokes"
@@ -99,9 +99,9 @@ class ROSY_OT_strokes(DialogTaskMixin, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         """Show no settings in the file browser: those of the panel apply."""
 
-    def make_task(self, context: bpy.types.Context) -> Task[StrokeResult]:
+    def begin(self, context: bpy.types.Context) -> Steps[StrokeResult]:
         is_set = self.properties.is_property_set
-        return draw_strokes_task(
+        return draw_strokes.begin(
             context.scene,
             kind=self._kind(context),
             collection=context.collection,

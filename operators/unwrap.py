@@ -1,4 +1,4 @@
-"""Unwrapping of meshes with Blender's Smart UV Project, for tasks that need a UV map."""
+"""Unwrapping of meshes with Blender's Smart UV Project, for jobs that need a UV map."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 
 from ..rosy_addon.errors import RosyError
-from ..rosy_addon.progress import Progress, Task
 from ..rosy_addon.scene.compat import is_editable
+from ..rosy_addon.worker.job import Step, Steps
 
 #: Angle between the faces of a chart, and distance between charts as a fraction of the map.
 ANGLE, MARGIN = math.radians(66), 0.003
@@ -21,18 +21,18 @@ ANGLE, MARGIN = math.radians(66), 0.003
 UV_MAP_NAME = "UVMap"
 
 
-def unwrapping_task(
-    context: bpy.types.Context, objects: Sequence[bpy.types.Object], task: Task[Any]
-) -> Task[Any]:
-    """Add a UV map to the meshes of objects, and return a task that removes them if `task` is not finished.
+def unwrapped(
+    context: bpy.types.Context, objects: Sequence[bpy.types.Object], steps: Steps[Any]
+) -> Steps[Any]:
+    """Add a UV map to the meshes of objects for a job, which removes them if it is not finished.
 
     Parameters
     ----------
     context : bpy.types.Context
     objects : sequence of bpy.types.Object
         Meshes without a UV map.
-    task : Task
-        Work that needs the UV maps.
+    steps : Steps
+        Of the job that needs the UV maps.
 
     Raises
     ------
@@ -55,16 +55,16 @@ def unwrapping_task(
         layer.data.foreach_set("uv", uv)
         # Blender adds a number if the mesh has another attribute of this name.
         map_names[mesh] = layer.name
-    with_cleanup = _removing_maps_task(map_names, task)
+    with_cleanup = _with_removal(map_names, steps)
     next(with_cleanup)  # from here on, it removes the maps also if it is closed
     return with_cleanup
 
 
-def _removing_maps_task(map_names: Mapping[bpy.types.Mesh, str], task: Task[Any]) -> Task[Any]:
-    """Run a task. If it is not finished, the UV maps of `unwrapping_task` are removed from meshes."""
+def _with_removal(map_names: Mapping[bpy.types.Mesh, str], steps: Steps[Any]) -> Steps[Any]:
+    """Run the steps of a job. If it is not finished, the UV maps are removed from the meshes."""
     try:
-        yield Progress(0.0, "unwrapping")
-        return (yield from task)
+        yield Step(0.0, "unwrapping")
+        return (yield from steps)
     except BaseException:
         for mesh, name in map_names.items():
             if (layer := mesh.uv_layers.get(name)) is not None:

@@ -25,16 +25,14 @@ from .cache import Cache, content_hash
 from .compositor.look import Look, has_flow
 from .errors import RosyError
 from .file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
-from .gpu.select import select_renderer
-from .progress import Progress, Task, as_task, run_to_completion, subtask
+from .gpu.image_steps import image_steps
+from .gpu.select import select_device
 from .projection.camera import Camera
-from .rendering.band_workers import BandWorkers
-from .rendering.renderer import Renderer
 from .rendering.singularities import sequence_key
 from .rendering.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
-from .scene.blender_images import compute_image_data, frame_path, write_frame
+from .scene.blender_images import frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
 from .scene.file_names import picture_stem
 from .scene.keys import update_keys
@@ -49,6 +47,7 @@ from .scene.pictures import (
 )
 from .scene.read_view import nonfinite_policy, read_views, scene_depsgraph
 from .scene.scene_reader import SceneData, field_objects, temp_attributes
+from .worker.job import Call, Step, Steps, job, part
 
 #: Suffix of a sidecar file, after the name of the picture.
 SIDECAR_SUFFIX = ".rosy.txt"
@@ -79,7 +78,8 @@ class SequenceResult:
     warnings: tuple[str, ...] = ()
 
 
-def bake_animation_task(
+@job
+def bake_animation(
     scene: bpy.types.Scene,
     frames: Sequence[int],
     *,
@@ -90,7 +90,7 @@ def bake_animation_task(
     settings: OutputSettings | None = None,
     show: bool = True,
     workers: int = 0,
-) -> Task[list[SequenceResult]]:
+) -> Steps[list[SequenceResult]]:
     """Draw the fields of a scene at a range of frames, and apply the image sequences.
 
     Parameters
@@ -110,8 +110,8 @@ def bake_animation_task(
 
     Yields
     ------
-    Progress
-        The label includes the remaining time.
+    Call or Step
+        The label names the frame and the remaining time.
 
     Raises
     ------
@@ -130,9 +130,8 @@ def bake_animation_task(
     start_time, rendered_count = time.monotonic(), 0
     scene_data = None
     warnings: dict[str, None] = {}
-    # `_frame_task` evicts the entries that a frame has not used.
+    # What was read; `_frame_steps` evicts what a frame has not used.
     exit_stack, cache = ExitStack(), Cache()
-    pool = exit_stack.enter_context(BandWorkers(workers))
     try:
         depsgraph = scene_depsgraph(scene)
         targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
@@ -150,13 +149,13 @@ def bake_animation_task(
         for index, frame in enumerate(frames):
             start, stop = index / len(frames), (index + 1) / len(frames)
             label = f"frame {frame}{_time_left(start_time, rendered_count, len(frames) - index)}"
-            yield Progress(start, label)
+            yield Step(start, label)
             scene.frame_set(frame)
             try:
-                task = _frame_task(
-                    scene, frame, cameras, objects, look, size, settings, cache, pool
+                steps = _frame_steps(
+                    scene, frame, cameras, objects, look, size, settings, cache, workers
                 )
-                scene_data, results = yield from subtask(task, start, stop, label)
+                scene_data, results = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
             warnings |= dict.fromkeys(scene_data.warnings)
@@ -169,8 +168,7 @@ def bake_animation_task(
         key = PictureKey()
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
-            task = as_task(sequence_key, scene_data.instances, last_look, cache)
-            key = yield from subtask(task, 1.0, 1.0)
+            key = yield Call(sequence_key, (scene_data.instances, last_look), 1.0)
         sequence_results = []
         for index, (name, results) in enumerate(frame_results.items()):
             path = _path_of_frame(settings, name, cameras, frames[0])
@@ -197,18 +195,10 @@ def bake_animation_task(
         return sequence_results
     finally:
         exit_stack.close()
-        cache.clear()  # it holds renderers, which refer to the cache
         # `frame_set` takes no negative subframes, which frames before 0 have.
         whole_frame = math.floor(original_frame)
         scene.frame_set(whole_frame, subframe=original_frame - whole_frame)
         scene.camera = original_camera  # markers may have changed it
-
-
-def bake_animation(
-    scene: bpy.types.Scene, frames: Sequence[int], **options
-) -> list[SequenceResult]:
-    """Run `bake_animation_task` to its end."""
-    return run_to_completion(bake_animation_task(scene, frames, **options))
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +225,7 @@ class _FrameResult:
     device: str
 
 
-def _frame_task(
+def _frame_steps(
     scene: bpy.types.Scene,
     frame: int,
     cameras: Sequence[CameraSource] | None,
@@ -244,22 +234,15 @@ def _frame_task(
     size: tuple[int, int] | None,
     settings: OutputSettings,
     cache: Cache,
-    pool: BandWorkers,
-) -> Task[tuple[SceneData, list[_FrameResult]]]:
+    workers: int,
+) -> Steps[tuple[SceneData, list[_FrameResult]]]:
     """Draw one frame from all cameras."""
     look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)
-    # The look may be animated, and its method decides which renderer can draw it.
-    renderer = cache.get_or_create(
-        ("renderer", settings.device, look.method, has_flow(look)),
-        # Frames in which only the streaks move share their G-buffer.
-        lambda: select_renderer(
-            settings.device, look, cache, keep_gbuffers=has_flow(look), workers=pool
-        ),
-    )
+    # The look may be animated, and its method decides which device can draw it.
+    device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
-    reading = as_task(
-        read_views,
+    scene_views = read_views(
         scene,
         depsgraph,
         sources,
@@ -269,7 +252,7 @@ def _frame_task(
         reference_camera=frame_camera(scene, frame) if look.tone == "picture" else None,
         cache=cache,
     )
-    scene_views = yield from subtask(reading, 0.0, 0.0)
+    cache.evict_unused()
     states = read_picture_states(scene, depsgraph, sources, is_frame=True)
     results = []
     for index, view in enumerate(scene_views.views):
@@ -277,7 +260,7 @@ def _frame_task(
         name = scene.name if cameras is None else view.camera.name
         path = _path_of_frame(settings, name, cameras, frame)
         sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
-        input_hash = _input_hash(view, renderer, settings)
+        input_hash = _input_hash(view, device, settings)
         up_to_date = (
             path.is_file()
             and sidecar.is_file()
@@ -286,16 +269,15 @@ def _frame_task(
         if not up_to_date:
             if sidecar.exists():
                 check_writable(sidecar)
-            picture = yield from subtask(renderer.render_task(view), start, stop)
-            image_task = as_task(compute_image_data, picture, as_float=settings.as_float)
-            image_data = yield from subtask(image_task, stop, stop)
+            # Frames in which only the streaks move share their G-buffer.
+            steps = image_steps(
+                view, device, settings.as_float, keep_gbuffers=has_flow(look), workers=workers
+            )
+            _, image_data = yield from part(steps, start, stop)
             sidecar.unlink(missing_ok=True)
             write_frame(path, image_data)
             write_bytes(sidecar, _sidecar_text(input_hash, path))
-        results.append(
-            _FrameResult(name, frame, view.camera, up_to_date, states[index], renderer.device_name)
-        )
-    cache.evict_unused()
+        results.append(_FrameResult(name, frame, view.camera, up_to_date, states[index], device))
     return scene_views.scene_data, results
 
 
@@ -313,7 +295,7 @@ def _sidecar_text(input_hash: bytes, path: Path) -> bytes:
     return f"{SIDECAR_HEADER}\n{input_hash.hex()}\n{picture_hash.hex()}\n".encode()
 
 
-def _input_hash(view: ViewInput, renderer: Renderer, settings: OutputSettings) -> bytes:
+def _input_hash(view: ViewInput, device: str, settings: OutputSettings) -> bytes:
     """Return a digest of everything that a picture is drawn from."""
     camera, reference = view.camera, view.reference
     parts: list = [
@@ -324,7 +306,7 @@ def _input_hash(view: ViewInput, renderer: Renderer, settings: OutputSettings) -
         camera.height,
         settings.as_float,
     ]
-    if renderer.device_name == "gpu":
+    if device == "gpu":
         parts.append("by the graphics card")
     if view.look.light == "scene":
         for light in view.lights:

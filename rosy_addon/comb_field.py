@@ -8,22 +8,22 @@ import bpy
 import numpy as np
 
 from .cache import BAKE_CACHE
-from .field.combing import Combing, start_combing
+from .field.combing import Combing, settle, start_combing
 from .field.guide_brush import BrushStroke, GuideBrush
-from .field.guided_system import GuidedSystem, guided_system
+from .field.guided_system import guided_system
 from .field.rosy_field import RosyField
 from .field.surface import Surface
-from .progress import Progress, Task, as_task, subtask
 from .scene.brush_surface import closest_faces
 from .scene.combed_guides import check_guides_storable, read_combed_guides, store_combed_guides
 from .scene.field_attributes import is_face_vector_field
 from .scene.meshes import mesh_surface
 from .scene.read_field import read_mesh_field
 from .scene.write_field import assign_fields, check_writable, overwrite_vectors
+from .worker.job import Call, Steps
 
 
 class CombStroke:
-    """A stroke that is being drawn; made by `comb_stroke_task`.
+    """A stroke that is being drawn; made by `start_stroke`.
 
     Attributes
     ----------
@@ -71,9 +71,9 @@ class CombStroke:
         if self._vectors_before is None:
             self._vectors_before = before
 
-    def settle_task(self) -> Task[None]:
+    def settle(self) -> Steps[None]:
         """Solve for the whole field."""
-        return as_task(self._combing.settle)
+        self._combing.representations = yield Call(settle, (self._combing,))
 
     def store(self) -> RosyField:
         """Store the field and its guides. Return the field."""
@@ -88,7 +88,7 @@ class CombStroke:
             overwrite_vectors(self.mesh, self._vectors_before)
 
 
-def comb_stroke_task(mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> Task[CombStroke]:
+def start_stroke(mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> CombStroke:
     """Prepare a stroke.
 
     Parameters
@@ -106,17 +106,12 @@ def comb_stroke_task(mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> T
     """
     check_writable(mesh)
     check_guides_storable(mesh)
-    surface = yield from subtask(as_task(mesh_surface, mesh, cache=BAKE_CACHE), 0.0, 0.3)
-    yield Progress(0.3, "reading the field")
+    surface = mesh_surface(mesh, cache=BAKE_CACHE)
     field = read_mesh_field(mesh, surface=surface, cache=BAKE_CACHE)
     degree = field.degree
-
-    def create_task() -> Task[GuidedSystem]:
-        return as_task(guided_system, surface, degree)
-
-    key = "guided system", surface, degree
-    system = yield from subtask(BAKE_CACHE.get_or_create_task(key, create_task), 0.3, 0.9)
-    yield Progress(0.9, "reading the guides")
+    system = BAKE_CACHE.get_or_create(
+        ("guided system", surface, degree), lambda: guided_system(surface, degree)
+    )
     guides = read_combed_guides(mesh, surface)
     combing = start_combing(system, field, guides, reach * surface.extent)
     locate = closest_faces(mesh, surface, BAKE_CACHE)

@@ -12,19 +12,18 @@ from .cache import BAKE_CACHE
 from .compositor.shading import lights_of
 from .errors import RosyError
 from .file_io import check_writable, write_bytes
-from .line_drawing.pipeline import StrokeDrawing, draw_instances, stroke_geometry
-from .line_drawing.polyline_files import check_drawing_suffix, polyline_file
+from .line_drawing.drawing_outputs import drawing_curves, drawing_file
+from .line_drawing.pipeline import StrokeDrawing
+from .line_drawing.polyline_files import check_drawing_suffix
 from .line_drawing.style import StrokeStyle
-from .line_drawing.svg import Pen, svg_text
-from .progress import Progress, Task, as_task, run_to_completion, subtask
-from .projection.camera import Camera
+from .line_drawing.svg import Pen
 from .projection.gbuffer import MeshInstance
-from .projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
 from .scene.read_view import nonfinite_policy, scene_depsgraph
-from .scene.scene_reader import SceneData, compute_read_scene
+from .scene.scene_reader import SceneData, read_scene
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
+from .worker.job import Call, Step, Steps, job
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,8 @@ class StrokeResult:
     notes: tuple[str, ...] = ()
 
 
-def draw_strokes_task(
+@job
+def draw_strokes(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph | None = None,
     *,
@@ -63,10 +63,10 @@ def draw_strokes_task(
     style: StrokeStyle | None = None,
     pen: Pen | None = None,
     size: tuple[int, int] | None = None,
-) -> Task[StrokeResult]:
+) -> Steps[StrokeResult]:
     """Cover the objects of a scene with strokes along their fields.
 
-    The scene is changed in the last step. Closing the generator earlier leaves it unchanged.
+    The scene is changed when all are drawn. A job that is cancelled leaves it unchanged.
 
     Parameters
     ----------
@@ -92,10 +92,6 @@ def draw_strokes_task(
     size : (int, int), optional
         Resolution of the picture that lengths in pixels refer to. By default that of renders.
 
-    Yields
-    ------
-    Progress
-
     Returns
     -------
     StrokeResult
@@ -103,7 +99,7 @@ def draw_strokes_task(
     Raises
     ------
     RosyError
-        If there is nothing to draw, or it cannot be drawn; see `compute_read_scene`, `resolve_camera` and
+        If there is nothing to draw, or it cannot be drawn; see `read_scene`, `resolve_camera` and
         `draw_instances`. Also if the file cannot be written.
     """
     settings = scene.rosy.strokes
@@ -114,39 +110,26 @@ def draw_strokes_task(
     if kind == "FILE":
         path = drawing_path(settings.filepath if path is None else path)
         suffix = check_drawing_suffix(path)
-    yield Progress(0.0, "reading the scene")
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
-    reading = as_task(compute_read_scene, depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
-    scene_data = yield from subtask(reading, 0.0, 0.05)
+    scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
+    BAKE_CACHE.evict_over_limit()
     followed = None
     if kind == "CURVES" and settings.follow:
         followed = _followed_instance(scene_data)
     lights = lights_of(style, read_lights(depsgraph, view.view))
-    work = as_task(
-        draw_instances,
-        scene_data.instances,
-        view,
-        style,
-        lights=lights,
-        clip_to_frame=suffix == ".svg",
-        cache=BAKE_CACHE,
-    )
-    drawing = yield from subtask(work, 0.05, 0.95)
-    BAKE_CACHE.evict_over_limit()
-    label = "storing the strokes"
+    inputs = scene_data.instances, view, style, pen, lights
     if kind == "FILE":
-        task = _file_task(suffix, drawing, view, pen)
-        write_bytes(path, (yield from subtask(task, 0.95, 1.0, label)))
+        drawing, contents = yield Call(drawing_file, (suffix, *inputs))
+        write_bytes(path, contents)
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
-    task = as_task(stroke_geometry, drawing, view, pen, followed)
-    geometry = yield from subtask(task, 0.95, 0.97, label)
-    yield Progress(0.97, label)
+    drawing, curves = yield Call(drawing_curves, (*inputs, followed), 0.0, 0.97)
+    yield Step(0.97, "storing the strokes")
     obj = store_strokes(
         scene,
         kind,
-        geometry,
+        curves,
         view.name,
         _parent_object(scene_data),
         collection,
@@ -154,23 +137,6 @@ def draw_strokes_task(
     )
     return StrokeResult(
         view.name, drawing, obj, notes=(*scene_data.warnings, *_notes(scene, obj, style))
-    )
-
-
-def draw_strokes(
-    scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None, **options
-) -> StrokeResult:
-    """Run `draw_strokes_task` to its end."""
-    return run_to_completion(draw_strokes_task(scene, depsgraph, **options))
-
-
-def _file_task(suffix: str, drawing: StrokeDrawing, view: Camera, pen: Pen) -> Task[bytes]:
-    """Return the contents of a file of strokes."""
-    if suffix == ".svg":
-        return (yield from as_task(svg_text, drawing.strokes, view, pen, drawing.marks)).encode()
-    up = UP_AXIS_BY_SUFFIX.get(suffix, "z")
-    return (
-        yield from as_task(polyline_file, suffix, drawing.strokes, view, pen, UP_AXIS_MATRIX[up].T)
     )
 
 

@@ -7,10 +7,10 @@ context variable, so no function passes it on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from contextvars import ContextVar
 from types import TracebackType
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 #: Is told a fraction from 0 to 1, and what is being done. An exception that it raises ends the work.
 Listener = Callable[[float, str], None]
@@ -125,52 +125,3 @@ def current_report() -> Listener:
             report(fraction, label)
 
     return report_there
-
-
-# Tasks of the rooms that are not plain functions yet.
-
-
-class Progress(NamedTuple):
-    """How far a task has come."""
-
-    fraction: float
-    label: str
-
-
-Result = TypeVar("Result")
-
-#: A generator that yields `Progress` and returns a `Result`. Closing it cancels the task.
-Task = Generator[Progress, None, Result]
-
-
-def run_to_completion(task: Task[Result]) -> Result:
-    """Run a task to its end and return its result."""
-    while True:
-        try:
-            next(task)
-        except StopIteration as end:
-            return end.value
-
-
-def as_task(function: Callable[..., Result], *args: Any, **kwargs: Any) -> Task[Result]:
-    """Return a task of one step that calls a function."""
-    yield Progress(0.0, "working")
-    return function(*args, **kwargs)
-
-
-def run_with_report(task: Task[Result], report: Any = None) -> Result:
-    """Run a task to its end and return its result."""
-    return run_to_completion(task)
-
-
-def subtask(
-    task: Task[Result], start: float, stop: float, label: str | None = None
-) -> Task[Result]:
-    """Run a task as one part of a longer task."""
-    while True:
-        try:
-            progress = next(task)
-        except StopIteration as end:
-            return end.value
-        fraction = start + (stop - start) * progress.fraction
-        yield Progress(fraction, progress.label if label is None else label)

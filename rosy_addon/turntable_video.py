@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +18,12 @@ from .compositor.shading import Light
 from .errors import RosyError
 from .file_io import write_bytes
 from .image_io.gif import gif_bytes
-from .image_io.png import write_png
+from .image_io.png import png_bytes
 from .memory import check_memory
 from .progress import progress, report
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
+from .rendering.draw import bake_picture
 from .rendering.view_input import ViewInput
 
 #: Suffixes of videos that can be written.
@@ -188,11 +190,7 @@ class VideoWriter:
             If they need more than `available_memory`.
         """
         if self._is_gif:
-            check_memory(
-                GIF_BYTES * count * width * height,
-                f"a .gif of {count} pictures of {width} x {height} pixels",
-                "choose a smaller size or fewer pictures, or write an .mp4",
-            )
+            check_gif_memory(count, width, height)
 
     def add(self, rgba: np.ndarray) -> None:
         """Add a picture.
@@ -204,13 +202,12 @@ class VideoWriter:
             last row or column of an odd one is cut off.
         """
         if self._is_gif:
-            self._gif_frames.append(_gif_frame(rgba))
+            self._gif_frames.append(gif_frame(rgba))
             return
-        rgba = rgba[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2]
-        opaque = np.ones_like(rgba)
-        opaque[..., :3] = _over_white(rgba)
-        write_png(Path(self._temp_folder.name) / f"{self._count:05d}.png", opaque)
-        self._count, self._size = self._count + 1, (rgba.shape[1], rgba.shape[0])
+        path = Path(self._temp_folder.name) / f"{self._count:05d}.png"
+        write_bytes(path, png_frame(rgba))
+        self._size = rgba.shape[1] // 2 * 2, rgba.shape[0] // 2 * 2
+        self._count += 1
 
     def write(self) -> None:
         """Write the video.
@@ -230,6 +227,21 @@ class VideoWriter:
         write_bytes(self._path, video_path.read_bytes())
 
 
+def check_gif_memory(count: int, width: int, height: int) -> None:
+    """Raise a `RosyError` if a .gif of a number of pictures needs more than `available_memory`."""
+    check_memory(
+        GIF_BYTES * count * width * height,
+        f"a .gif of {count} pictures of {width} x {height} pixels",
+        "choose a smaller size or fewer pictures, or write an .mp4",
+    )
+
+
+def draw_frame(view: ViewInput, is_gif: bool, keep_gbuffers: bool, workers: int) -> Any:
+    """Draw a picture as `bake_picture`, and return its `gif_frame` or its `png_frame`."""
+    picture = bake_picture(view, keep_gbuffers, workers)
+    return gif_frame(picture.rgba) if is_gif else png_frame(picture.rgba)
+
+
 def check_video_path(path: Path) -> None:
     """Check that a video can be written under a file name.
 
@@ -247,7 +259,15 @@ def _over_white(rgba: np.ndarray) -> np.ndarray:
     return 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
 
 
-def _gif_frame(rgba: np.ndarray) -> np.ndarray:
+def png_frame(rgba: np.ndarray) -> bytes:
+    """Return a picture on white paper as a PNG file, without the last row or column of an odd side."""
+    rgba = rgba[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2]
+    opaque = np.ones_like(rgba)
+    opaque[..., :3] = _over_white(rgba)
+    return png_bytes(opaque)
+
+
+def gif_frame(rgba: np.ndarray) -> np.ndarray:
     """Return a picture on white paper as (H, W, 3) uint8, with the top row first."""
     return np.rint(to_display(_over_white(rgba)[::-1]) * 255).astype(np.uint8)
 

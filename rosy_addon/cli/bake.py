@@ -12,6 +12,7 @@ from ..errors import RosyError, counted
 from ..file_io import check_folder
 from ..frame_workers import parse_frames
 from ..gpu.select import RENDER_DEVICES
+from ..progress import listening
 from .bake_workers import run_workers, uses_workers
 from .extras import Extras
 from .look import add_flow_option, add_look_options, requested_look
@@ -132,7 +133,7 @@ def _check_bake_options(options: argparse.Namespace) -> None:
 def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> None:
     """Draw the frames in this process, and print what was written."""
 
-    from ..animation import bake_animation_task
+    from ..animation import bake_animation
     from ..scene.blend_files import save_blend
     from ..scene.look_properties import read_look
 
@@ -141,18 +142,18 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
         # The workers have drawn all frames. The first and the last set the range of the materials.
         frames = sorted({frames[0], frames[-1]})
     has_look_options = bool(options.preset or options.set)
-    task = bake_animation_task(
-        scene,
-        frames,
-        objects=requested_objects(options),
-        cameras=requested_cameras(scene, options),
-        look=requested_look(options, read_look(scene.rosy)) if has_look_options else None,
-        size=options.size,
-        settings=settings,
-        workers=options.workers,
-        show=options.save,
-    )
-    results = _run_with_log(task)
+    with listening(_FrameLog()):
+        results = bake_animation(
+            scene,
+            frames,
+            objects=requested_objects(options),
+            cameras=requested_cameras(scene, options),
+            look=requested_look(options, read_look(scene.rosy)) if has_look_options else None,
+            size=options.size,
+            settings=settings,
+            workers=options.workers,
+            show=options.save,
+        )
     print_warnings(warning for result in results for warning in result.warnings)
     for result in results:
         if result.skipped:
@@ -162,14 +163,13 @@ def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> N
         print_line(save_blend())
 
 
-def _run_with_log(task: Any) -> Any:
-    """Run a task to its end and return its result. Print a line for each frame."""
-    last_label = ""
-    while True:
-        try:
-            progress = next(task)
-        except StopIteration as done:
-            return done.value
-        if progress.label != last_label and progress.label.startswith("frame "):
-            last_label = progress.label
-            print_line(f"{progress.label} ({100 * progress.fraction:.0f} %)")
+class _FrameLog:
+    """Prints a line for each frame of an animation when it begins."""
+
+    def __init__(self) -> None:
+        self._last_label = ""
+
+    def __call__(self, fraction: float, label: str) -> None:
+        if label != self._last_label and label.startswith("frame "):
+            self._last_label = label
+            print_line(f"{label} ({100 * fraction:.0f} %)")

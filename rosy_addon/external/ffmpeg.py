@@ -6,8 +6,8 @@ import shutil
 from pathlib import Path
 
 from ..errors import RosyError
-from ..processes import run_process
 from ..turntable_video import Encoder
+from ..worker.program import run_program
 
 
 def find_encoder() -> Encoder | None:
@@ -32,7 +32,7 @@ def find_encoder() -> Encoder | None:
             program, "-v", "error", "-y", "-framerate", f"{fps:g}", "-i", f"{folder}/%05d.png",
             "-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p", str(path),
         ]  # fmt: skip
-        status, output = run_process(command, "encoding the video")
+        status, output = run_program(command, "encoding the video")
         if status:
             message = (output.strip().splitlines() or ["it failed"])[-1]
             raise RosyError(f"ffmpeg: {message}")

@@ -29,8 +29,8 @@ from typing import Any, BinaryIO, TextIO
 from ..cli.bake_workers import uses_workers
 from ..cli.presets import user_presets_folder
 from ..errors import RosyError
-from ..processes import run_process
 from ..turntable_video import Encoder
+from ..worker.program import run_program
 from ..worker.start import guarded
 
 #: The oldest version of Blender that RoSy runs in.
@@ -426,7 +426,7 @@ def blender_encoder(requested: str | None) -> Encoder | None:
         """Encode the pictures of a folder. See `Encoder`."""
         command = [program, *BLENDER_OPTIONS, "--python", str(script), "--"]
         command += map(str, (folder, count, *size, repr(fps), path))
-        status, output = run_process(command, "encoding the video")
+        status, output = run_program(command, "encoding the video")
         if status or not path.is_file():
             message = (output.strip().splitlines() or ["it failed"])[-1]
             raise RosyError(f"{path}: {program} cannot encode a video: {message}")

@@ -58,6 +58,15 @@ class Combing:
         """(F, 3) float64: member vectors of the guides, whose lengths are their firmness."""
         return from_representation(self.guides, self.system.x, self.system.y, self.system.degree)
 
+    @property
+    def representations(self) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) complex128 at the nodes and (F,) complex128 on the faces: the state that is solved for."""
+        return self._z, self._face_z
+
+    @representations.setter
+    def representations(self, representations: tuple[np.ndarray, np.ndarray]) -> None:
+        self._z, self._face_z = representations
+
     def follow(self, face: np.ndarray) -> None:
         """Let the field follow changed guides on (m,) faces, near them."""
         if not len(face):
@@ -106,6 +115,12 @@ class Combing:
         is_exact = np.abs(guides) >= EXACT_FIRMNESS
         z[is_exact] = guides[is_exact] / np.abs(guides[is_exact])
         self._face_z[face] = z
+
+
+def settle(combing: Combing) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the whole system, and return `Combing.representations`."""
+    combing.settle()
+    return combing.representations
 
 
 def start_combing(

@@ -253,6 +253,43 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     load_field : The formats.
     """
     path = Path(path)
+    _check_storable(path, field)
+    check_writable(path)
+    report(0.0, "writing the file")
+    with progress(0.0, 0.4):
+        blocks = _contents(path.suffix.lower(), field, surface)
+    with progress(0.4, 1.0):
+        write_blocks(path, blocks, _step_count(path, surface))
+
+
+def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
+    """Return the contents of the file that `write_field` writes.
+
+    Raises
+    ------
+    RosyError
+        As `write_field`, but nothing is written.
+    """
+    path = Path(path)
+    _check_storable(path, field)
+    report(0.0, "writing the file")
+    with progress(0.0, 0.4):
+        blocks = _contents(path.suffix.lower(), field, surface)
+    step_count, contents = _step_count(path, surface), bytearray()
+    for index, block in enumerate(blocks):
+        report(0.4 + 0.6 * min(index / step_count, 1.0), "writing the file")
+        contents += block
+    return bytes(contents)
+
+
+def _step_count(path: Path, surface: Surface) -> float:
+    """Return about how many blocks the file of a field has."""
+    vertex_rows = 3 * len(surface.vertices) if path.suffix.lower() == ".obj" else 0
+    return 1 + (surface.face_count + vertex_rows) / ROWS_PER_BLOCK
+
+
+def _check_storable(path: Path, field: RosyField) -> None:
+    """Raise an error if the format of a file cannot store a field."""
     suffix = path.suffix.lower()
     if suffix not in WRITE_SUFFIXES:
         raise RosyError(
@@ -263,12 +300,6 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
             f"{path}: a {suffix} file stores one member per row, but the directions of this field "
             "do not form a RoSy: write a .rawfield, .txt or .npy file"
         )
-    check_writable(path)
-    with progress(0.0, 0.4):
-        blocks = _contents(suffix, field, surface)
-    row_count = surface.face_count + (3 * len(surface.vertices) if suffix == ".obj" else 0)
-    with progress(0.4, 1.0):
-        write_blocks(path, blocks, 1 + row_count / ROWS_PER_BLOCK)
 
 
 def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes]:

@@ -5,88 +5,12 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import bpy
-import numpy as np
 
-from ..color import to_linear
-from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_writable, make_folder, replacing, write_bytes
-from ..image_io.png import png_bytes
-from ..progress import progress, report
-
-#: Pixels by which colors are extended past the border of the covered area. A render whose
-#: silhouette differs slightly (other subdivision, filtering) then still samples the picture.
-BLEED_PIXELS = 4
-
-#: Rows that are converted at once.
-BLOCK_ROWS = 64
-
-#: Label of all steps.
-STEP_LABEL = "converting the picture"
-
-#: Shown where there is no picture: the linear value of mid gray on screen.
-NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
-
-
-class ImageData(NamedTuple):
-    """A picture as a Blender image stores it.
-
-    Attributes
-    ----------
-    pixels : (H, W, 4) float32 ndarray
-        Linear, with bleed; see `with_bleed`. Thresholds of ink with their spread, if the picture has them.
-    png : bytes or None
-        The file of an 8-bit image, None for an image in single precision.
-    """
-
-    pixels: np.ndarray
-    png: bytes | None = None
-
-
-def compute_image_data(picture: Picture, *, as_float: bool) -> ImageData:
-    """Convert a picture for a Blender image.
-
-    Parameters
-    ----------
-    picture : Picture
-    as_float : bool
-        Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
-
-    Returns
-    -------
-    ImageData
-    """
-    with progress(0.0, 0.5):
-        pixels = _bleed(picture.rgba)
-    if picture.spread is not None:
-        spread = picture.rgba.copy()
-        spread[..., 0] = picture.spread
-        with progress(0.5):
-            spread = _bleed(spread)
-        # Where nothing was drawn, the ink is a mean tone.
-        is_blank = spread[..., 3] == 0
-        is_blank &= (pixels[..., :3] == NEUTRAL_GRAY).all(axis=2)
-        pixels[..., 3] = spread[..., 0]
-        pixels[is_blank] = (0.5, 0.5, 0.5, 1 / 3)
-    if as_float:
-        return ImageData(pixels)
-    with progress(0.5, 1.0, STEP_LABEL):
-        return ImageData(pixels, png_bytes(pixels, is_color=picture.spread is None))
-
-
-def _bleed(rgba: np.ndarray) -> np.ndarray:
-    """Return `with_bleed` of a picture, a few rows at a time."""
-    height = len(rgba)
-    pixels = np.empty(rgba.shape, dtype=np.float32)
-    for start in range(0, height, BLOCK_ROWS):
-        report(start / height, STEP_LABEL)
-        first = max(start - BLEED_PIXELS, 0)
-        block = with_bleed(rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
-        pixels[start : start + BLOCK_ROWS] = block[start - first :][:BLOCK_ROWS]
-    return pixels
+from ..image_io.image_data import ImageData
 
 
 def new_image(
@@ -104,7 +28,7 @@ def new_image(
     name : str
         Name of the datablock.
     image_data : ImageData
-        From `compute_image_data`, with the same parameters.
+        With a PNG file for 8 bits, with pixels for single precision.
     as_float : bool
         Whether linear values are stored in single precision.
     is_color : bool
@@ -117,8 +41,9 @@ def new_image(
     RosyError
         If the file cannot be written. The image is deleted in this case.
     """
-    height, width = image_data.pixels.shape[:2]
-    image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=as_float)
+    image = bpy.data.images.new(
+        name, image_data.width, image_data.height, alpha=True, float_buffer=as_float
+    )
     try:
         image.alpha_mode = "CHANNEL_PACKED"
         image.colorspace_settings.name = "sRGB" if is_color and not as_float else "Non-Color"
@@ -204,49 +129,6 @@ def _load_tiles(
     return image
 
 
-def with_bleed(rgba: np.ndarray) -> np.ndarray:
-    """Return a picture whose border colors are extended by `BLEED_PIXELS` pixels.
-
-    Pixels farther outside are `NEUTRAL_GRAY`. Alpha is not changed: it is the coverage.
-
-    Parameters
-    ----------
-    rgba : (H, W, 4) float32 ndarray
-        Linear.
-
-    Returns
-    -------
-    (H, W, 4) float32 ndarray
-    """
-    # Pad by one pixel, so that every pixel of the picture has eight neighbors.
-    padded = np.pad(rgba, ((1, 1), (1, 1), (0, 0)))
-    height, width = padded.shape[:2]
-    is_filled = padded[..., 3].ravel() > 0
-    pixels = padded.reshape(-1, 4)
-    pixels[~is_filled, :3] = NEUTRAL_GRAY
-    is_inside = np.zeros((height, width), dtype=bool)
-    is_inside[1:-1, 1:-1] = True
-    neighbor_offsets = [
-        row * width + column for row in (1, 0, -1) for column in (1, 0, -1) if row or column
-    ]
-    frontier = np.flatnonzero(is_filled)
-    for _ in range(BLEED_PIXELS):
-        is_adjacent = np.zeros_like(is_filled)
-        for offset in neighbor_offsets:
-            is_adjacent[frontier + offset] = True
-        targets = np.flatnonzero(is_adjacent & ~is_filled & is_inside.ravel())
-        total = np.zeros((len(targets), 3), dtype=np.float32)
-        count = np.zeros((len(targets), 1), dtype=np.float32)
-        for offset in neighbor_offsets:
-            neighbor_filled = is_filled[targets + offset, None]
-            total += pixels[targets + offset, :3] * neighbor_filled
-            count += neighbor_filled
-        pixels[targets, :3] = total / count
-        is_filled[targets] = True
-        frontier = targets
-    return padded[1:-1, 1:-1].copy()
-
-
 def frame_path(stem: Path, frame: int, as_float: bool) -> Path:
     """Return the path of one frame of an image sequence, numbered as Blender expects it."""
     return stem.with_name(f"{stem.name}_{frame:04d}{'.exr' if as_float else '.png'}")
@@ -272,8 +154,9 @@ def write_frame(path: Path, image_data: ImageData) -> None:
     if image_data.png is not None:
         write_bytes(path, image_data.png)
         return
-    height, width = image_data.pixels.shape[:2]
-    image = bpy.data.images.new(path.stem, width, height, alpha=True, float_buffer=True)
+    image = bpy.data.images.new(
+        path.stem, image_data.width, image_data.height, alpha=True, float_buffer=True
+    )
     # Blender takes the output format from a scene. A temporary one leaves the user's unchanged.
     scene = bpy.data.scenes.new(path.stem)
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import bpy
@@ -18,8 +17,8 @@ from ..field.validate import (
     project_to_tangent,
     tangent_normals,
 )
-from ..progress import report, run_to_completion
-from .field_attributes import VECTOR_TYPE, field_values, surface_key
+from ..progress import report
+from .field_attributes import VECTOR_TYPE, cached_field, field_values
 from .meshes import read_attribute
 from .rest_shape import follow_mesh, read_rest_shape
 
@@ -88,22 +87,7 @@ def read_evaluated_field(
     label: str,
     cache: Cache | None = None,
 ) -> RosyField:
-    """Run the task of `evaluated_field_reader` to its end."""
-    build_task = evaluated_field_reader(mesh, layout, nonfinite, label, cache)
-    return run_to_completion(build_task(surface))
-
-
-def evaluated_field_reader(
-    mesh: bpy.types.Mesh,
-    layout: FieldLayout,
-    nonfinite: str,
-    label: str,
-    cache: Cache | None = None,
-) -> Callable[[Surface], RosyField]:
     """Read the field of an evaluated mesh, whose faces a modifier may have created.
-
-    The arrays are read at once. The function that is returned makes a task that builds the field
-    from them and the surface of the mesh. The task does not use the mesh.
 
     Modifiers copy the vector of an original face without changing it. `Surface.rest_vertices` gives
     the new face before any deformation, but its plane can still differ from that of the original
@@ -116,6 +100,8 @@ def evaluated_field_reader(
     mesh : bpy.types.Mesh
         Evaluated.
     layout : FieldLayout
+    surface : Surface
+        Of the mesh.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     label : str
@@ -123,52 +109,31 @@ def evaluated_field_reader(
     cache : Cache, optional
         Keeps fields that have not changed since an earlier call.
 
-    Returns
-    -------
-    function
-        From a Surface to a task that returns a RosyField.
-
     Raises
     ------
     RosyError
-        By the task, if a value is not finite and the policy is "error".
+        If a value is not finite and the policy is "error".
     """
     source = f"{label}, attribute '{layout.name}'"
     stored_values = field_values(mesh.attributes[layout.name], source, mesh)
-    rest_shape = read_rest_shape(mesh, layout.name)
+    values = follow_mesh(read_rest_shape(mesh, layout.name), stored_values, surface)
     original_normals = read_attribute(mesh, FACE_NORMAL_ATTRIBUTE, np.float32, 3)
     deviation_pairs = [
         read_attribute(mesh, name, np.float32, 2) for name in layout.attribute_names[1:]
     ]
 
-    def build(surface: Surface) -> RosyField:
-        values = follow_mesh(rest_shape, stored_values, surface)
+    def build() -> RosyField:
+        vectors = _transport(values, original_normals, surface, source, nonfinite)
+        deviations = [pair.astype(np.float64) @ (1, 1j) for pair in deviation_pairs]
+        ratios = np.stack(deviations, axis=1) if deviations else None
+        return RosyField(layout.degree, vectors, ratios, layout.family_count)
 
-        def field() -> RosyField:
-            vectors = _transport(values, original_normals, surface, source, nonfinite)
-            deviations = [pair.astype(np.float64) @ (1, 1j) for pair in deviation_pairs]
-            return RosyField(
-                layout.degree,
-                vectors,
-                np.stack(deviations, axis=1) if deviations else None,
-                layout.family_count,
-            )
-
-        def with_surface() -> tuple[Surface, RosyField]:
-            return surface, field()
-
-        if cache is None:
-            return field()
-        key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
-        if surface.rest_vertices is None:
-            key = surface_key(surface, "evaluated", *key_parts)
-            return cache.get_or_create(key, with_surface)[1]
-        # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
-        shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
-        key = "evaluated field", content_hash(*shape, *key_parts)
-        return cache.get_or_create(key, field)
-
-    return build
+    key_parts = values, original_normals, *deviation_pairs, layout, source, nonfinite
+    if cache is None or surface.rest_vertices is None:
+        return cached_field(cache, surface, build, "evaluated", *key_parts)
+    # The field depends on the rest shape alone. The deformed shape changes from frame to frame.
+    shape = surface.rest_vertices, surface.corner_vertex, surface.face_start
+    return cache.get_or_create(("evaluated field", content_hash(*shape, *key_parts)), build)
 
 
 def _transport(

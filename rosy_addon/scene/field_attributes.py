@@ -144,29 +144,10 @@ def cached_field(
     cache: Cache | None, surface: Surface, build_field: Callable[[], RosyField], *key_parts: object
 ) -> RosyField:
     """Return the cached field for a surface and other inputs, or build it."""
-
-    def build() -> RosyField:
-        ()()
-        return build_field()
-
-    return compute_cached_field(cache, surface, build, *key_parts)
-
-
-def compute_cached_field(
-    cache: Cache | None,
-    surface: Surface,
-    build_task: Callable[[], RosyField],
-    *key_parts: object,
-) -> RosyField:
-    """Return the cached field for a surface and other inputs, or build it in steps."""
     if cache is None:
-        return build_task()
+        return build_field()
     key = surface_key(surface, *key_parts)
-
-    def create() -> tuple[Surface, RosyField]:
-        return surface, build_task()
-
-    return cache.get_or_create(key, create)[1]
+    return cache.get_or_create(key, lambda: (surface, build_field()))[1]
 
 
 def surface_key(surface: Surface, *key_parts: object) -> Hashable:

@@ -9,10 +9,9 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..field.analysis import ErrorStatistics, angle_errors, error_statistics
-from ..field.singularities import find_singularities
-from ..field.singularity_matching import match_on_surface
-from ..progress import progress, report
+from ..field.analysis import ErrorStatistics
+from ..field.field_comparison import compare_fields
+from ..worker.job import Call, Steps, job
 from .combed_guides import GUIDE_ATTRIBUTE
 from .field_attributes import (
     VECTOR_TYPE,
@@ -69,9 +68,10 @@ def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
     ]
 
 
+@job
 def store_difference(
     mesh: bpy.types.Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
-) -> FieldDifference:
+) -> Steps[FieldDifference]:
     """Compute the angle between the field of a mesh and another one, and store it on the faces.
 
     Parameters
@@ -97,28 +97,18 @@ def store_difference(
         hint = f"choose {choice}" if choice else "make one with another name of the attribute"
         raise RosyError(f"{label}: needs another field to compare with: {hint}")
     check_attribute_type(mesh, name, "FLOAT")
-    with progress(0.0, 0.2):
-        surface = mesh_surface(mesh, label)
-    with progress(0.2, 0.4):
-        field = read_mesh_field(mesh, surface=surface)
-    with progress(0.4, 0.6):
-        other_field = read_mesh_field(mesh, other, field.degree, surface)
-    report(0.6, "comparing the fields")
-    angles = angle_errors(surface, field, other_field)
-    with progress(0.6, 0.75):
-        own = find_singularities(surface, field)
-    with progress(0.75, 0.9):
-        others = find_singularities(surface, other_field)
-    with progress(0.9, 1.0):
-        matching = match_on_surface(surface, own, others)
+    surface = mesh_surface(mesh, label)
+    field = read_mesh_field(mesh, surface=surface)
+    other_field = read_mesh_field(mesh, other, field.degree, surface)
+    comparison = yield Call(compare_fields, (surface, field, other_field))
     attribute = get_or_create_attribute(mesh, name, "FLOAT")
-    attribute.data.foreach_set("value", np.degrees(angles).astype(np.float32))
+    attribute.data.foreach_set("value", np.degrees(comparison.angles).astype(np.float32))
     mesh.update()
     return FieldDifference(
         other,
         field.degree,
-        error_statistics(surface, angles),
-        len(own[0]),
-        len(others[0]),
-        len(matching.distance),
+        comparison.statistics,
+        comparison.singularity_count,
+        comparison.other_count,
+        comparison.matched_count,
     )

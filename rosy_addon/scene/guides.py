@@ -10,6 +10,7 @@ import numpy as np
 from mathutils.geometry import interpolate_bezier
 
 from ..errors import RosyError
+from ..field.surface import Surface
 from .compat import is_annotation_in_space, scene_annotation
 from .face_values import read_face_vectors
 from .libraries import check_not_missing
@@ -169,10 +170,18 @@ def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
     return values
 
 
-def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface | None = None) -> np.ndarray:
     """Read a vector attribute as one vector for each face; see `read_face_vectors`.
 
     Vectors that RoSy has stored are turned as the faces were turned since.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    name : str
+        Name of the attribute.
+    surface : Surface, optional
+        The surface of the mesh, if it has been read already.
 
     Returns
     -------
@@ -187,9 +196,8 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
         raise RosyError(
             f"{mesh_label(mesh)} has no attribute '{name}' to follow: choose a vector attribute"
         )
-    return follow_mesh(
-        read_rest_shape(mesh, name), read_face_vectors(mesh, name), mesh_surface(mesh)
-    )
+    surface = mesh_surface(mesh) if surface is None else surface
+    return follow_mesh(read_rest_shape(mesh, name), read_face_vectors(mesh, name), surface)
 
 
 def _object_strokes(obj: bpy.types.Object) -> list[np.ndarray]:

@@ -16,7 +16,8 @@ from ..compositor.look import is_hatched
 from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..projection.camera import Camera
-from .blender_images import compute_image_data, new_image
+from ..rendering.picture_images import picture_image
+from .blender_images import new_image
 from .camera_planes import (
     add_camera_plane,
     frame_corners,
@@ -77,7 +78,7 @@ def _add_key(
         return
     name = f"RoSy Key {camera.name}"
     corners = frame_corners(view, DISTANCE * camera.data.clip_start)
-    image_data = compute_image_data(picture, as_float=False)
+    image_data = picture_image(picture, as_float=False)
     with rollback_on_error() as created:
         image = new_image(name, image_data)
         created.append(image)

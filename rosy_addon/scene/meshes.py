@@ -45,9 +45,7 @@ def mesh_surface(
     occluder_only: bool = False,
     cache: Cache | None = None,
 ) -> Surface:
-    """Read the arrays of a mesh at once, and return a task that builds its surface from them.
-
-    The task does not use the mesh, which may change or be deleted meanwhile.
+    """Read a mesh as a surface.
 
     Parameters
     ----------
@@ -64,7 +62,7 @@ def mesh_surface(
 
     Returns
     -------
-    Task
+    Surface
 
     Raises
     ------
@@ -92,21 +90,6 @@ def mesh_surface(
     return cache.get_or_create(key, partial(_with_fans, arguments, cache))
 
 
-def mesh_fans(mesh: bpy.types.Mesh, cache: Cache) -> np.ndarray:
-    """Read the topology of a mesh at once, and return a task that caches its `corner_fan`.
-
-    The fans depend on the topology alone, so a deformation does not change them.
-    """
-    return _fans(_topology(mesh), vertex_positions(mesh), cache)
-
-
-def _fans(topology: dict[str, np.ndarray | None], vertices: np.ndarray, cache: Cache) -> np.ndarray:
-    """Return the smooth fans of a topology, from the cache if they are known."""
-    return cache.get_or_create(
-        ("fans", content_hash(*topology.values())), partial(smooth_fans, vertices, **topology)
-    )
-
-
 def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np.ndarray | None]:
     """Return the arguments of `build_surface` that smooth fans depend on."""
     corner_vertex, face_start = polygon_arrays(mesh)
@@ -123,11 +106,15 @@ def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np
 
 
 def _with_fans(arguments: dict[str, Any], cache: Cache) -> Surface:
-    """Build a surface from the arguments of `build_surface`, with fans from the cache."""
+    """Build a surface from the arguments of `build_surface`, with smooth fans from the cache.
+
+    The fans depend on the topology alone, so a deformation does not change them.
+    """
     names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
     topology = {name: arguments[name] for name in names}
+    key = "fans", content_hash(*topology.values())
     with progress(0.0, 0.7):
-        fans = _fans(topology, arguments["vertices"], cache)
+        fans = cache.get_or_create(key, partial(smooth_fans, arguments["vertices"], **topology))
     with progress(0.7, 1.0):
         return build_surface(**arguments, corner_fan=fans)
 

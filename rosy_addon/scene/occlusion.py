@@ -9,12 +9,12 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import progress
 from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
 from ..projection.gbuffer import MeshInstance
+from ..worker.job import Call, Steps, job
 from .compat import is_editable
 from .meshes import mesh_surface
-from .scene_reader import SceneData, compute_read_scene
+from .scene_reader import SceneData, read_scene
 
 #: Default name of the attribute.
 OCCLUSION_ATTRIBUTE = "Occlusion"
@@ -22,12 +22,13 @@ OCCLUSION_ATTRIBUTE = "Occlusion"
 _ATTRIBUTE_TYPE = "CORNER", "FLOAT"
 
 
+@job
 def store_occlusion(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object],
     name: str = OCCLUSION_ATTRIBUTE,
     direction_count: int = DIRECTION_COUNT,
-) -> None:
+) -> Steps[None]:
     """Compute the ambient occlusion of objects, and store it on their meshes.
 
     Everything that is visible in renders of the view layer occludes. The evaluated mesh is used if
@@ -47,20 +48,17 @@ def store_occlusion(
     Raises
     ------
     RosyError
-        If the scene cannot be read (see `compute_read_scene`), or a mesh is linked, in edit mode, or has an
+        If the scene cannot be read (see `read_scene`), or a mesh is linked, in edit mode, or has an
         attribute of that name with another type or domain. Nothing is changed in this case.
     """
     for obj in objects:
         _check_writable(obj, name)
-    with progress(0.0, 0.1):
-        scene_data = compute_read_scene(depsgraph, objects, "zero")
+    scene_data = read_scene(depsgraph, objects, "zero")
     values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
     for index, obj in enumerate(objects):
-        start, stop = (0.1 + 0.9 * done / len(objects) for done in (index, index + 1))
-        with progress(start):
-            instances, instance_index = _with_original_faces(scene_data, obj)
-        with progress(start, stop):
-            values_by_mesh[obj.data] = ambient_occlusion(instances, instance_index, direction_count)
+        start, stop = index / len(objects), (index + 1) / len(objects)
+        inputs = *_with_original_faces(scene_data, obj), direction_count
+        values_by_mesh[obj.data] = yield Call(ambient_occlusion, inputs, start, stop)
     for mesh, values in values_by_mesh.items():
         attribute = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT", "CORNER")
         attribute.data.foreach_set("value", values)

@@ -10,7 +10,7 @@ from collections.abc import Container
 import bpy
 import numpy as np
 
-from .blender_images import NEUTRAL_GRAY
+from ..rendering.picture_images import NEUTRAL_GRAY
 from .compat import is_editable
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material

@@ -22,6 +22,7 @@ import numpy as np
 from ..compositor.picture import Picture
 from ..errors import RosyError
 from ..file_io import check_folder
+from ..image_io.image_data import ImageData
 from ..projection.camera import Camera
 from .bake_records import (
     DrawnFrom,
@@ -31,7 +32,7 @@ from .bake_records import (
     recorded_materials,
     store_record,
 )
-from .blender_images import ImageData, load_sequence, new_image
+from .blender_images import load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
 from .hatching_nodes import hatching_group
@@ -206,7 +207,7 @@ def is_beside_blend(folder: Path) -> bool:
 
 
 def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:
-    """Check that pictures can be applied to objects. Call this before a long task.
+    """Check that pictures can be applied to objects. Call this before a long job.
 
     Raises
     ------
@@ -283,14 +284,13 @@ def apply_picture(
         for obj in objects:
             node_groups.append(new_group(f"RoSy {obj.name}", material, matrices[obj]))
             created.append(node_groups[-1])
-    height, width = rendered_view.picture.rgba.shape[:2]
     store_record(
         scene,
         name,
         image,
         material,
         rendered_view.drawn_from,
-        size=(width, height),
+        size=rendered_view.image_data[:2],
     )
     _show_on_objects(objects, node_groups)
     return BakeResult(

@@ -23,7 +23,7 @@ from .field_attributes import (
     ANGLE_TYPE,
     VECTOR_TYPE,
     attribute_name,
-    compute_cached_field,
+    cached_field,
     describe_type,
     field_degree,
     field_values,
@@ -48,8 +48,6 @@ def read_mesh_field(
     cache: Cache | None = None,
 ) -> RosyField:
     """Read the field of a mesh.
-
-    The mesh must not change until the task is done. Its attributes are read in one step.
 
     Parameters
     ----------
@@ -109,7 +107,7 @@ def read_mesh_field(
         return validated_field(surface, values, degree, source, nonfinite, element)
 
     with progress(0.5, 1.0, "reading the field"):
-        return compute_cached_field(
+        return cached_field(
             cache, surface, build, "attribute", *attribute_type, values, degree, source, nonfinite
         )
 
@@ -150,7 +148,7 @@ def _field_from_directions(
         return validated_directions(surface, directions, source, nonfinite, domain)
 
     with progress(0.0, 1.0, "reading the field"):
-        return compute_cached_field(
+        return cached_field(
             cache, surface, build, "directions", directions, source, nonfinite, domain
         )
 

@@ -17,7 +17,7 @@ from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
 from .color_inputs import color_attribute_of
 from .lights import read_lights
-from .scene_reader import SceneData, compute_read_scene
+from .scene_reader import SceneData, read_scene
 from .tone_inputs import load_reference, make_tone_request
 
 
@@ -75,7 +75,7 @@ def read_views(
     Raises
     ------
     RosyError
-        If two cameras have the same name; see also `resolve_camera`, `compute_read_scene` and
+        If two cameras have the same name; see also `resolve_camera`, `read_scene` and
         `load_reference`.
     """
     resolved_cameras = [resolve_camera(scene, depsgraph, camera, size) for camera in cameras]
@@ -87,7 +87,7 @@ def read_views(
             "rename them in their libraries, or draw from one"
         )
     tone_request = make_tone_request(scene, look)
-    scene_data = compute_read_scene(
+    scene_data = read_scene(
         depsgraph,
         objects,
         nonfinite_policy(scene),
@@ -121,10 +121,10 @@ def read_turntable(
     Raises
     ------
     RosyError
-        See `compute_read_scene`.
+        See `read_scene`.
     """
     tone_request = make_tone_request(scene, look)
-    scene_data = compute_read_scene(
+    scene_data = read_scene(
         depsgraph,
         [obj],
         nonfinite_policy(scene),

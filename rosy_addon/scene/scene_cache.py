@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import bpy
 import numpy as np
@@ -22,11 +20,10 @@ from ..cache import Cache, content_hash
 from ..errors import REPORTED_ERRORS, RosyError, error_text
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
-from ..progress import report
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .color_inputs import read_color_values
-from .evaluated_field import FieldLayout, evaluated_field_reader, read_evaluated_field
+from .evaluated_field import FieldLayout, read_evaluated_field
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .meshes import (
     evaluated_mesh,
@@ -109,11 +106,6 @@ class SceneCache:
         self.cache = Cache() if cache is None else cache
         self._deadline = math.inf
         self._has_read_any = False
-        # Names of the objects whose meshes were prepared, and the one that is being prepared.
-        self._prepared: set[str] = set()
-        self._preparation: tuple[str, None] | None = None
-        # The object that `resolve_topologies` has begun.
-        self._resolution: tuple[str, None] | None = None
         # The error message of a mesh that could not be read.
         self._topologies: dict[_TopologyKey, _TopologyEntry | str] = {}
         # By the name of the object, the pointer of its mesh, and `tone_image_key`. None: no faces.
@@ -143,9 +135,6 @@ class SceneCache:
         for key in [key for key in self._topologies if names is None or key[0] in names]:
             if topology_changed or isinstance(self._topologies[key], str):
                 del self._topologies[key]
-        resolving = None if self._resolution is None else self._resolution[0]
-        if topology_changed and (names is None or resolving in names):
-            self._resolution = None
         for by_name in (self._attempts, self.errors):
             for name in [name for name in by_name if names is None or name in names]:
                 del by_name[name]
@@ -177,8 +166,8 @@ class SceneCache:
         color_attribute : str, optional
             Name of the attribute whose numbers are read for the color map.
         deadline : float
-            Seconds, monotonic. If it is finite, large meshes are prepared in steps. What was not
-            begun by then, except one step, is left for the next call; see `is_complete`.
+            Seconds, monotonic. Meshes that were not read by then, except one, are left for the next
+            call; see `is_complete`.
         """
         if self.is_complete:
             self.errors.clear()
@@ -251,12 +240,11 @@ class SceneCache:
     @property
     def has_unresolved(self) -> bool:
         """Whether there are objects that need `resolve_topologies`."""
-        return bool(self._unresolved or self._resolution)
+        return bool(self._unresolved)
 
     def _waiting_names(self) -> set[str]:
         """Return the names of the objects that need `resolve_topologies`."""
-        resolving = () if self._resolution is None else (self._resolution[0],)
-        return {*resolving, *(name for name, _ in self._unresolved)}
+        return {name for name, _ in self._unresolved}
 
     def resolve_topologies(
         self,
@@ -267,26 +255,15 @@ class SceneCache:
         """Read the rest positions and fields of meshes whose modifiers change the topology.
 
         This adds temporary attributes to the meshes, so it must not be called while Blender draws.
-        What was not begun by the deadline, except one step, is left for the next call.
+        Objects that were not read by the deadline, except one, are left for the next call.
         """
-        while self.has_unresolved:
-            if self._resolution is None:
-                name = min(name for name, _ in self._unresolved)
-                self._resolution = (
-                    name,
-                    partial(self._compute_resolution, depsgraph, name, nonfinite),
-                )
-            try:
-                next(self._resolution[1])
-            except StopIteration:
-                self._resolution = None
+        while self._unresolved:
+            self._resolve(depsgraph, min(self._waiting_names()), nonfinite)
             if time.monotonic() > deadline:
                 return
 
-    def _compute_resolution(
-        self, depsgraph: bpy.types.Depsgraph, name: str, nonfinite: str
-    ) -> None:
-        """Read the meshes of an object in the first step, and build their fields in the others."""
+    def _resolve(self, depsgraph: bpy.types.Depsgraph, name: str, nonfinite: str) -> None:
+        """Read the rest positions and fields of the meshes of an object."""
         unresolved = {key for key in self._unresolved if key[0] == name}
         self._unresolved -= unresolved
         self._attempts[name] = self._attempts.get(name, 0) + 1
@@ -297,8 +274,7 @@ class SceneCache:
             del self._topologies[key]
         problem = str(lost_field_error(obj, attribute_name(obj.data)))
         try:
-            for task in self._read_with_attributes(depsgraph, obj, nonfinite):
-                task()
+            self._read_with_attributes(depsgraph, obj, nonfinite)
         except REPORTED_ERRORS as error:
             problem = error_text(error)
         # Whatever was not read now is not tried again before the object changes.
@@ -319,9 +295,6 @@ class SceneCache:
             self.is_complete = False
             return None
         self._has_read_any = True
-        if not self._prepare(obj, owner, draws_field):
-            self.is_complete = False
-            return None
         try:
             mesh_state = (
                 self._read_evaluated(obj, owner, nonfinite)
@@ -334,53 +307,6 @@ class SceneCache:
         if mesh_state is not None or name not in self._waiting_names():
             self._mesh_states[key] = mesh_state
         return mesh_state
-
-    def _prepare(self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool) -> bool:
-        """Continue to build what takes long to read, and return whether it is built.
-
-        It is kept in the cache by its contents. If the object changes meanwhile, or has meshes of
-        several instances, they are read without preparation.
-        """
-        name = owner.name
-        if self._deadline == math.inf or name in self._prepared:
-            return True
-        try:
-            if self._preparation is None or self._preparation[0] != name:
-                self._preparation = name, partial(self._compute_preparation, obj, name, draws_field)
-            while True:
-                next(self._preparation[1])
-                if time.monotonic() > self._deadline:
-                    return False
-        except StopIteration:
-            pass
-        except REPORTED_ERRORS:
-            pass  # it is left to those who read the mesh
-        self._preparation = None
-        self._prepared.add(name)
-        return time.monotonic() <= self._deadline
-
-    def _compute_preparation(self, obj: bpy.types.Object, name: str, draws_field: bool) -> None:
-        """Cache what is built from the meshes of an object: read one, build, then the other.
-
-        `obj` is the evaluated object, used in the first step alone.
-        """
-        label = f"object '{name}'"
-        with evaluated_mesh(obj) as mesh:
-            if mesh is None:
-                return
-            task = partial(
-                mesh_surface, mesh, label, occluder_only=not draws_field, cache=self.cache
-            )
-        report(0.0, label)
-        task()
-        owner = bpy.data.objects.get(name)
-        if not draws_field or owner is None or owner.type != "MESH" or owner.data.is_editmode:
-            return
-        report(0.5, label)
-        report(0.6, label)
-        surface = mesh_surface(owner.data, label, cache=self.cache)
-        report(0.9, label)
-        _ = surface.face_normal
 
     def _read_occluder(self, obj: bpy.types.Object) -> _MeshState | None:
         """Read a mesh that only occludes; None if it has no faces."""
@@ -423,8 +349,6 @@ class SceneCache:
             key = owner.name, _topology_hash(mesh, original)
         entry = self._topologies.get(key)
         if entry is None:
-            if self._resolution is not None and self._resolution[0] == owner.name:
-                return None
             if self._attempts.get(owner.name, 0) >= MAX_ATTEMPTS:
                 raise RosyError(f"{label}: its modifiers make other faces at each evaluation")
             self._unresolved.add(key)
@@ -455,12 +379,8 @@ class SceneCache:
 
     def _read_with_attributes(
         self, depsgraph: bpy.types.Depsgraph, owner: bpy.types.Object, nonfinite: str
-    ) -> list[None]:
-        """Read all meshes of an object that have its field, and return tasks that add them.
-
-        The tasks add entries to `_topologies`. They use neither the object nor its meshes.
-        """
-        tasks, keys = [], set()
+    ) -> None:
+        """Add the meshes of an object that have its field to `_topologies`."""
         with temp_attributes(depsgraph, [owner], nonfinite, self.cache) as layouts:
             layout, label = layouts[owner], f"object '{owner.name}'"
             for instance in depsgraph.object_instances:
@@ -471,29 +391,13 @@ class SceneCache:
                     if mesh is None or not layout.is_on(mesh):
                         continue
                     key = owner.name, _topology_hash(mesh, owner.data)
-                    if key in keys:
+                    if key in self._topologies:
                         continue
-                    keys.add(key)
-                    surface_task = partial(
-                        mesh_surface, mesh, label, read_rest=True, cache=self.cache
+                    surface = mesh_surface(mesh, label, read_rest=True, cache=self.cache)
+                    field = read_evaluated_field(
+                        mesh, layout, surface, nonfinite, label, self.cache
                     )
-                    build_field_task = evaluated_field_reader(
-                        mesh, layout, nonfinite, label, self.cache
-                    )
-                    tasks.append(partial(self._add_topology, key, surface_task, build_field_task))
-        return tasks
-
-    def _add_topology(
-        self,
-        key: _TopologyKey,
-        surface_task: Surface,
-        build_field_task: Callable[[Surface], RosyField],
-    ) -> None:
-        """Build a surface and its field, and add them to `_topologies`."""
-        report(0.0, "reading the field")
-        surface = surface_task()
-        field = build_field_task(surface)
-        self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
+                    self._topologies[key] = _TopologyEntry(surface.rest_vertices, field)
 
 
 def _topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:

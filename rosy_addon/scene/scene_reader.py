@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
-from functools import partial
 
 import bpy
 import numpy as np
@@ -15,7 +14,6 @@ from ..cache import Cache
 from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .color_inputs import check_colored, read_color_values
@@ -25,12 +23,11 @@ from .evaluated_field import (
     FieldLayout,
     add_temp_field,
     add_temp_vectors,
-    evaluated_field_reader,
     read_evaluated_field,
 )
 from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from .libraries import check_object_type, remedy_for_absence
-from .meshes import evaluated_mesh, mesh_fans, mesh_surface, read_uvs
+from .meshes import evaluated_mesh, mesh_surface, read_uvs
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
 from .tone_inputs import ToneRequest, check_tones, read_tone
@@ -105,20 +102,6 @@ def read_scene(
     nonfinite: str = "error",
     cache: Cache | None = None,
     tone_request: ToneRequest | None = None,
-    color_attribute: str | None = None,
-) -> SceneData:
-    """Run `compute_read_scene` to its end."""
-    return compute_read_scene(
-        depsgraph, objects, nonfinite, cache, tone_request, color_attribute=color_attribute
-    )
-
-
-def compute_read_scene(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object] | None = None,
-    nonfinite: str = "error",
-    cache: Cache | None = None,
-    tone_request: ToneRequest | None = None,
     uv_maps: Mapping[bpy.types.Object, str] | None = None,
     color_attribute: str | None = None,
 ) -> SceneData:
@@ -164,24 +147,11 @@ def compute_read_scene(
         remedy = remedy_for_absence("make or import one first")
         raise RosyError(f"no visible object has a RoSy field: {remedy}")
     cache = Cache() if cache is None else cache
-    label = "reading the scene"
-    for index, obj in enumerate(objects):
-        start, stop = (0.5 * done / len(objects) for done in (index, index + 1))
-        with progress(start, stop, label):
-            _prepare_surfaces(obj, depsgraph, cache)
-    report(0.5, label)
     with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
-        report(0.7, label)
-        for obj, layout in layouts.items():
-            # Found in the cache by the last step, unless the object has changed until then.
-            with progress(0.7, 0.9, label):
-                _compute_prepare_field(obj, layout, depsgraph, nonfinite, cache)
-        # The scene may have changed since the last step. All instances are read in one step, the
-        # last, so that the caller can read what belongs to them before it yields.
-        depsgraph.update()
         reader = _SceneReader(
             layouts, nonfinite, cache, tone_request, errors, uv_maps or {}, color_attribute
         )
+        depsgraph.update()
         for instance in rendered_instances(depsgraph):
             reader.add(instance)
     reader.check_complete(objects)
@@ -200,61 +170,6 @@ def compute_read_scene(
         tuple(f"{error}. It was left out" for error in (errors or {}).values()),
         reader.uvs,
     )
-
-
-def _prepare_surfaces(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache) -> None:
-    """Build what the surfaces of an object take longest to build, and keep it in the cache.
-
-    These are the original surface, its face normals, and the smooth fans of the evaluated mesh.
-    Errors are left to those who read the surfaces.
-    """
-    label = f"object '{obj.name}'"
-    try:
-        task = partial(mesh_surface, obj.data, label, cache=cache)
-        with progress(0.0, 0.5):
-            surface = task()
-        report(0.5, label)
-        _ = surface.face_normal
-        if user_modifiers(obj):
-            depsgraph.update()
-            with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
-                task = None if mesh is None else partial(mesh_fans, mesh, cache)
-            report(0.6, label)
-            if task is not None:
-                with progress(0.6, 1.0):
-                    task()
-    except RosyError:
-        pass
-
-
-def _compute_prepare_field(
-    obj: bpy.types.Object,
-    layout: FieldLayout,
-    depsgraph: bpy.types.Depsgraph,
-    nonfinite: str,
-    cache: Cache,
-) -> None:
-    """Build the evaluated surface and field of an object, and keep them in the cache.
-
-    Errors are left to those who read them.
-    """
-    label = f"object '{obj.name}'"
-    try:
-        depsgraph.update()
-        with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
-            if mesh is None or not layout.is_on(mesh):
-                return
-            task = partial(mesh_surface, mesh, label, read_rest=True, cache=cache)
-            build_field_task = evaluated_field_reader(mesh, layout, nonfinite, label, cache)
-        report(0.0, label)
-        with progress(0.0, 0.5):
-            surface = task()
-        report(0.5, label)
-        with progress(0.5, 1.0):
-            build_field_task(surface)
-        report(1.0, label)
-    except RosyError:
-        pass
 
 
 #: Why the fields of objects cannot be drawn.

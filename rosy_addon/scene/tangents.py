@@ -7,10 +7,8 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
-from ..line_drawing.tangent_mesh import build_tangent_mesh
-from ..progress import progress
-from ..projection.gbuffer import MeshInstance
-from ..surface_texture.direction_maps import corner_directions
+from ..surface_texture.direction_maps import corner_tangents
+from ..worker.job import Call, Steps, job
 from .field_attributes import VECTOR_TYPE, check_attribute_type, get_or_create_attribute
 from .meshes import mesh_surface
 from .read_field import read_mesh_field
@@ -20,7 +18,8 @@ from .write_field import check_writable
 DEFAULT_TANGENT_NAME = "rosy_tangent"
 
 
-def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") -> np.ndarray:
+@job
+def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") -> Steps[np.ndarray]:
     """Compute one direction of a mesh's field on each corner.
 
     Parameters
@@ -42,18 +41,9 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
         If there is no field, or no attribute of this name can store tangents.
     """
     _check_storable(mesh, name)
-    with progress(0.0, 0.1):
-        surface = mesh_surface(mesh)
-    with progress(0.1, 0.2):
-        field = read_mesh_field(mesh, surface=surface)
-    instance = MeshInstance(surface, np.eye(4), field)
-    with progress(0.2, 0.4):
-        tangent_mesh = build_tangent_mesh(instance)
-    with progress(0.4, 1.0):
-        vectors = corner_directions(tangent_mesh, guiding_angle)
-    tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
-    tangents[surface.triangles] = vectors
-    return tangents
+    surface = mesh_surface(mesh)
+    field = read_mesh_field(mesh, surface=surface)
+    return (yield Call(corner_tangents, (surface, field, guiding_angle)))
 
 
 def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "") -> None:

@@ -14,9 +14,10 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
+from ..image_io.image_data import ImageData
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_record
-from .blender_images import ImageData, new_image, new_tiled_image
+from .blender_images import new_image, new_tiled_image
 from .file_names import picture_stem
 from .hatching_nodes import hatching_group
 from .owned_data import delete_unused, rollback_on_error
@@ -24,7 +25,7 @@ from .picture_nodes import new_group, set_picture_modifier
 from .picture_state import PictureState
 from .pictures import OutputSettings
 from .read_view import nonfinite_policy
-from .scene_reader import compute_read_scene
+from .scene_reader import read_scene
 from .texture_nodes import (
     Hatching,
     new_anisotropy_material,
@@ -84,7 +85,7 @@ def read_texture_input(
         If there is no field, no UV map or no such attribute, or a modifier loses one of them.
     """
     name = uv_map_name(obj)
-    scene_data = compute_read_scene(
+    scene_data = read_scene(
         depsgraph,
         [obj],
         nonfinite_policy(scene),
@@ -157,7 +158,7 @@ def apply_texture(
         created.append(material)
         node_group = new_group(name, material, None)
         created.append(node_group)
-    size = first.pixels.shape[1], first.pixels.shape[0]
+    size = first.width, first.height
     store_record(
         scene, obj.name, image, material, DrawnFrom(source, {None: state}, "cpu"), size=size
     )

@@ -1,4 +1,4 @@
-"""Encoding a video from image files, in steps."""
+"""Encoding a video from image files."""
 
 from __future__ import annotations
 
@@ -7,22 +7,27 @@ from pathlib import Path
 import bpy
 
 from ..errors import RosyError
-from ..processes import process_task
-from ..progress import report, run_with_report
+from ..worker.job import Step, Steps, job
+from ..worker.program import run_program
 from . import video_encoding
 
 
-def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, path: Path) -> None:
+@job
+def encode_video(
+    folder: Path, count: int, size: tuple[int, int], fps: float, path: Path
+) -> Steps[None]:
     """Encode the images of a folder with Blender's encoder. See `video_encoding.encode_video`.
 
-    In a window, another Blender does it, so that it can be stopped: closing the task stops it.
+    In a window, another Blender does it, which ends if the job is cancelled.
 
     Raises
     ------
     RosyError
         If this build of Blender cannot encode the video.
     """
+    label = "encoding the video"
     if bpy.app.background or not bpy.app.binary_path:
+        yield Step(0.0, label)
         try:
             video_encoding.encode_video(folder, count, size, fps, path)
         except (RuntimeError, TypeError, AttributeError) as reason:
@@ -31,7 +36,7 @@ def encode_video(folder: Path, count: int, size: tuple[int, int], fps: float, pa
     command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-exit-code", "1"]
     command += ["--python", video_encoding.__file__, "--"]
     command += map(str, (folder, count, *size, repr(fps), path))
-    status, output = run_with_report(process_task(command, "encoding the video"), report)
+    status, output = yield from run_program.begin(command, label)
     if status or not path.is_file():
         message = (output.strip().splitlines() or ["it failed"])[-1]
         raise RosyError(f"{path}: this Blender cannot encode a video: {message}")

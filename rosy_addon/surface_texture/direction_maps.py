@@ -13,8 +13,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..line_drawing.tangent_mesh import TangentMesh, nearest_member
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface
+from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh, nearest_member
 from ..progress import progress, report
+from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents
 from .line_order import CombedDirections, combed_directions
@@ -65,6 +68,30 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
         values[block, 2] = is_defined
     values[:, :2] = 0.5 + 0.5 * values[:, :2]
     return values
+
+
+def corner_tangents(surface: Surface, field: RosyField, guiding_angle: float) -> np.ndarray:
+    """Compute one direction of a field on each corner of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : RosyField
+    guiding_angle : float
+        Direction that it is near to; see `line_order`.
+
+    Returns
+    -------
+    (C, 3) float32 ndarray
+        Unit vectors in object space; 0 where the field is undefined.
+    """
+    with progress(0.0, 0.3):
+        mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
+    with progress(0.3, 1.0):
+        vectors = corner_directions(mesh, guiding_angle)
+    tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
+    tangents[surface.triangles] = vectors
+    return tangents
 
 
 def corner_directions(mesh: TangentMesh, guiding_angle: float) -> np.ndarray:

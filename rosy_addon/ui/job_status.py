@@ -1,8 +1,8 @@
-"""The progress of the running task, for the panels."""
+"""The progress of the running job, for the panels."""
 
 from __future__ import annotations
 
-from ..progress import Progress
+from ..worker.job import Step
 
-#: Progress of the modal task that is running; None if there is none.
-current: Progress | None = None
+#: How far the job has come that runs in a window; None if there is none.
+current: Step | None = None

@@ -17,6 +17,7 @@ from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
 from .generator_settings import generator_setting_names
+from .helper_start import start_helper_once
 from .sidebar import (
     SidebarPanel,
     draw_cycles_hint,
@@ -38,6 +39,7 @@ class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
     bl_label = "RoSy"
 
     def draw(self, context: bpy.types.Context) -> None:
+        start_helper_once(context)
         layout = self.layout
         use_property_columns(layout)
         objects = field_objects(context.view_layer)

@@ -43,9 +43,16 @@ class ROSY_AP_preferences(bpy.types.AddonPreferences):
         max=256,
     )
 
+    use_helper: bpy.props.BoolProperty(
+        name="Helper Process",
+        description="Compute in a process beside Blender, which stays responsive. Off: Blender waits",
+        default=True,
+    )
+
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
+        layout.prop(self, "use_helper")
         layout.prop(self, "workers")
         layout.label(text="When the first field of a scene is made")
         layout.prop(self, "live_first_field")
@@ -63,6 +70,12 @@ def worker_count(context: bpy.types.Context) -> int:
     """Return the number of processes that draw a large picture; 0 is one for each core."""
     preferences = addon_preferences(context)
     return 0 if preferences is None else preferences.workers
+
+
+def uses_helper(context: bpy.types.Context) -> bool:
+    """Return whether a process beside Blender computes."""
+    preferences = addon_preferences(context)
+    return preferences is None or preferences.use_helper
 
 
 def apply_preferences(context: bpy.types.Context) -> None:

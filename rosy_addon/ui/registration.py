@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import (
+    helper_start,
     job_status,
     key_panel,
     live_views,
@@ -44,3 +45,4 @@ def unregister() -> None:
     preset_library.unregister()
     overlay.hide()
     job_status.current = None
+    helper_start.unregister()

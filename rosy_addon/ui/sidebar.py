@@ -50,7 +50,7 @@ def draw_wrapped(
 
 
 def draw_progress(layout: bpy.types.UILayout) -> None:
-    """Draw the progress of the running task."""
+    """Draw the progress of the running job."""
     progress = job_status.current
     layout.progress(factor=progress.fraction, text=as_sentence(progress.label))
     layout.label(text="Press ESC to cancel")

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..compositor.target_tone import ReferenceRender
+from ..field.guided_system import GuidedSystem
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
@@ -24,7 +25,7 @@ from ..projection.surface_tone import SurfaceTone
 from .start import PACKAGE
 
 #: Immutable classes whose instances the other process keeps: they are large, and used again.
-KEPT_CLASSES = (MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
+KEPT_CLASSES = (GuidedSystem, MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
 
 #: Bytes of an array that are written at a time.
 CHUNK_BYTES = 1 << 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import time
 from collections.abc import Callable, Mapping
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from .channel import Channel
@@ -103,6 +103,11 @@ class Helper:
         if channel is not None:
             channel.close()
 
+    def wait(self, seconds: float) -> None:
+        """Wait until the process has something to say, or ends, at most for some time."""
+        if self.connection is not None:
+            wait([self.connection], seconds)
+
     @property
     def connection(self) -> Connection | None:
         """What becomes readable when the process has something to say, or ends."""
@@ -195,3 +200,7 @@ class Handle:
         """End the helper at once, if the call is not done."""
         if not self.is_done:
             self._helper.close()
+
+
+#: The helper of Blender's windows; see `ui.helper_start`.
+HELPER = Helper()

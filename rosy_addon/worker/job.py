@@ -79,6 +79,44 @@ def run(steps: Steps[Result]) -> Result:
             error = raised
 
 
+def part(
+    steps: Steps[Result], start: float, stop: float, label: str | None = None
+) -> Steps[Result]:
+    """Run the steps of a job as one part of another.
+
+    Parameters
+    ----------
+    steps : Steps
+    start, stop : float
+        Fractions of the whole job at which the part begins and ends.
+    label : str, optional
+        Replaces the labels of the steps.
+    """
+
+    def scaled(fraction: float) -> float:
+        return start + (stop - start) * fraction
+
+    answer, error = None, None
+    try:
+        while True:
+            try:
+                step = steps.send(answer) if error is None else steps.throw(error)
+            except StopIteration as end:
+                return end.value
+            answer, error = None, None
+            step_label = step.label if label is None else label
+            try:
+                if isinstance(step, Call):
+                    ends = scaled(step.start), scaled(step.stop)
+                    answer = yield Call(step.function, step.arguments, *ends, step_label)
+                else:
+                    yield Step(scaled(step.fraction), step_label)
+            except Exception as raised:
+                error = raised
+    finally:
+        steps.close()
+
+
 class Job(Generic[Arguments, Result]):
     """A function that runs a job to its end; `begin` returns the steps instead."""
 

@@ -496,24 +496,24 @@ def cancel_midway(monkey):
 
     def animation():
         output_settings = settings.OutputSettings(folder=monkey.folder / "frames")
-        return rosy(f"{addon}.animation").bake_animation_task(
+        return rosy(f"{addon}.animation").bake_animation.begin(
             scene, frames, settings=output_settings
         )
 
-    what, make_task = monkey.pick(
+    what, begin = monkey.pick(
         [
-            ("bake", lambda: rosy(f"{addon}.bake").bake_task(scene)),
+            ("bake", lambda: rosy(f"{addon}.bake").bake.begin(scene)),
             ("bake_animation", animation),
             (
                 "strokes",
-                lambda: rosy(f"{addon}.draw_strokes").draw_strokes_task(scene, kind="CURVES"),
+                lambda: rosy(f"{addon}.draw_strokes").draw_strokes.begin(scene, kind="CURVES"),
             ),
         ]
     )
     if what == "strokes" and bpy.context.mode != "OBJECT":
         return
     if bpy.ops.rosy.bake.poll():
-        monkey.task(make_task, what)
+        monkey.cancelled_job(begin, what)
 
 
 def modal(monkey, operator, **settings):

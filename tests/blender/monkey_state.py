@@ -425,13 +425,14 @@ def _is_used(block: bpy.types.ID) -> bool:
 
 
 def handlers() -> list[str]:
-    """Return the application handlers of RoSy's."""
+    """Return the application handlers of RoSy's, but for those that remember live views."""
     return [
         f"{name}: {function!r}"
         for name in dir(bpy.app.handlers)
         if isinstance(functions := getattr(bpy.app.handlers, name), list)
         for function in functions
-        if "rosy" in getattr(function, "__module__", "")
+        if "rosy" in (module := getattr(function, "__module__", ""))
+        and not module.endswith(".ui.live_views")
     ]
 
 

@@ -37,12 +37,16 @@ WINDOWS = {
     "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
     "presets": ("window_presets.py", 1120, 900, SIMULATED_EVENTS),
     "live": ("window_live.py", 1000, 720, ()),
+    "helper": ("window_helper.py", 1000, 720, SIMULATED_EVENTS),
     "first-bake": ("window_first_bake.py", 1000, 800, ()),
     "listing": ("window_listing.py", 1922, 1200, ()),
 }
 
 #: Size of the screen that `real-blender gui` makes. Larger windows get a screen of their own.
 SCREEN = 1400, 900
+
+#: Seconds within which processes end after Blender was killed.
+END_SECONDS = 5.0
 
 #: Seconds after which the screen of a window exists.
 START_SECONDS = 4.0
@@ -79,7 +83,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--shots", type=Path, help="folder for the screenshots of the panel")
     parser.add_argument(
         "--windows",
-        default="panel,presets,live,first-bake",
+        default="panel,presets,live,helper,first-bake",
         help="which tests to run in a window, by default all; none for headless",
     )
     parser.add_argument("--only-window", action="store_true")
@@ -172,6 +176,7 @@ def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
                 timeout=time_limit + 60.0,
             )
             add_window(counts, results_file)
+            add_processes(counts, results_file.with_suffix(".processes"))
             # Errors in the drawing of a panel appear on the terminal alone.
             if "Traceback" in process.stdout:
                 print(
@@ -221,6 +226,29 @@ def add_window(counts: dict[str, int], results: Path) -> None:
     if "the end" not in steps:
         print("the run in a window did not come to its end")
         counts["errors"] += 1
+
+
+def add_processes(counts: dict[str, int], listing: Path) -> None:
+    """Check that the processes end that a killed Blender had started, if a step has listed them."""
+    if not listing.is_file():
+        return
+    processes = json.loads(listing.read_text())
+    deadline = time.monotonic() + END_SECONDS
+    while any(is_running(process) for process in processes) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    left = [process for process in processes if is_running(process)]
+    if left:
+        print(f"of {len(processes)} processes, {len(left)} are left after Blender was killed")
+    counts["failed" if left else "passed"] += 1
+
+
+def is_running(process: int) -> bool:
+    """Return whether a process runs, given its number."""
+    try:
+        stat = Path(f"/proc/{process}/stat").read_text()
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
 
 
 if __name__ == "__main__":

@@ -116,6 +116,31 @@ def wait_until(condition, seconds=TIMEOUT_SECONDS):
         yield
 
 
+def is_running(process):
+    """Return whether a process runs, given its number."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def descendants():
+    """Return the numbers of all processes that this one has started, directly or not."""
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        parents[int(path.parent.name)] = int(fields[1])
+    found, new = set(), {os.getpid()}
+    while new:
+        new = {child for child, parent in parents.items() if parent in new}
+        found |= new
+    return sorted(found)
+
+
 def redraw_view():
     """Yield until the 3D view has been drawn once more, so that its matrices are those of its settings."""
     drawn = []

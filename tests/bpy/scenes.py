@@ -8,6 +8,22 @@ from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
 from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.write_field import write_mesh_field
+from rosy.rosy_addon.worker.job import Call
+
+
+def each_step(steps):
+    """Yield what a job yields, and make its calls. Closing this generator cancels the job."""
+    answer = None
+    try:
+        while True:
+            try:
+                step = steps.send(answer)
+            except StopIteration:
+                return
+            yield step
+            answer = step() if isinstance(step, Call) else None
+    finally:
+        steps.close()
 
 
 def link(obj):

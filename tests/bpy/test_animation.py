@@ -20,7 +20,7 @@ from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.frame_workers import format_frames, parse_frames, run_local
-from rosy.rosy_addon.gpu.select import select_renderer
+from rosy.rosy_addon.gpu.select import select_device
 from rosy.rosy_addon.projection import project as projection
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
@@ -435,7 +435,7 @@ def test_invalid_options_are_refused(file, tmp_path, monkeypatch):
         assert process.returncode == 2 and expected in err, err
 
 
-def test_the_renderer_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
+def test_the_device_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
     """The graphics card does not draw the method "members": the choice is made for each frame."""
     look = moving.rosy.look
     for frame, method in ((1, "sheets"), (2, "members"), (3, "sheets")):
@@ -443,11 +443,11 @@ def test_the_renderer_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
         look.keyframe_insert("method", frame=frame)
     chosen = []
 
-    def select(device, look, *options, **keywords):
+    def select(device, look):
         chosen.append((moving.frame_current, device, look.method))
-        return select_renderer(device, look, *options, **keywords)
+        return select_device(device, look)
 
-    monkeypatch.setattr(animation, "select_renderer", select)
+    monkeypatch.setattr(animation, "select_device", select)
     settings = OutputSettings(folder=tmp_path, device="auto")
     bake_animation(moving, [1, 2, 3], settings=settings)
     assert chosen[:2] == [(1, "auto", "sheets"), (2, "auto", "members")]

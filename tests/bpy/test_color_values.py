@@ -12,11 +12,10 @@ from rosy.rosy_addon.bake_texture import bake_texture
 from rosy.rosy_addon.color import map_colors
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.progress import run_to_completion
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.color_inputs import color_attribute_of
 from rosy.rosy_addon.scene.look_properties import read_look
-from rosy.rosy_addon.scene.read_view import read_turntable_task
+from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_cache import SceneCache
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.ui.look_panels import _draw_color_source
@@ -155,9 +154,7 @@ EXPECTED = {
 def test_pictures_and_turntables(scene, colored):
     (result,) = bake(scene)
     assert colors_in(pixels(result.image), 4) == EXPECTED
-    instance, _ = run_to_completion(
-        read_turntable_task(scene, depsgraph(), colored, Look(hue="values"))
-    )
+    instance, _ = read_turntable(scene, depsgraph(), colored, Look(hue="values"))
     assert np.isfinite(instance.color_values).sum() == 12
 
 

@@ -13,6 +13,7 @@ from rosy.rosy_addon.field.generate import GeneratorSettings, axis_field, genera
 from rosy.rosy_addon.field.representation import face_frames, face_representation
 from rosy.rosy_addon.field.rosy_field import RosyField
 from rosy.rosy_addon.projection.project import project
+from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.field_attributes import has_field
 from rosy.rosy_addon.scene.lights import read_lights
@@ -22,7 +23,6 @@ from rosy.rosy_addon.scene.scene_reader import (
     TEMP_FIELD_ATTRIBUTE,
     field_objects,
     read_instances,
-    read_scene_task,
 )
 from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
@@ -505,15 +505,16 @@ def test_selected_edges_of_a_mesh_made_by_a_script(scene, repeated):
         assert len(marked_edges(mesh, "SELECTED")) == count
 
 
-def test_reading_can_be_stopped_at_every_step(scene, monkey):
+@pytest.mark.parametrize("failing", ["rendered_instances", "read_evaluated_field"])
+def test_an_error_while_reading_leaves_nothing(scene, monkey, monkeypatch, failing):
     """Nothing is left of the attributes that modifiers copy while a scene is read."""
     monkey.modifiers.new("Subdivision", "SUBSURF")
     before = contents()
-    steps = sum(1 for _ in read_scene_task(depsgraph()))
-    assert steps > 10
-    for step in range(1, steps + 1):
-        task = read_scene_task(depsgraph())
-        for _ in range(step):
-            next(task)
-        task.close()
-        assert contents() == before, step
+
+    def fail(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scene_reader, failing, fail)
+    with pytest.raises(KeyboardInterrupt):
+        scene_reader.read_scene(depsgraph())
+    assert contents() == before

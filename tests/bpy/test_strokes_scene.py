@@ -10,17 +10,19 @@ from itertools import pairwise
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.draw_strokes import draw_strokes, draw_strokes_task
+from rosy.rosy_addon.draw_strokes import draw_strokes
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
 from rosy.rosy_addon.line_drawing.svg import Pen
 from rosy.rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
+from rosy.rosy_addon.progress import listening
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.compat import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
-from scenes import add_camera, add_field, add_mesh, add_plane, contents, render
+from rosy.rosy_addon.worker.job import Step
+from scenes import add_camera, add_field, add_mesh, add_plane, contents, each_step, render
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -400,13 +402,12 @@ def test_polylines_lie_on_the_object_when_they_are_imported(
 
 def test_cancelling_leaves_nothing(monkey, camera, scene):
     before = contents()
-    task = draw_strokes_task(scene, kind="PENCIL", style=PLAIN)
+    stepping = each_step(draw_strokes.begin(scene, kind="PENCIL", style=PLAIN))
     labels = []
-    for step in task:
-        labels.append(step.label)
-        if step.fraction > 0.9:
-            task.close()
-            break
+    with listening(lambda _, label: labels.append(label)):
+        for step in stepping:
+            if isinstance(step, Step):
+                stepping.close()
     assert "tracing strokes" in labels and contents() == before
 
 

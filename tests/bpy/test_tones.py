@@ -12,8 +12,7 @@ from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.color import to_linear
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
-from rosy.rosy_addon.progress import run_to_completion
-from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion_task
+from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_cache import SceneCache
 from rosy.rosy_addon.scene.scene_reader import read_scene
@@ -329,7 +328,7 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     floor = add_mesh("Floor", [(-9, 0, -1), (9, 0, -1), (9, -9, -1), (-9, -9, -1)], [(3, 2, 1, 0)])
     add_field(floor, "axis", 2, (1.0, 0.0, 0.0))
     bpy.context.view_layer.update()
-    run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=128))
+    store_occlusion(depsgraph(), [wall], direction_count=128)
     attribute = wall.data.attributes[OCCLUSION_ATTRIBUTE]
     assert (attribute.domain, attribute.data_type) == ("CORNER", "FLOAT")
     assert OCCLUSION_ATTRIBUTE not in floor.data.attributes
@@ -342,14 +341,14 @@ def test_occlusion_is_stored_and_drawn(scene, wall):
     assert values[height == 1].mean() > values[height == 0].mean() > 0.55
     assert tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)) is not None
     # Storing it again replaces it.
-    run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=16))
+    store_occlusion(depsgraph(), [wall], direction_count=16)
     assert sum(a.name.startswith(OCCLUSION_ATTRIBUTE) for a in wall.data.attributes) == 1
 
 
 def test_occlusion_of_meshes_with_new_faces(scene, wall):
     wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
     bpy.context.view_layer.update()
-    run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=16))
+    store_occlusion(depsgraph(), [wall], direction_count=16)
     assert len(wall.data.attributes[OCCLUSION_ATTRIBUTE].data) == 16
     assert len(tone_of(ToneRequest("attribute", OCCLUSION_ATTRIBUTE)).values) == 64
 
@@ -357,5 +356,5 @@ def test_occlusion_of_meshes_with_new_faces(scene, wall):
 def test_occlusion_does_not_replace_other_attributes(scene, wall):
     add_attribute(wall.data, OCCLUSION_ATTRIBUTE, "POINT", "FLOAT", np.arange(9))
     with pytest.raises(RosyError, match="object 'Plane' already has an attribute 'Occlusion'"):
-        run_to_completion(store_occlusion_task(depsgraph(), [wall], direction_count=4))
+        store_occlusion(depsgraph(), [wall], direction_count=4)
     assert wall.data.attributes[OCCLUSION_ATTRIBUTE].data[3].value == 3

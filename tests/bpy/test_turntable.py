@@ -7,9 +7,8 @@ from dataclasses import replace
 import bpy
 import numpy as np
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.progress import run_to_completion
 from rosy.rosy_addon.scene.lights import read_lights
-from rosy.rosy_addon.scene.read_view import read_turntable_task
+from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.turntable_video import turntable_views
 from scenes import add_monkey, link
 
@@ -26,7 +25,7 @@ def test_lights_are_those_of_the_scene_in_the_space_of_each_camera(scene, monkey
     add_monkey((4.0, 0.0, 0.0))
     depsgraph = bpy.context.evaluated_depsgraph_get()
     look = Look(light="scene")
-    instance, lights = run_to_completion(read_turntable_task(scene, depsgraph, monkey, look))
+    instance, lights = read_turntable(scene, depsgraph, monkey, look)
     np.testing.assert_allclose(instance.matrix, np.array(monkey.matrix_world), atol=1e-6)
     views = list(turntable_views(instance, look, 3, (32, 24), (10.0, 20.0), lights=lights))
     assert len(views) == 3
@@ -37,9 +36,4 @@ def test_lights_are_those_of_the_scene_in_the_space_of_each_camera(scene, monkey
         for light, other in zip(view.lights, expected, strict=True):
             np.testing.assert_allclose(light.vector, other.vector, atol=1e-6)
             assert light.strength == other.strength
-    assert (
-        run_to_completion(
-            read_turntable_task(scene, depsgraph, monkey, replace(look, light="lamp"))
-        )[1]
-        == []
-    )
+    assert read_turntable(scene, depsgraph, monkey, replace(look, light="lamp"))[1] == []

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 from rosy.rosy_addon.animation import bake_animation
-from rosy.rosy_addon.bake import bake, bake_task
+from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.cache import BAKE_CACHE
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.gpu.select import automatic_device
@@ -24,7 +24,8 @@ from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.cameras import VIEW_NAME
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
-from scenes import add_camera, add_field, add_plane, link, pixels, set_vectors
+from rosy.rosy_addon.worker.job import Call
+from scenes import add_camera, add_field, add_plane, each_step, link, pixels, set_vectors
 
 SIZE = 40
 
@@ -618,11 +619,10 @@ def test_a_renamed_camera_keeps_its_picture(tmp_path):
 def test_a_change_during_a_bake_counts(tmp_path):
     scene = build(tmp_path)
     BAKE_CACHE.clear()
-    task = bake_task(scene)
-    while next(task).label == "reading the scene":
-        pass
+    stepping = each_step(bake.begin(scene))
+    assert isinstance(next(stepping), Call)
     obj("Plain").location.x = 0.7
-    for _ in task:
+    for _ in stepping:
         pass
     bpy.context.view_layer.update()
     assert bake_word(scene) == "'Plain' was moved"

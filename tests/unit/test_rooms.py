@@ -24,7 +24,6 @@ BASE_ROOMS = {
     "color",
     "settings",
     "cache",
-    "processes",
 }
 
 #: What each room may import besides itself. Modules at the top of the package are rooms, too.
@@ -33,7 +32,6 @@ MAY_IMPORT = {
     "progress": set(),
     "memory": {"errors"},
     "cache": set(),
-    "processes": {"progress"},
     "deterministic_trig": set(),
     "color": {"errors"},
     "file_io": {"errors", "memory", "progress"},
@@ -43,12 +41,14 @@ MAY_IMPORT = {
     "annotation": BASE_ROOMS | {"field", "projection"},
     "compositor": BASE_ROOMS | {"field", "projection", "annotation"},
     "line_drawing": BASE_ROOMS | {"field", "projection", "annotation"},
-    "surface_texture": BASE_ROOMS | {"field", "projection", "compositor", "line_drawing"},
     "image_io": BASE_ROOMS,
+    "surface_texture": BASE_ROOMS
+    | {"field", "projection", "compositor", "line_drawing", "image_io"},
     "worker": BASE_ROOMS | {"field", "projection", "compositor"},
-    "rendering": BASE_ROOMS | {"field", "projection", "annotation", "compositor", "worker"},
+    "rendering": BASE_ROOMS
+    | {"field", "projection", "annotation", "compositor", "worker", "image_io"},
     "preset_files": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "worker"},
+    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "worker", "image_io"},
     "scene": BASE_ROOMS
     | {
         "field",
@@ -72,6 +72,8 @@ MAY_IMPORT = {
     | {"field", "projection", "annotation", "compositor", "rendering", "worker", "scene", "gpu"},
     "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "worker", "scene"},
     "frame_workers": BASE_ROOMS | {"worker"},
+    "render_turntable": BASE_ROOMS
+    | {"rendering", "image_io", "worker", "scene", "gpu", "turntable_video"},
     "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
     "ui": BASE_ROOMS
     | {
@@ -81,12 +83,13 @@ MAY_IMPORT = {
         "compositor",
         "line_drawing",
         "surface_texture",
+        "worker",
         "scene",
         "gpu",
         "bake",
         "viewport",
     },
-    "external": BASE_ROOMS | {"field", "annotation", "turntable_video"},
+    "external": BASE_ROOMS | {"field", "annotation", "worker", "turntable_video"},
     "api": BASE_ROOMS
     | {
         "field",
@@ -159,6 +162,7 @@ BLENDER_ROOMS = (
         "bake_texture",
         "comb_field",
         "draw_strokes",
+        "render_turntable",
         "viewport",
         "cli",
         "animation",

@@ -20,7 +20,6 @@ from rosy_addon.errors import RosyError
 from rosy_addon.external.ffmpeg import find_encoder
 from rosy_addon.field.generate import axis_field
 from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw_compress
-from rosy_addon.processes import run_process
 from rosy_addon.progress import listening
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
@@ -32,6 +31,7 @@ from rosy_addon.turntable_video import (
     turntable,
     turntable_views,
 )
+from rosy_addon.worker.program import run_program
 
 QUICK = Look(length=8)
 
@@ -158,7 +158,7 @@ def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
         code = (
             f"import os, time; open({str(pid_file)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
         )
-        run_process([sys.executable, "-c", code], "encoding")
+        run_program([sys.executable, "-c", code], "encoding")
 
     def cancel(fraction, label):
         if label == "encoding the video" and pid_file.exists() and pid_file.read_text():
@@ -173,7 +173,7 @@ def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
 
 def test_a_program_that_fails():
     program = "import sys; print('bad pixels'); sys.exit(3)"
-    status, output = run_process([sys.executable, "-c", program], "")
+    status, output = run_program([sys.executable, "-c", program], "")
     assert (status, output.strip()) == (3, "bad pixels")
 
 

@@ -12,7 +12,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.image_io.png import png_bytes
+from rosy_addon.image_io.image_data import image_of_pixels
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_basis, orbit_camera
@@ -71,7 +71,7 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
     """Render and save the pictures of brushed metal: one field, two guiding angles, and without a map."""
     import bpy
 
-    from rosy_addon.scene.blender_images import ImageData, new_image
+    from rosy_addon.scene.blender_images import new_image
     from rosy_addon.scene.texture_nodes import new_anisotropy_material
 
     scene, obj = bpy.context.scene, bpy.context.object
@@ -81,8 +81,8 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
     for label, angle in (("horizontal strokes", 0.0), ("vertical strokes", np.pi / 2)):
         look = Look(guiding_angle=angle)
         pixels = draw_texture(instance, uv, look, TEXTURE_SIDE, content="anisotropy").rgba
-        png = png_bytes(pixels, is_color=False)
-        image = new_image("map", ImageData(pixels, png), is_color=False)
+        image_data = image_of_pixels(pixels, as_float=False, is_color=False)
+        image = new_image("map", image_data, is_color=False)
         material = new_anisotropy_material("metal", image, obj.data.uv_layers.active.name)
         obj.data.materials.clear()
         obj.data.materials.append(material)

@@ -1,26 +1,29 @@
-"""Running another program."""
+"""Running another program as part of a job."""
 
 from __future__ import annotations
 
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 
-from .progress import report
+from .job import Step, Steps, job
+from .start import guarded
 
-#: Seconds between two reports.
-POLL_SECONDS = 0.05
+#: Seconds for which each step waits.
+WAIT_SECONDS = 0.02
 
 
-def run_process(command: Sequence[str], label: str) -> tuple[int, str]:
-    """Run a program and wait for its end. An exception, as of a listener that cancels, kills it.
+@job
+def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
+    """Run a program and wait for its end. It is killed if the job is cancelled.
 
     Parameters
     ----------
     command : sequence of str
         The program and its arguments.
     label : str
-        What the program does, for the progress.
+        For the progress.
 
     Returns
     -------
@@ -34,12 +37,11 @@ def run_process(command: Sequence[str], label: str) -> tuple[int, str]:
             command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
         )
         try:
-            while process.poll() is None:
-                report(0.0, label)
-                try:
-                    process.wait(POLL_SECONDS)
-                except subprocess.TimeoutExpired:
-                    continue
+            with guarded(process):
+                while process.poll() is None:
+                    yield Step(0.0, label)
+                    with suppress(subprocess.TimeoutExpired):
+                        process.wait(WAIT_SECONDS)
         finally:
             if process.poll() is None:
                 process.kill()

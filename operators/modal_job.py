@@ -1,35 +1,48 @@
-"""Modal tasks: long work in small slices on a timer, with a progress display. ESC cancels it.
+"""Jobs in a window: a helper process computes, a timer hears from it, and ESC ends both at once.
 
-An operator derives from `ModalTaskMixin`, and returns its task from `make_task`. If it is called
-with ``EXEC_DEFAULT``, or if there is no window, the task runs to completion at once.
+An operator derives from `ModalJobMixin`, and returns the steps of its job from `begin`. If it is called
+with ``EXEC_DEFAULT``, or if there is no window, the job runs in Blender's process at once.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import bpy
 
 from ..rosy_addon.errors import REPORTED_ERRORS, as_sentence
-from ..rosy_addon.progress import Progress, Task, run_to_completion
 from ..rosy_addon.ui import job_status
+from ..rosy_addon.ui.preferences import uses_helper
 from ..rosy_addon.viewport.view3d import redraw_sidebars
-from .reports import report_error, report_operator_error
+from ..rosy_addon.worker.helper import HELPER, HelperLostError
+from ..rosy_addon.worker.job import Call, Step, Steps, run
+from ..rosy_addon.worker.pending_call import PendingCall
+from .reports import report_error, report_operator_error, report_warning
 
-#: Seconds of work in each slice. Events of the user are handled between slices.
+#: Seconds for which steps in Blender's process go on. Events of the user are handled between them.
 SLICE_SECONDS = 0.05
 
-#: Handlers of events that invalidate the data of a task, and the reasons that the user is told.
+#: Seconds between two looks at what the helper says.
+TIMER_SECONDS = 0.01
+
+#: Handlers of events that invalidate the data of a job, and the reasons that the user is told.
 INTERRUPT_REASONS = {
     "undo_pre": "undo was used",
     "redo_pre": "redo was used",
     "load_pre": "another file was opened",
 }
 
+#: Said once if there is no helper.
+NO_HELPER = "Blender waits while RoSy computes, as no other process can be started"
+
 #: The running job, if any.
 _current_job: Job | None = None
+
+#: Whether the user knows that there is no helper.
+_has_said_no_helper = False
 
 
 def stop_current_job() -> None:
@@ -39,39 +52,46 @@ def stop_current_job() -> None:
 
 
 class Job:
-    """A task that runs in a window, with its timer, handlers and progress display.
+    """A job that runs in a window, with its timer, handlers and progress display.
 
-    At most one job runs at a time. `stop` releases the timer, the handlers and the progress
-    display, and sets `stop_reason`.
+    At most one job runs at a time. `stop` ends the helper, releases the timer, the handlers and the
+    progress display, and sets `stop_reason`.
 
     Parameters
     ----------
     context : bpy.types.Context
-    task : Task
+    steps : Steps
     required_data : iterable of bpy.types.ID
-        Datablocks that the task needs. The job stops if one of them is deleted.
+        Datablocks that the job needs. It stops if one of them is deleted.
 
     Attributes
     ----------
     stop_reason : str or None
         Why the job has ended; None while it runs.
     result : Any
-        The result of the task once it is done.
+        The result of the job once it is done.
+    note : str
+        What the user should know when it has ended.
     """
 
     def __init__(
-        self, context: bpy.types.Context, task: Task[Any], required_data: Iterable[bpy.types.ID]
+        self, context: bpy.types.Context, steps: Steps[Any], required_data: Iterable[bpy.types.ID]
     ) -> None:
         """Start the timer, the handlers and the progress display, and make this the current job."""
         global _current_job
-        self.task = task
+        self.steps = steps
         self.required_data = list(required_data)
         self.scene, self.view_layer = context.scene, context.view_layer
         self.stop_reason: str | None = None
         self.result: Any = None
+        self.note = ""
+        self._uses_helper = uses_helper(context)
+        self._pending: PendingCall | None = None
+        self._answer: Any = None
+        self._error: Exception | None = None
         self.workspaces: list[bpy.types.WorkSpace] = []
         self.window_manager = context.window_manager
-        self.timer = self.window_manager.event_timer_add(0.01, window=context.window)
+        self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
         self.window_manager.progress_begin(0, 100)
         self.handlers = [
             (getattr(bpy.app.handlers, name), self._make_interrupt_handler(reason))
@@ -80,7 +100,7 @@ class Job:
         for handlers, handler in self.handlers:
             handlers.append(handler)
         _current_job = self
-        self._show_progress(context, Progress(0.0, "Starting"))
+        self._show_progress(context, Step(0.0, "starting"))
 
     def _make_interrupt_handler(self, reason: str) -> Any:
         """Return an application handler that stops the job."""
@@ -90,27 +110,31 @@ class Job:
 
         return interrupt
 
-    def run_slice(self, context: bpy.types.Context) -> bool:
-        """Run the task for `SLICE_SECONDS`.
+    def advance(self, context: bpy.types.Context) -> bool:
+        """Hear what the helper says, and go on with the job if it waits for nothing.
 
         Returns
         -------
         bool
-            True if the task is done. False if it continues, or the job was stopped.
+            True if the job is done. False if it continues, or was stopped.
 
         Raises
         ------
         RosyError
-            An error of the task. The job is stopped in this case.
+            An error of the job, which is stopped in this case.
         """
         if (reason := self._abort_reason(context)) is not None:
             self.stop(reason)
             return False
         deadline = time.monotonic() + SLICE_SECONDS
         try:
-            progress = next(self.task)
-            while time.monotonic() < deadline:
-                progress = next(self.task)
+            while True:
+                if self._pending is None:
+                    self._next_step(context)
+                elif not self._has_answer(context):
+                    return False
+                if time.monotonic() > deadline:
+                    return False
         except StopIteration as done:
             self.result = done.value
             self.stop("done")
@@ -121,15 +145,72 @@ class Job:
         except BaseException:
             self.stop("an error")
             raise
-        self._show_progress(context, progress)
+
+    def finish(self, context: bpy.types.Context) -> bool:
+        """Go on until the job is done or stopped, and return whether it is done."""
+        while self.stop_reason is None:
+            if self.advance(context):
+                return True
+            if self._pending is not None:
+                HELPER.wait(SLICE_SECONDS)
         return False
+
+    def _next_step(self, context: bpy.types.Context) -> None:
+        """Continue the job until it yields. Let a call be made."""
+        answer, error = self._answer, self._error
+        self._answer = self._error = None
+        step = self.steps.send(answer) if error is None else self.steps.throw(error)
+        if not isinstance(step, Call):
+            self._show_progress(context, step)
+        elif self._uses_helper:
+            try:
+                self._pending = PendingCall(step, HELPER)
+            except HelperLostError:
+                self._call_here(context, step)
+        else:
+            self._call_here(context, step)
+
+    def _has_answer(self, context: bpy.types.Context) -> bool:
+        """Return whether the call is done whose result the job waits for."""
+        pending = self._pending
+        try:
+            if not pending.poll():
+                self._show_progress(context, pending.progress)
+                return False
+        except HelperLostError:
+            self._pending = None
+            self._call_here(context, pending.call)
+            return True
+        except (
+            REPORTED_ERRORS
+        ) as error:  # the helper has ended twice, or its answer takes too much memory
+            pending.cancel()
+            self._error = error
+        else:
+            try:
+                self._answer = pending.result()
+            except Exception as error:
+                self._error = error
+        self._pending = None
+        return True
+
+    def _call_here(self, context: bpy.types.Context, call: Call) -> None:
+        """Make a call in this process, while Blender waits."""
+        global _has_said_no_helper
+        if self._uses_helper and not _has_said_no_helper:
+            self.note, _has_said_no_helper = NO_HELPER, True
+        with _wait_cursor(context):
+            try:
+                self._answer = call()
+            except Exception as error:
+                self._error = error
 
     def _abort_reason(self, context: bpy.types.Context) -> str | None:
         """Return why the job cannot continue; None if it can."""
         try:
             if context.scene != self.scene:
                 return "another scene was chosen"
-            if context.view_layer != self.view_layer:  # tasks hold its depsgraph
+            if context.view_layer != self.view_layer:  # jobs hold its depsgraph
                 return "another view layer was chosen"
             for data_block in self.required_data:
                 if isinstance(data_block, bpy.types.Object) and not data_block.users_scene:
@@ -138,15 +219,17 @@ class Job:
             return "required data was deleted"
         return None
 
-    def _show_progress(self, context: bpy.types.Context, progress: Progress) -> None:
-        """Show the progress in the cursor, the status bar and the sidebars."""
-        percent = int(100 * progress.fraction)
-        job_status.current = progress
+    def _show_progress(self, context: bpy.types.Context, step: Step) -> None:
+        """Show the progress in the cursor, the status bar and the sidebars, if it has changed."""
+        if step == job_status.current:
+            return
+        job_status.current = step
+        percent = int(100 * step.fraction)
         self.window_manager.progress_update(percent)
         if context.workspace is not None:
             if context.workspace not in self.workspaces:
                 self.workspaces.append(context.workspace)
-            label = as_sentence(progress.label)
+            label = as_sentence(step.label)
             context.workspace.status_text_set(f"RoSy: {label}, {percent} %     ESC: Cancel")
         redraw_sidebars()
 
@@ -158,10 +241,14 @@ class Job:
         self.stop_reason = reason
         _current_job = None
         job_status.current = None
+        if self._pending is not None:
+            self._pending.cancel()
+            with suppress(HelperLostError):
+                HELPER.start()  # for the next job
         try:
-            self.task.close()
+            self.steps.close()
         except ReferenceError:
-            pass  # the data that the task would restore were deleted
+            pass  # the data that the job would restore were deleted
         finally:
             self._cleanup()
 
@@ -178,34 +265,47 @@ class Job:
         redraw_sidebars()
 
 
-class ModalTaskMixin:
-    """Mixin of operators that run a task: implements execute, invoke, modal and cancel."""
+@contextmanager
+def _wait_cursor(context: bpy.types.Context) -> Iterator[None]:
+    """Show that Blender is busy."""
+    window = context.window
+    if window is not None:
+        window.cursor_modal_set("WAIT")
+    try:
+        yield
+    finally:
+        if window is not None:
+            window.cursor_modal_restore()
+
+
+class ModalJobMixin:
+    """Mixin of operators that run a job: implements execute, invoke, modal and cancel."""
 
     _job: Job | None = None
 
     #: State of the scene or of the files after a cancel, for the message to the user.
     cancel_note = "nothing was changed"
 
-    def make_task(self, context: bpy.types.Context) -> Task[Any]:
-        """Return the task of the operator.
+    def begin(self, context: bpy.types.Context) -> Steps[Any]:
+        """Return the steps of the operator's job.
 
         Raises
         ------
         RosyError
-            Reported to the user, like errors that the task itself raises.
+            Reported to the user, like errors that the job itself raises.
         """
         raise NotImplementedError
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        """Return the datablocks that the task needs. The job stops if one of them is deleted."""
+        """Return the datablocks that the job needs. It stops if one of them is deleted."""
         return ()
 
     def finish(self, context: bpy.types.Context, result: Any) -> None:
-        """Report the result of the task to the user."""
+        """Report the result of the job to the user."""
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            result = run_to_completion(self.make_task(context))
+            result = run(self.begin(context))
         except REPORTED_ERRORS as error:
             return report_error(self, error)
         self.finish(context, result)
@@ -215,7 +315,7 @@ class ModalTaskMixin:
         if bpy.app.background or context.window is None:
             return self.execute(context)
         try:
-            self._job = Job(context, self.make_task(context), self.required_data(context))
+            self._job = Job(context, self.begin(context), self.required_data(context))
         except REPORTED_ERRORS as error:
             return report_error(self, error)
         context.window_manager.modal_handler_add(self)
@@ -227,11 +327,15 @@ class ModalTaskMixin:
             job.stop("cancelled")
         elif job.stop_reason is None and event.type == "TIMER":
             try:
-                if job.run_slice(context):
-                    self.finish(context, job.result)
-                    return {"FINISHED"}
+                is_done = job.advance(context)
             except REPORTED_ERRORS as error:
                 return report_error(self, error)
+            if job.note:
+                report_warning(self, job.note)
+                job.note = ""
+            if is_done:
+                self.finish(context, job.result)
+                return {"FINISHED"}
         if job.stop_reason is not None:
             self.report({"INFO"}, f"RoSy stopped, {self.cancel_note}: {job.stop_reason}")
             return {"CANCELLED"}
@@ -243,8 +347,8 @@ class ModalTaskMixin:
             self._job.stop("the window was closed")
 
 
-class DialogTaskMixin(ModalTaskMixin):
-    """Mixin of operators that may ask the user something before they run their task.
+class DialogJobMixin(ModalJobMixin):
+    """Mixin of operators that may ask the user something before they run their job.
 
     Blender frees an operator when its dialog or file browser is confirmed. So a second operator, with
     the answer, does the work.

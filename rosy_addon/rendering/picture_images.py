@@ -1,0 +1,123 @@
+"""Pictures converted for images of Blender: their colors extend past the silhouette."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..color import to_linear
+from ..compositor.picture import Picture
+from ..image_io.image_data import ImageData, image_of_pixels
+from ..progress import progress, report
+from .draw import bake_picture
+from .view_input import ViewInput
+
+#: Pixels by which colors are extended past the border of the covered area. A render whose
+#: silhouette differs slightly (other subdivision, filtering) then still samples the picture.
+BLEED_PIXELS = 4
+
+#: Rows that are converted at once.
+BLOCK_ROWS = 64
+
+#: Label of all steps.
+STEP_LABEL = "converting the picture"
+
+#: Shown where there is no picture: the linear value of mid gray on screen.
+NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
+
+#: Share of the time for a picture after which it is converted.
+CONVERSION_START = 0.95
+
+
+def draw_image(
+    view: ViewInput, as_float: bool, keep_gbuffers: bool = True, workers: int = 0
+) -> tuple[Picture, ImageData]:
+    """Draw a picture with numpy and convert it; see `bake_picture` and `picture_image`."""
+    with progress(0.0, CONVERSION_START):
+        picture = bake_picture(view, keep_gbuffers, workers)
+    with progress(CONVERSION_START, 1.0):
+        return picture, picture_image(picture, as_float)
+
+
+def picture_image(picture: Picture, as_float: bool) -> ImageData:
+    """Convert a picture for a Blender image, with bleed; see `with_bleed`.
+
+    Parameters
+    ----------
+    picture : Picture
+        If it has thresholds of ink, their spread is stored, too.
+    as_float : bool
+        Store linear values in single precision (.exr) instead of 8-bit sRGB (.png).
+
+    Returns
+    -------
+    ImageData
+    """
+    with progress(0.0, 0.5):
+        pixels = _bleed(picture.rgba)
+    if picture.spread is not None:
+        spread = picture.rgba.copy()
+        spread[..., 0] = picture.spread
+        with progress(0.5):
+            spread = _bleed(spread)
+        # Where nothing was drawn, the ink is a mean tone.
+        is_blank = spread[..., 3] == 0
+        is_blank &= (pixels[..., :3] == NEUTRAL_GRAY).all(axis=2)
+        pixels[..., 3] = spread[..., 0]
+        pixels[is_blank] = (0.5, 0.5, 0.5, 1 / 3)
+    with progress(0.5, 1.0, STEP_LABEL):
+        return image_of_pixels(pixels, as_float, is_color=picture.spread is None)
+
+
+def _bleed(rgba: np.ndarray) -> np.ndarray:
+    """Return `with_bleed` of a picture, a few rows at a time."""
+    height = len(rgba)
+    pixels = np.empty(rgba.shape, dtype=np.float32)
+    for start in range(0, height, BLOCK_ROWS):
+        report(start / height, STEP_LABEL)
+        first = max(start - BLEED_PIXELS, 0)
+        block = with_bleed(rgba[first : start + BLOCK_ROWS + BLEED_PIXELS])
+        pixels[start : start + BLOCK_ROWS] = block[start - first :][:BLOCK_ROWS]
+    return pixels
+
+
+def with_bleed(rgba: np.ndarray) -> np.ndarray:
+    """Return a picture whose border colors are extended by `BLEED_PIXELS` pixels.
+
+    Pixels farther outside are `NEUTRAL_GRAY`. Alpha is not changed: it is the coverage.
+
+    Parameters
+    ----------
+    rgba : (H, W, 4) float32 ndarray
+        Linear.
+
+    Returns
+    -------
+    (H, W, 4) float32 ndarray
+    """
+    # Pad by one pixel, so that every pixel of the picture has eight neighbors.
+    padded = np.pad(rgba, ((1, 1), (1, 1), (0, 0)))
+    height, width = padded.shape[:2]
+    is_filled = padded[..., 3].ravel() > 0
+    pixels = padded.reshape(-1, 4)
+    pixels[~is_filled, :3] = NEUTRAL_GRAY
+    is_inside = np.zeros((height, width), dtype=bool)
+    is_inside[1:-1, 1:-1] = True
+    neighbor_offsets = [
+        row * width + column for row in (1, 0, -1) for column in (1, 0, -1) if row or column
+    ]
+    frontier = np.flatnonzero(is_filled)
+    for _ in range(BLEED_PIXELS):
+        is_adjacent = np.zeros_like(is_filled)
+        for offset in neighbor_offsets:
+            is_adjacent[frontier + offset] = True
+        targets = np.flatnonzero(is_adjacent & ~is_filled & is_inside.ravel())
+        total = np.zeros((len(targets), 3), dtype=np.float32)
+        count = np.zeros((len(targets), 1), dtype=np.float32)
+        for offset in neighbor_offsets:
+            neighbor_filled = is_filled[targets + offset, None]
+            total += pixels[targets + offset, :3] * neighbor_filled
+            count += neighbor_filled
+        pixels[targets, :3] = total / count
+        is_filled[targets] = True
+        frontier = targets
+    return padded[1:-1, 1:-1].copy()

@@ -1,0 +1,29 @@
+"""Start of the helper process before the first job, so that no click waits for it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import bpy
+
+from ..worker.helper import HELPER, HelperLostError
+from .preferences import uses_helper
+
+_has_started = False
+
+
+def start_helper_once(context: bpy.types.Context) -> None:
+    """Start the helper at the first call, unless the preferences switch it off."""
+    global _has_started
+    if _has_started or bpy.app.background or not uses_helper(context):
+        return
+    _has_started = True
+    with suppress(HelperLostError):
+        HELPER.start()
+
+
+def unregister() -> None:
+    """End the helper."""
+    global _has_started
+    HELPER.close()
+    _has_started = False

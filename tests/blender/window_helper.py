@@ -1,0 +1,294 @@
+"""RoSy in a window: jobs whose calls a helper process makes, and helpers that end.
+
+Run by run.py as ``blender --enable-event-simulate -P window_helper.py``. Every step is a generator
+that yields to let Blender handle its events (`window_steps`). The last step kills Blender, and run.py
+checks that no process of `PROCESSES` is left.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from conftest import add_camera, contents
+from window_steps import (
+    RESULTS,
+    SHOTS,
+    descendants,
+    in_view,
+    is_running,
+    preferences,
+    rosy,
+    run_steps,
+    view,
+    wait_until,
+)
+
+#: The numbers of the processes that Blender has started when it is killed.
+PROCESSES = RESULTS.with_suffix(".processes")
+
+#: Seconds within which ESC stops a job and ends the helper.
+STOP_SECONDS = 0.2
+
+#: Seconds for which Blender does not react at most, while the helper computes.
+RESPONSE_SECONDS = 0.4
+
+
+def suzanne(size=(320, 240)):
+    """Create a scene with Suzanne, her field and a camera."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    with in_view():
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = 2
+        camera = add_camera("Camera", (0.0, -4.5, 1.0), (math.radians(78), 0.0, 0.0))
+        bpy.context.scene.camera = camera
+        bpy.ops.object.select_all(action="DESELECT")
+        monkey = bpy.data.objects["Suzanne"]
+        monkey.select_set(True)
+        bpy.context.view_layer.objects.active = monkey
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
+        bpy.ops.ed.undo_push(message="field")
+    render = bpy.context.scene.render
+    render.resolution_x, render.resolution_y = size
+    area = view()[1]
+    area.spaces.active.show_region_ui = True
+    yield 0.3
+    view()[3].active_panel_category = "RoSy"
+    area.tag_redraw()
+    yield 0.3
+
+
+def status():
+    return rosy("rosy_addon.ui.job_status")
+
+
+def helper_id():
+    """Return the number of the helper process; None if there is none."""
+    process = rosy("rosy_addon.worker.helper").HELPER._process
+    return None if process is None else process.pid
+
+
+def start_bake():
+    with in_view():
+        assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
+
+
+def start_long_bake():
+    """Start a bake that no other one has prepared, and wait until the helper is at work."""
+    look = bpy.context.scene.rosy.look
+    look.method, look.seed = "brute", look.seed + 1
+    start_bake()
+    yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
+    assert status().current is not None, "the job ended before it could be interrupted"
+
+
+def note(name, *seconds):
+    """Add measured seconds to the file of them beside the screenshots."""
+    with (SHOTS / "helper-seconds.txt").open("a") as file:
+        print(name, *(f"{value:.3f}" for value in seconds), file=file)
+
+
+def baked_pixels():
+    """Return the pixels of the only baked picture."""
+    (image,) = [image for image in bpy.data.images if image.name.startswith("RoSy")]
+    values = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(values)
+    return values
+
+
+def wait_for_job():
+    """Wait until no job runs, and return how long Blender has not reacted at most before the end."""
+    longest, last = 0.0, time.monotonic()
+    while status().current is not None:
+        yield 0.01
+        now = time.monotonic()
+        if status().current is not None and status().current.fraction < 0.97:
+            longest = max(longest, now - last)
+        last = now
+        assert longest < 60
+    return longest
+
+
+def picture_from_the_helper():
+    """Blender reacts while the helper draws, and the picture is that of a script."""
+    yield from suzanne((1280, 960))
+    first = helper_id()
+    assert first is not None, "the panel has not started the helper"
+    start_bake()
+    longest = yield from wait_for_job()
+    note("longest pause", longest)
+    assert longest < RESPONSE_SECONDS, longest
+    assert helper_id() == first and is_running(first)
+    picture = baked_pixels()
+    with in_view():
+        bpy.ops.rosy.bake("EXEC_DEFAULT", True)
+    np.testing.assert_array_equal(baked_pixels(), picture)
+    subprocess.run(
+        ["import", "-window", "root", str(SHOTS / "helper-baked.png")], check=True, timeout=20
+    )
+
+
+def another_look_is_quick():
+    """Meshes are sent once, and what does not depend on the look is kept by the helper."""
+    yield from suzanne((1280, 960))
+    preferences().workers = 1
+    seconds = []
+    for gain in (1.0, 1.3):
+        bpy.context.scene.rosy.look.gain = gain
+        start = time.monotonic()
+        start_bake()
+        yield from wait_for_job()
+        seconds.append(time.monotonic() - start)
+    preferences().workers = 0
+    note("bakes with two looks", *seconds)
+    assert seconds[1] < 0.8 * seconds[0], seconds
+
+
+def escape_ends_the_helper_at_once():
+    yield from suzanne((1600, 1200))
+    before = contents()
+    yield from start_long_bake()
+    first, job_class, stopped = helper_id(), rosy("operators.modal_job").Job, []
+    stop = job_class.stop
+
+    def timed_stop(job, reason):
+        start = time.monotonic()
+        stop(job, reason)
+        stopped.append((reason, time.monotonic() - start, is_running(first)))
+
+    job_class.stop = timed_stop
+    try:
+        window, _, region, _ = view()
+        x, y = region.x + region.width // 2, region.y + region.height // 2
+        start = time.monotonic()
+        window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
+        window.event_simulate(type="ESC", value="RELEASE", x=x, y=y)
+        yield from wait_until(lambda: status().current is None)
+        note("from ESC to the end, with the drawing of the window", time.monotonic() - start)
+    finally:
+        job_class.stop = stop
+    ((reason, seconds, is_left),) = stopped
+    note("from ESC to the end", seconds)
+    assert reason == "cancelled" and seconds < STOP_SECONDS and not is_left, stopped
+    assert contents() == before
+    yield 0.3
+    assert helper_id() not in (None, first), "there is no helper for the next job"
+
+
+def a_helper_that_is_killed():
+    """Another helper draws the picture. If that is killed as well, there is one message."""
+    yield from suzanne((800, 600))
+    yield from start_long_bake()
+    first = helper_id()
+    os.kill(first, signal.SIGKILL)
+    yield from wait_for_job()
+    assert helper_id() not in (None, first) and len(baked_pixels()) == 4 * 800 * 600
+    yield from suzanne((1600, 1200))
+    before = contents()
+    yield from start_long_bake()
+    first = helper_id()
+    os.kill(first, signal.SIGKILL)
+    yield from wait_until(lambda: helper_id() not in (None, first))
+    helper = rosy("rosy_addon.worker.helper").HELPER
+    yield from wait_until(lambda: helper._is_ready)
+    os.kill(helper_id(), signal.SIGKILL)
+    yield from wait_for_job()
+    assert contents() == before
+    assert_reported("has ended twice")
+
+
+def without_a_helper():
+    """Blender waits for the picture if no process can be started, or the user wants none."""
+    helper = rosy("rosy_addon.worker.helper")
+    start_process = helper._start_process
+
+    def refuse(*_):
+        raise OSError("too many processes")
+
+    yield from suzanne()
+    helper.HELPER.close()
+    helper._start_process = refuse
+    try:
+        for _ in range(2):
+            start_bake()
+            yield from wait_for_job()
+            assert len(baked_pixels()) == 4 * 320 * 240
+    finally:
+        helper._start_process = start_process
+    assert_reported("Blender waits while RoSy computes")
+    preferences().use_helper = False
+    try:
+        start_bake()
+        yield from wait_for_job()
+    finally:
+        preferences().use_helper = True
+    assert helper_id() is None
+
+
+def assert_reported(text):
+    """Check that a line is among the reports of Blender, once."""
+    reports = report_texts()
+    assert sum(text in report for report in reports) == 1, reports
+
+
+def report_texts():
+    """Return the reports of Blender in the order in which they came."""
+    window, area, _, _ = view()
+    kind = area.ui_type
+    area.ui_type = "INFO"
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
+            bpy.ops.info.select_all(action="SELECT")
+            bpy.ops.info.report_copy()
+    finally:
+        area.ui_type = kind
+    return bpy.context.window_manager.clipboard.splitlines()
+
+
+def switched_off():
+    """The helper ends with the extension."""
+    yield from suzanne()
+    start_bake()
+    yield from wait_for_job()
+    first, name = helper_id(), "bl_ext.user_default.rosy"
+    bpy.ops.preferences.addon_disable(module=name)
+    assert not is_running(first)
+    bpy.ops.preferences.addon_enable(module=name)
+    yield 0.2
+
+
+def blender_is_killed():
+    """All processes end, while they draw a large picture together."""
+    yield from suzanne((1920, 1440))
+    bpy.context.scene.rosy.look.supersampling = 2
+    yield from start_long_bake()
+    processes = descendants()
+    assert helper_id() in processes
+    PROCESSES.write_text(json.dumps(processes))
+    results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
+    results |= {"blender is killed": ["", 0.0], "the end": ["", 0.0]}
+    RESULTS.write_text(json.dumps(results))
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+run_steps(
+    picture_from_the_helper,
+    another_look_is_quick,
+    escape_ends_the_helper_at_once,
+    a_helper_that_is_killed,
+    without_a_helper,
+    switched_off,
+    blender_is_killed,
+)

@@ -1,0 +1,153 @@
+"""Jobs whose calls a helper process makes give what they give in place."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+from rosy.rosy_addon.animation import bake_animation
+from rosy.rosy_addon.bake import bake
+from rosy.rosy_addon.bake_texture import bake_texture
+from rosy.rosy_addon.comb_field import start_stroke
+from rosy.rosy_addon.draw_strokes import draw_strokes
+from rosy.rosy_addon.field.guide_brush import GuideBrush
+from rosy.rosy_addon.line_drawing.style import StrokeStyle
+from rosy.rosy_addon.render_turntable import render_turntable
+from rosy.rosy_addon.scene.field_difference import store_difference
+from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
+from rosy.rosy_addon.scene.pictures import OutputSettings
+from rosy.rosy_addon.scene.tangents import mesh_tangents
+from rosy.rosy_addon.worker.helper import Helper
+from rosy.rosy_addon.worker.job import Call, run
+from rosy.rosy_addon.worker.pending_call import PendingCall
+from scenes import add_field, pixels
+
+
+@pytest.fixture(scope="module")
+def helper():
+    helper = Helper()
+    yield helper
+    helper.close()
+
+
+@pytest.fixture
+def run_with(helper):
+    """A function that runs the steps of a job, given "in place" or "helper"."""
+
+    def run_beside(steps):
+        answer = None
+        while True:
+            try:
+                step = steps.send(answer)
+            except StopIteration as end:
+                return end.value
+            answer = None
+            if isinstance(step, Call):
+                pending = PendingCall(step, helper)
+                while not pending.poll():
+                    helper.wait(5.0)
+                answer = pending.result()
+
+    return lambda where, steps: run(steps) if where == "in place" else run_beside(steps)
+
+
+def picture(run_with, where, scene, monkey):
+    return pixels(run_with(where, bake.begin(scene, workers=1))[0].image)
+
+
+def hatching_by_the_light(run_with, where, scene, monkey):
+    light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    scene.collection.objects.link(light)
+    scene.rosy.look.ink, scene.rosy.look.light = "hatch", "scene"
+    settings = OutputSettings(as_float=True, relight=True)
+    return pixels(run_with(where, bake.begin(scene, settings=settings, workers=1))[0].image)
+
+
+def texture(run_with, where, scene, monkey):
+    scene.rosy.texture_size = 64
+    monkey.data.uv_layers.new(name="UVMap")
+    return pixels(run_with(where, bake_texture.begin(scene, [monkey]))[0].image)
+
+
+def strokes(run_with, where, scene, monkey):
+    style = StrokeStyle(spacing=20)
+    result = run_with(where, draw_strokes.begin(scene, kind="CURVES", style=style))
+    return result.drawing.strokes.points
+
+
+def occlusion(run_with, where, scene, monkey):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    run_with(where, store_occlusion.begin(depsgraph, [monkey], direction_count=8))
+    attribute = monkey.data.attributes[OCCLUSION_ATTRIBUTE]
+    values = np.empty(len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("value", values)
+    return values
+
+
+def tangents(run_with, where, scene, monkey):
+    return run_with(where, mesh_tangents.begin(monkey.data, 0.3))
+
+
+def difference(run_with, where, scene, monkey):
+    attribute = monkey.data.attributes.new("other", "FLOAT_VECTOR", "FACE")
+    values = np.empty(3 * len(attribute.data), dtype=np.float32)
+    monkey.data.attributes["rosy"].data.foreach_get("vector", values)
+    attribute.data.foreach_set("vector", values)
+    add_field(monkey, kind="axis")
+    return run_with(where, store_difference.begin(monkey.data, "other")).statistics
+
+
+def combed_field(run_with, where, scene, monkey):
+    vectors = []
+    for x in (-0.3, 0.3):  # the second stroke uses what the helper has kept
+        stroke = start_stroke(monkey.data, GuideBrush(0.4, 1.0, "comb", False, True), 0.1)
+        points = np.stack([np.linspace(x - 0.1, x + 0.1, 5), np.full(5, -0.8), np.full(5, 0.3)])
+        stroke.extend(points.T, np.ones(5))
+        stroke.lift()
+        run_with(where, stroke.settle())
+        vectors.append(stroke.store().vectors)
+    return np.stack(vectors)
+
+
+JOBS = [picture, hatching_by_the_light, texture, strokes, occlusion, tangents, difference]
+JOBS += [combed_field]
+
+
+@pytest.mark.parametrize("job", JOBS, ids=lambda job: job.__name__)
+def test_a_helper_computes_the_same(scene, camera, monkey, run_with, job):
+    scene.render.resolution_x, scene.render.resolution_y = 80, 60
+    original = monkey.data.copy()
+    results = []
+    for where in ("in place", "helper"):
+        monkey.data = original.copy()
+        results.append(job(run_with, where, scene, monkey))
+    np.testing.assert_array_equal(*results)
+
+
+def test_files_are_the_same(scene, camera, monkey, run_with, tmp_path):
+    """Frames and a .gif."""
+    scene.render.resolution_x, scene.render.resolution_y = 80, 60
+    files = {}
+    for where in ("in place", "helper"):
+        folder = tmp_path / where
+        settings = OutputSettings(folder=folder / "frames")
+        run_with(where, bake_animation.begin(scene, [1, 2], settings=settings, workers=1))
+        turntable = render_turntable.begin(
+            scene, monkey, folder / "a.gif", count=3, rate=10.0, size=(64, 48), view_angles=(0, 20)
+        )
+        run_with(where, turntable)
+        files[where] = {
+            path.relative_to(folder): path.read_bytes()
+            for path in sorted(folder.rglob("*"))
+            if path.is_file()
+        }
+    assert len(files["helper"]) == 5 and files["in place"] == files["helper"]
+
+
+def test_a_turntable_that_is_cancelled_leaves_no_file(scene, camera, monkey, tmp_path):
+    steps = render_turntable.begin(
+        scene, monkey, tmp_path / "a.gif", count=3, rate=10.0, size=(64, 48), view_angles=(0, 20)
+    )
+    steps.send(next(steps)())
+    steps.close()
+    assert not list(tmp_path.iterdir())

@@ -126,7 +126,7 @@ def test_a_call_is_made_again_if_its_helper_is_killed(helper):
 
 
 def test_no_process_can_be_started(helper, monkeypatch):
-    monkeypatch.setattr("rosy_addon.worker.helper._start_process", refuse)
+    monkeypatch.setattr("rosy_addon.worker.helper.start_module", refuse)
     with pytest.raises(HelperLostError) as caught:
         PendingCall(Call(sum, ([1, 2],)), helper)
     assert not caught.value.has_started

@@ -132,5 +132,5 @@ def test_no_process_can_be_started(helper, monkeypatch):
     assert not caught.value.has_started
 
 
-def refuse(*_):
+def refuse(*_, **__):
     raise OSError("too many processes")

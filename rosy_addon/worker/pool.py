@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from multiprocessing.connection import wait
 from typing import Any
 
@@ -56,63 +57,75 @@ class Pool:
         list
             The results, in the order of the arguments.
         """
-        waiting = deque(range(len(arguments)))
-        results: list[Any] = [None] * len(arguments)
-        busy: dict[Helper, tuple[int, Handle]] = {}
-        lost: set[Helper] = set()
-        helper_count = min(count or core_count(), len(arguments)) - 1
+        helper_count = max(min(count or core_count(), len(arguments)) - 1, 0)
         while len(self.helpers) < helper_count:
             self.helpers.append(Helper(ENVIRONMENT))
-
-        report_here = current_report()
-
-        def collect() -> None:
-            """Take what helpers have done, and give them what is waiting."""
-            for helper in self.helpers[: max(helper_count, 0)]:
-                if helper in lost:
-                    continue
-                try:
-                    if helper in busy:
-                        index, handle = busy[helper]
-                        if not handle.poll():
-                            continue
-                        del busy[helper]
-                        results[index] = handle.result()
-                    if waiting:
-                        index = waiting.popleft()
-                        busy[helper] = index, helper.submit(function, *arguments[index])
-                        busy[helper][1].poll()
-                except HelperLostError:
-                    lost.add(helper)
-                    waiting.appendleft(busy.pop(helper)[0] if helper in busy else index)
-
-        def hear(fraction: float, label: str) -> None:
-            """Report the work of this process, and attend to the helpers."""
-            collect()
-            done = len(arguments) - len(waiting) - len(busy) - 1
-            report_here((done + fraction) / len(arguments), label)
-
-        try:
-            while waiting or busy:
-                collect()
-                if waiting:
-                    index = waiting.popleft()
-                    with listening(hear):
-                        results[index] = function(*arguments[index])
-                elif busy:
-                    hear(1.0, "waiting for other processes")
-                    wait([helper.connection for helper in busy], WAIT_SECONDS)
-        except BaseException:
-            for _, handle in busy.values():
-                handle.cancel()
-            raise
-        return results
+        return _SharedCalls(self.helpers[:helper_count], function, arguments).make()
 
     def close(self) -> None:
         """End all helpers."""
         for helper in self.helpers:
             helper.close()
         self.helpers.clear()
+
+
+class _SharedCalls:
+    """Calls that this process and some helpers make together."""
+
+    def __init__(
+        self,
+        helpers: Sequence[Helper],
+        function: Callable[..., Any],
+        arguments: Sequence[tuple[Any, ...]],
+    ) -> None:
+        self._function, self._arguments = function, arguments
+        self._results: list[Any] = [None] * len(arguments)
+        #: Numbers of the calls that nobody makes yet, and of those that helpers make.
+        self._waiting = deque(range(len(arguments)))
+        self._given: dict[Helper, tuple[int, Handle]] = {}
+        self._free = list(helpers)
+        self._report = current_report()
+
+    def make(self) -> list[Any]:
+        """Make all calls, and return their results in order."""
+        try:
+            while self._waiting or self._given:
+                self._attend_to_helpers()
+                if self._waiting:
+                    number = self._waiting.popleft()
+                    with listening(self._hear):
+                        self._results[number] = self._function(*self._arguments[number])
+                elif self._given:
+                    wait([helper.connection for helper in self._given], WAIT_SECONDS)
+                    self._hear(1.0, "waiting for other processes")
+        except BaseException:
+            for _, handle in self._given.values():
+                handle.cancel()
+            raise
+        return self._results
+
+    def _hear(self, fraction: float, label: str) -> None:
+        """Report the work of this process, and attend to the helpers."""
+        self._attend_to_helpers()
+        done = len(self._arguments) - len(self._waiting) - len(self._given) - 1
+        self._report((done + fraction) / len(self._arguments), label)
+
+    def _attend_to_helpers(self) -> None:
+        """Take what helpers have done, and give them what waits. The calls of lost ones wait again."""
+        for helper, (number, handle) in list(self._given.items()):
+            try:
+                if handle.poll():
+                    self._results[number] = handle.result()
+                    self._free.append(helper)
+                    del self._given[helper]
+            except HelperLostError:
+                self._waiting.appendleft(number)
+                del self._given[helper]
+        while self._waiting and self._free:
+            helper = self._free.pop()
+            with suppress(HelperLostError):
+                handle = helper.submit(self._function, *self._arguments[self._waiting[0]])
+                self._given[helper] = self._waiting.popleft(), handle
 
 
 #: The helpers of this process.

@@ -37,17 +37,19 @@ REFUSED_MODULES = {
 #: its own helpers in Blender's Python, and pickles and pipes are only between these. Of multiprocessing,
 #: only the connections are used: it neither starts nor finds processes.
 QUESTIONED_MODULES = {
-    "subprocess": {"frame_workers.py", "processes.py", "worker/helper.py", "worker/program.py"},
+    "subprocess": {
+        *("frame_workers.py", "worker/start.py", "worker/helper.py", "worker/program.py"),
+    },
     "pickle": {"worker/channel.py", "worker/__main__.py"},
     "multiprocessing": {
-        *("worker/helper.py", "worker/channel.py", "worker/pool.py", "worker/__main__.py"),
+        *("worker/start.py", "worker/helper.py", "worker/channel.py", "worker/pool.py"),
     },
     "ctypes": {"memory.py"},
 }
 
 #: The file that starts helpers. They look for modules where Blender does, so it reads `sys.path`, and
 #: sets PYTHONPATH for them.
-HELPER_FILE = "worker/helper.py"
+HELPER_FILE = "worker/start.py"
 
 #: Files that look for others beside themselves, to read or to run them.
 FILES_WITH_PATHS = {

@@ -212,21 +212,21 @@ def a_helper_that_is_killed():
 def without_a_helper():
     """Blender waits for the picture if no process can be started, or the user wants none."""
     helper = rosy("rosy_addon.worker.helper")
-    start_process = helper._start_process
+    start_process = helper.start_module
 
-    def refuse(*_):
+    def refuse(*_, **__):
         raise OSError("too many processes")
 
     yield from suzanne()
     helper.HELPER.close()
-    helper._start_process = refuse
+    helper.start_module = refuse
     try:
         for _ in range(2):
             start_bake()
             yield from wait_for_job()
             assert len(baked_pixels()) == 4 * 320 * 240
     finally:
-        helper._start_process = start_process
+        helper.start_module = start_process
     assert_reported("Blender waits while RoSy computes")
     preferences().use_helper = False
     try:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import RosyError
+from ..field.blocks import row_blocks
 from ..progress import progress, report
 from ..projection.camera import Camera
 from .pipeline import simplify_strokes
@@ -99,7 +100,7 @@ def _csv_blocks(
     """Yield a header, then a row for each point. A closed stroke ends at its first point."""
     yield "stroke,family,x,y,z,nx,ny,nz,width\n"
     stroke = strokes.stroke
-    for rows in _row_blocks(len(points)):
+    for rows in row_blocks(len(points), POINTS_PER_BLOCK):
         names = [strokes.names[family] for family in strokes.family[stroke[rows]]]
         values = np.column_stack([points[rows], normals[rows], width[rows]]).tolist()
         yield "".join(
@@ -123,7 +124,7 @@ def _obj_blocks(
     yield "# Each normal and each texture coordinate, the width, is that of the vertex of the same number\n"
     for keyword, values in (("v", points), ("vn", normals), ("vt", width[:, None])):
         form = keyword + values.shape[1] * (" %.9g" if keyword == "v" else " %.6g") + "\n"
-        for block in _row_blocks(len(rows)):
+        for block in row_blocks(len(rows), POINTS_PER_BLOCK):
             yield "".join(form % tuple(row) for row in values[rows[block]].tolist())
     number = np.cumsum(kept)
     number[~kept] = number[first_of_closed]
@@ -171,9 +172,3 @@ def _without_repeated_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
     kept = np.ones(len(strokes.points), dtype=bool)
     kept[strokes.start[1:][strokes.closed] - 1] = False
     return strokes.start[:-1][strokes.closed], kept
-
-
-def _row_blocks(count: int) -> Iterator[slice]:
-    """Yield the rows of each block."""
-    for first in range(0, count, POINTS_PER_BLOCK):
-        yield slice(first, min(first + POINTS_PER_BLOCK, count))

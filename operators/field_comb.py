@@ -123,7 +123,7 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
                 line.lift()
             line.extend(np.array([point.location]), np.array([point.pressure]))
         line.lift()
-        yield from part(self._settle(context, line), 0.4, 1.0)
+        return part(self._settle(context, line), 0.4, 1.0)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if len(self.stroke) or context.region_data is None:

@@ -153,8 +153,8 @@ class _Worker:
         self._log = log.open("rb")
         self._partial_line = b""
 
-    def new_lines(self) -> Iterator[str]:
-        """Read what the process has printed since the last call, and yield the lines.
+    def new_lines(self) -> list[str]:
+        """Return the lines that the process has printed since the last call.
 
         Once the process has ended, this includes a last line without an end.
         """
@@ -162,9 +162,9 @@ class _Worker:
         if self.process.returncode is not None and self._partial_line:
             lines.append(self._partial_line)
             self._partial_line = b""
-        for line in lines:
-            self.lines.append(line.decode(errors="replace").rstrip("\r"))
-            yield self.lines[-1]
+        texts = [line.decode(errors="replace").rstrip("\r") for line in lines]
+        self.lines += texts
+        return texts
 
     def stop(self) -> None:
         """End the process if it still runs."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -114,28 +113,30 @@ def available_memory() -> int | None:
     return max(min(found), 0) if found else None
 
 
-def _system_memory() -> Iterator[int]:
-    """Yield the bytes that the operating system has left."""
+def _system_memory() -> list[int]:
+    """Return the bytes that the operating system has left."""
     if sys.platform == "win32":
         # The structure MEMORYSTATUSEX: its size and the load, then seven amounts.
         status = (ctypes.c_uint64 * 8)(64)
         if ctypes.windll.kernel32.GlobalMemoryStatusEx(ctypes.byref(status)):
-            yield min(status[4], status[6])  # of memory with page files, and of the address space
-    elif sys.platform == "darwin":
-        yield os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    else:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        kilobytes = {name: int(rest.split()[0]) for name, rest in (s.split(":") for s in lines)}
-        yield (kilobytes["MemAvailable"] + kilobytes["SwapFree"]) * 1024
+            # Of memory with page files, and of the address space.
+            return [min(status[4], status[6])]
+        return []
+    if sys.platform == "darwin":
+        return [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
+    lines = Path("/proc/meminfo").read_text().splitlines()
+    kilobytes = {name: int(rest.split()[0]) for name, rest in (s.split(":") for s in lines)}
+    return [(kilobytes["MemAvailable"] + kilobytes["SwapFree"]) * 1024]
 
 
-def _control_group_memory(root: Path = Path("/")) -> Iterator[int]:
-    """Yield the bytes that each control group of this process leaves, under a root directory.
+def _control_group_memory(root: Path = Path("/")) -> list[int]:
+    """Return the bytes that each control group of this process leaves, under a root directory.
 
     The files of a group are read where they are mounted, and those of the groups that contain it.
     In a container, the path of the group may not exist; its files are then those of the mount.
     Memory that only caches files is free.
     """
+    free = []
     for line in (root / "proc/self/cgroup").read_text().splitlines():
         _, controllers, path = line.split(":", 2)
         if controllers == "":
@@ -155,16 +156,18 @@ def _control_group_memory(root: Path = Path("/")) -> Iterator[int]:
                 used = int((folder / usage_name).read_text())
                 counts = (folder / "memory.stat").read_text().split()
                 cached = dict(zip(counts[::2], counts[1::2], strict=True)).get(cached_name, 0)
-                yield limit - used + int(cached)
+                free.append(limit - used + int(cached))
             if folder == mount:
                 break
+    return free
 
 
-def _address_space() -> Iterator[int]:
-    """Yield the bytes that the limit of the address space of this process leaves, if it has one."""
+def _address_space() -> list[int]:
+    """Return the bytes that the limit of the address space of this process leaves, if it has one."""
     import resource  # not on Windows
 
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if limit != resource.RLIM_INFINITY:
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
-        yield limit - pages * os.sysconf("SC_PAGE_SIZE")
+    if limit == resource.RLIM_INFINITY:
+        return []
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    return [limit - pages * os.sysconf("SC_PAGE_SIZE")]

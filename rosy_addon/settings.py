@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 from functools import cache
@@ -249,11 +249,10 @@ def check_settings(settings: Any) -> None:
         setting.check(getattr(settings, name))
 
 
-def pixel_lengths(cls: type) -> Iterator[Number]:
-    """Yield the settings of a class that are lengths in pixels."""
-    for setting in settings_of(cls).values():
-        if isinstance(setting, Number) and setting.is_pixel_length:
-            yield setting
+def pixel_lengths(cls: type) -> list[Number]:
+    """Return the settings of a class that are lengths in pixels."""
+    numbers = [setting for setting in settings_of(cls).values() if isinstance(setting, Number)]
+    return [setting for setting in numbers if setting.is_pixel_length]
 
 
 def stage_key(settings: Any, stage: Stage) -> tuple[Any, ...]:

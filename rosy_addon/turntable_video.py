@@ -23,7 +23,7 @@ from .memory import check_memory
 from .progress import progress, report
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
-from .rendering.draw import bake_picture
+from .rendering.draw import bake_picture, draw_picture
 from .rendering.view_input import ViewInput
 
 #: Suffixes of videos that can be written.
@@ -90,11 +90,11 @@ def turntable_views(
         yield ViewInput((instance,), camera, flow_at(look, index, count), camera_lights)
 
 
-def evicting(views: Iterator[ViewInput], cache: Cache) -> Iterator[ViewInput]:
-    """Yield the same views. After each is drawn, evict what it has not used."""
-    for view in views:
-        yield view
-        cache.evict_unused()
+def draw_next(view: ViewInput, cache: Cache, **options: Any) -> Picture:
+    """Draw a picture as `draw_picture`, and evict from the cache what it has not used."""
+    picture = draw_picture(view, cache, **options)
+    cache.evict_unused()
+    return picture
 
 
 def check_still(look: Look, still: bool, name: str) -> None:
@@ -113,6 +113,7 @@ def turntable(
     path: Path,
     fps: float,
     encode: Encoder | None = None,
+    on_picture: Callable[[int], None] | None = None,
 ) -> Path:
     """Draw views and write them as a video. No file is written before all pictures are drawn.
 
@@ -126,6 +127,8 @@ def turntable(
         Number of views.
     path, fps, encode
         See `VideoWriter`.
+    on_picture : function, optional
+        Called with the number of each picture, from 1, before it is drawn.
 
     Returns
     -------
@@ -134,6 +137,8 @@ def turntable(
     """
     with VideoWriter(path, fps, encode) as writer:
         for index, view in enumerate(views):
+            if on_picture is not None:
+                on_picture(index + 1)
             start, stop = (ENCODING_START * done / count for done in (index, index + 1))
             if not index:
                 writer.check_memory(count, view.camera.width, view.camera.height)

@@ -29,7 +29,7 @@ from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
 from ..turntable_video import Encoder, check_video_path, turntable
 from .field import Field, warn
-from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, announced, find_ffmpeg, picture_look
+from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, find_ffmpeg, picture_look
 
 #: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
 #: divided by the width of lines. The correlation of the two pictures is then above 0.9.
@@ -124,11 +124,8 @@ def film(
         keeps_anchor="anchor" in settings,
         name=str(path),
     )
-    views = series.views()
-    if on_picture is not None:
-        views = announced(views, on_picture)
     draw = partial(draw_picture, cache=Cache(), keep_gbuffers=False, workers=workers)
-    result = turntable(draw, views, series.picture_count, path, rate, encode)
+    result = turntable(draw, series.views(), series.picture_count, path, rate, encode, on_picture)
     warn(series.advice)
     return result
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -26,12 +26,11 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
-from ..rendering.view_input import ViewInput
 from ..turntable_video import (
     Encoder,
     check_still,
     check_video_path,
-    evicting,
+    draw_next,
     turntable_views,
 )
 from ..turntable_video import (
@@ -322,11 +321,8 @@ def turntable(
     views = turntable_views(
         instance, look, pictures, check_size(*size), view, perspective=not orthographic, still=still
     )
-    if on_picture is not None:
-        views = announced(views, on_picture)
-    cache = Cache()
-    draw = partial(draw_picture, cache=cache, keep_gbuffers=still, workers=workers)
-    return rosy_addon_turntable(draw, evicting(views, cache), pictures, path, rate, encode)
+    draw = partial(draw_next, cache=Cache(), keep_gbuffers=still, workers=workers)
+    return rosy_addon_turntable(draw, views, pictures, path, rate, encode, on_picture)
 
 
 def picture_look(
@@ -367,13 +363,6 @@ def picture_look(
         raise RosyError(f"{name}: choose one source of the tone, {' or '.join(given)}")
     look = replace(look, hue="values") if has_color_values else look
     return replace(look, tone=given[0]) if given else look
-
-
-def announced(views: Iterator[ViewInput], on_picture: Callable[[int], None]) -> Iterator[ViewInput]:
-    """Yield the same views, and call a function with the number of each, from 1, before it is drawn."""
-    for number, view in enumerate(views, 1):
-        on_picture(number)
-        yield view
 
 
 def find_ffmpeg() -> Encoder | None:

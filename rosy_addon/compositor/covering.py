@@ -21,7 +21,7 @@ of the cell plus a constant, and no table of neighbors is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,7 +188,7 @@ class Covering:
 
     def neighbor_lines(
         self, line: np.ndarray, offsets: Sequence[tuple[int, int]]
-    ) -> Iterator[np.ndarray]:
+    ) -> list[np.ndarray]:
         """Find the lines of neighboring cells that match the given lines.
 
         Parameters
@@ -198,9 +198,9 @@ class Covering:
         offsets : sequence of (int, int)
             Offsets of neighbors: pixels along the line, and to its left.
 
-        Yields
-        ------
-        (n,) intp ndarray
+        Returns
+        -------
+        list of (n,) intp ndarray
             Indices of lines for each offset, of the cell `SINK_CELL` where there is no linked
             neighbor.
         """
@@ -212,13 +212,15 @@ class Covering:
         x, y = x / norm, y / norm
         phase_bits = self.packed_phase.take(cell)
         mask = unpack_neighbor_mask(phase_bits)
+        neighbors = []
         for forward, left in offsets:
             column = np.rint(forward * x - left * y).astype(np.intp)
             row = np.rint(forward * y + left * x).astype(np.intp)
             linked = mask >> (column + 3 * row + 4).astype(np.uint32) & 1
             neighbor = np.where(linked, cell + row * self.width + column, SINK_CELL)
             matching = np.rint(phase_bits - self.packed_phase.take(neighbor)).astype(np.intp)
-            yield (sheet + matching) % self.line_count * self.cell_count + neighbor
+            neighbors.append((sheet + matching) % self.line_count * self.cell_count + neighbor)
+        return neighbors
 
 
 def member_lines(field: PixelField) -> np.ndarray:

@@ -8,7 +8,6 @@ are visible. Marks that are too short are not drawn, unless they are the border 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -100,24 +99,25 @@ def outline_coverage(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -
     return (sums / np.maximum(counts, 1)).astype(np.float32)
 
 
-def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> Iterator[tuple[slice, slice]]:
+def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> list[tuple[slice, slice]]:
     """Divide entries of a G-buffer into bands of rows with at most `MAX_OUTLINE_SAMPLES` or so.
 
-    Yields
-    ------
-    band, core : slice
+    Returns
+    -------
+    list of (band, core)
         Ranges of `entries`: the rows of the band, and the same without a margin of so many pixels
         that it shares with the other bands.
     """
     row = gbuffer.pixel[entries] // np.int32(gbuffer.camera.width)
     limit = max(MAX_OUTLINE_SAMPLES // gbuffer.samples.side**2, 1)
-    start = 0
+    bands, start = [], 0
     while start < len(row):
         last_row = row[min(start + limit, len(row)) - 1]
         ends = np.array([row[start] - margin, last_row + 1, last_row + 1 + margin], row.dtype)
         first, stop, band_stop = np.searchsorted(row, ends).tolist()
-        yield slice(first, band_stop), slice(start, stop)
+        bands.append((slice(first, band_stop), slice(start, stop)))
         start = stop
+    return bands
 
 
 def _sample_outline(

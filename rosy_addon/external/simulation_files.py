@@ -224,7 +224,7 @@ def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
 def simulation_steps(
     paths: Sequence[str | os.PathLike[str]],
 ) -> Iterator[tuple[Step, SimulationMesh]]:
-    """Yield the steps of a series with their meshes, one after the other.
+    """Iterate over the steps of a series with their meshes.
 
     A mesh is read when it is asked for, and is not kept.
 
@@ -233,8 +233,7 @@ def simulation_steps(
     >>> for step, mesh in simulation_steps(["flow.pvd"]):
     ...     print(step.time, mesh.polygons.face_count)
     """
-    for step in list_steps(paths):
-        yield step, step.read()
+    return ((step, step.read()) for step in list_steps(paths))
 
 
 def build_surface(mesh: SimulationMesh) -> Surface:
@@ -445,7 +444,7 @@ def _mesh_of(dataset: Any, path: Path, name: str) -> SimulationMesh:
         dataset = pyvista.MultiBlock(dataset)
     has_parts = isinstance(dataset, pyvista.MultiBlock) or path.suffix.lower() in _PARTED_SUFFIXES
     if isinstance(dataset, pyvista.MultiBlock):
-        blocks = list(_blocks(dataset))
+        blocks = _blocks(dataset)
         if path.suffix.lower() in XDMF_SUFFIXES:
             blocks = _without_copies(blocks)
         dataset = pyvista.MultiBlock(blocks).combine() if blocks else pyvista.UnstructuredGrid()
@@ -462,13 +461,15 @@ def _mesh_of(dataset: Any, path: Path, name: str) -> SimulationMesh:
     )
 
 
-def _blocks(dataset: Any) -> Iterator[Any]:
-    """Yield the meshes with cells in nested blocks."""
+def _blocks(dataset: Any) -> list[Any]:
+    """Return the meshes with cells in nested blocks."""
+    blocks = []
     for block in dataset:
         if hasattr(block, "combine"):
-            yield from _blocks(block)
+            blocks += _blocks(block)
         elif block is not None and getattr(block, "n_cells", 0):
-            yield block
+            blocks.append(block)
+    return blocks
 
 
 def _without_copies(blocks: list[Any]) -> list[Any]:

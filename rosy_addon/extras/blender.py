@@ -136,20 +136,17 @@ def _version_text(version: Sequence[int]) -> str:
     return ".".join(map(str, version))
 
 
-def installed_blenders() -> Iterator[str]:
-    """Yield the programs of Blender on the PATH and in the usual places, newest first in these.
+def installed_blenders() -> list[str]:
+    """Return the programs of Blender on the PATH and in the usual places, newest first in these.
 
     The numbers in the names of their folders are taken for versions.
     """
-    for name in PROGRAM_NAMES:
-        program = shutil.which(name)
-        if program is not None:
-            yield program
-    found = []
+    on_path = filter(None, map(shutil.which, PROGRAM_NAMES))
+    found: list[str | None] = []
     for place in _usual_places():
         folder = Path(place).expanduser()
         found += map(_program, folder.parents[-1].glob(str(folder.relative_to(folder.anchor))))
-    yield from sorted(filter(None, found), key=_numbers, reverse=True)
+    return [*on_path, *sorted(filter(None, found), key=_numbers, reverse=True)]
 
 
 def _usual_places() -> list[str]:

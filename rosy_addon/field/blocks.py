@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,24 +12,24 @@ from ..progress import report
 ROWS_PER_BLOCK = 1 << 16
 
 
-def row_blocks(count: int, size: int | None = None) -> Iterator[slice]:
+def row_blocks(count: int, size: int | None = None) -> list[slice]:
     """Split `count` rows into consecutive blocks of `size`; one empty block for no rows."""
     size = ROWS_PER_BLOCK if size is None else size
-    for start in range(0, max(count, 1), size):
-        yield slice(start, min(start + size, count))
+    return [slice(start, min(start + size, count)) for start in range(0, max(count, 1), size)]
 
 
-def blocks_by_count(count: np.ndarray, limit: int) -> Iterator[slice]:
+def blocks_by_count(count: np.ndarray, limit: int) -> list[slice]:
     """Split entries into consecutive slices whose counts sum up to at most a limit.
 
     A single entry with a larger count is a slice of its own.
     """
     total = np.cumsum(count, dtype=np.int64)
-    start = done = 0
+    blocks, start, done = [], 0, 0
     while start < len(count):
         stop = max(int(np.searchsorted(total, done + limit, side="right")), start + 1)
-        yield slice(start, stop)
+        blocks.append(slice(start, stop))
         start, done = stop, int(total[stop - 1])
+    return blocks
 
 
 def by_rows(

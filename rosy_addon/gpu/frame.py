@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import accumulate
@@ -123,13 +123,14 @@ class Frame:
             [screen_box(item, self.camera) for item in self.items if item.kind == kind]
         )
 
-    def fields_in_view(self) -> Iterator[tuple[int, DrawItem, Box]]:
-        """Yield the id, item and box of each instance that has a field and may be visible."""
-        for instance_id, item in enumerate(self.items):
-            if item.field is not None:
-                box = screen_box(item, self.camera)
-                if not is_empty(box):
-                    yield instance_id, item, box
+    def fields_in_view(self) -> list[tuple[int, DrawItem, Box]]:
+        """Return the id, item and box of each instance that has a field and may be visible."""
+        boxes = [
+            (instance_id, item, screen_box(item, self.camera))
+            for instance_id, item in enumerate(self.items)
+            if item.field is not None
+        ]
+        return [entry for entry in boxes if not is_empty(entry[2])]
 
     def take_passes(self) -> list[FramePass]:
         """Remove and return the passes that are to be run."""

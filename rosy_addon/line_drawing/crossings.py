@@ -133,8 +133,10 @@ def _close_pairs(
         np.searchsorted(key, key + (STRIP_STRIDE + window), side="right"),
     )
     for low, high in (own_strip, next_strip):
-        for segment, other in _ranges(low, high):
-            segment, other = order[segment], order[other]
+        count = np.maximum(high - low, 0)
+        for part in blocks_by_count(count, PAIR_BATCH_SIZE):
+            segment = order[np.repeat(np.arange(part.start, part.stop), count[part])]
+            other = order[concatenated_ranges(low[part], count[part])]
             yield np.minimum(segment, other), np.maximum(segment, other)
 
 
@@ -168,14 +170,6 @@ def _strip_keys(strokes: Strokes, segment_end: np.ndarray) -> tuple[np.ndarray, 
     strip = first_strip[group] + (offset[segment, across[group]] / strip_width[group]).astype(int)
     position = offset[segment, along[group]] / scale[group]
     return strip * STRIP_STRIDE + position, (reach / scale)[group] + ROUNDING
-
-
-def _ranges(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield each index i with all indices from low[i] to high[i] - 1, in batches."""
-    count = np.maximum(high - low, 0)
-    for part in blocks_by_count(count, PAIR_BATCH_SIZE):
-        index = np.repeat(np.arange(part.start, part.stop), count[part])
-        yield index, concatenated_ranges(low[part], count[part])
 
 
 def _intersect_segments(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import RosyError
+from ..field.blocks import row_blocks
 from ..progress import progress, report
 from ..projection.camera import Camera
 from .pipeline import simplify_strokes
@@ -66,17 +66,9 @@ def polyline_file(
     matrix = np.eye(4) if matrix is None else matrix
     points = strokes.points @ matrix[:3, :3].T + matrix[:3, 3]
     normals = strokes.normal @ matrix[:3, :3].T
-    columns = (points, normals, width)
-    if suffix == ".ply":
-        report(0.5, "writing strokes")
-        return _ply(strokes, *columns)
-    blocks = (_csv_blocks if suffix == ".csv" else _obj_blocks)(strokes, *columns)
-    contents = []
-    block_count = 2 + len(points) / POINTS_PER_BLOCK
-    for block in blocks:
-        contents.append(block.encode())
-        report(0.4 + 0.6 * min(len(contents) / block_count, 1.0), "writing strokes")
-    return b"".join(contents)
+    contents = {".csv": _csv, ".obj": _obj, ".ply": _ply}[suffix]
+    with progress(0.4, 1.0, "writing strokes"):
+        return contents(strokes, points, normals, width)
 
 
 def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
@@ -93,38 +85,43 @@ def check_drawing_suffix(path: str | os.PathLike[str]) -> str:
     return suffix
 
 
-def _csv_blocks(
-    strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray
-) -> Iterator[str]:
-    """Yield a header, then a row for each point. A closed stroke ends at its first point."""
-    yield "stroke,family,x,y,z,nx,ny,nz,width\n"
+def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
+    """Return a header, then a row for each point. A closed stroke ends at its first point."""
+    blocks = [b"stroke,family,x,y,z,nx,ny,nz,width\n"]
     stroke = strokes.stroke
-    for rows in _row_blocks(len(points)):
+    for rows in row_blocks(len(points), POINTS_PER_BLOCK):
+        report(rows.start / max(len(points), 1), "writing strokes")
         names = [strokes.names[family] for family in strokes.family[stroke[rows]]]
         values = np.column_stack([points[rows], normals[rows], width[rows]]).tolist()
-        yield "".join(
+        lines = (
             f"{number},{name},{x:.9g},{y:.9g},{z:.9g},{nx:.6g},{ny:.6g},{nz:.6g},{w:.6g}\n"
             for number, name, (x, y, z, nx, ny, nz, w) in zip(
                 stroke[rows].tolist(), names, values, strict=True
             )
         )
+        blocks.append("".join(lines).encode())
+    return b"".join(blocks)
 
 
-def _obj_blocks(
-    strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray
-) -> Iterator[str]:
-    """Yield vertices, then a line for each stroke, in a group for each family.
+def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
+    """Return vertices, then a line for each stroke, in a group for each family.
 
     Lines have no normals of their own in this format, so normal n is that of vertex n. Widths are the
     texture coordinates, with one number each.
     """
     first_of_closed, kept = _without_repeated_points(strokes)
     rows = np.flatnonzero(kept)
-    yield "# Each normal and each texture coordinate, the width, is that of the vertex of the same number\n"
-    for keyword, values in (("v", points), ("vn", normals), ("vt", width[:, None])):
+    blocks = [
+        b"# Each normal and each texture coordinate, the width, is that of the vertex of the same number\n"
+    ]
+    columns = ("v", points), ("vn", normals), ("vt", width[:, None])
+    for index, (keyword, values) in enumerate(columns):
         form = keyword + values.shape[1] * (" %.9g" if keyword == "v" else " %.6g") + "\n"
-        for block in _row_blocks(len(rows)):
-            yield "".join(form % tuple(row) for row in values[rows[block]].tolist())
+        for block in row_blocks(len(rows), POINTS_PER_BLOCK):
+            report((index + block.start / max(len(rows), 1)) / 4, "writing strokes")
+            lines = (form % tuple(row) for row in values[rows[block]].tolist())
+            blocks.append("".join(lines).encode())
+    report(0.75, "writing strokes")
     number = np.cumsum(kept)
     number[~kept] = number[first_of_closed]
     text, family = [], -1
@@ -135,11 +132,13 @@ def _obj_blocks(
             family = int(strokes.family[stroke])
             text.append(f"g {strokes.names[family].replace(' ', '_')}\n")
         text.append("l " + " ".join(f"{n}/{n}" for n in number[first:last].tolist()) + "\n")
-    yield "".join(text)
+    blocks.append("".join(text).encode())
+    return b"".join(blocks)
 
 
 def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return a binary file with the points as vertices and the segments as edges."""
+    report(0.0, "writing strokes")
     first_of_closed, kept = _without_repeated_points(strokes)
     stroke = strokes.stroke
     vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)
@@ -171,9 +170,3 @@ def _without_repeated_points(strokes: Strokes) -> tuple[np.ndarray, np.ndarray]:
     kept = np.ones(len(strokes.points), dtype=bool)
     kept[strokes.start[1:][strokes.closed] - 1] = False
     return strokes.start[:-1][strokes.closed], kept
-
-
-def _row_blocks(count: int) -> Iterator[slice]:
-    """Yield the rows of each block."""
-    for first in range(0, count, POINTS_PER_BLOCK):
-        yield slice(first, min(first + POINTS_PER_BLOCK, count))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,19 +119,20 @@ def face_values(
     return result
 
 
-def _faces_by_size(face_start: np.ndarray) -> Iterator[tuple[int, slice | np.ndarray]]:
-    """Yield blocks of faces with equally many corners, as the number of corners and the faces."""
+def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray]]:
+    """Return blocks of faces with equally many corners, as the number of corners and the faces."""
     corner_counts = np.diff(face_start)
     if (corner_counts == corner_counts[0]).all():
-        for start in range(0, len(corner_counts), BLOCK_SIZE):
-            yield int(corner_counts[0]), slice(start, start + BLOCK_SIZE)
-        return
+        starts = range(0, len(corner_counts), BLOCK_SIZE)
+        return [(int(corner_counts[0]), slice(start, start + BLOCK_SIZE)) for start in starts]
+    blocks = []
     for corner_count in np.unique(corner_counts).tolist():
         same_count = np.flatnonzero(corner_counts == corner_count)
         # Fewer faces per block if they have many corners, so that blocks need equal memory.
         block_faces = max(4 * BLOCK_SIZE // max(corner_count, 4), 1)
         for start in range(0, len(same_count), block_faces):
-            yield corner_count, same_count[start : start + block_faces]
+            blocks.append((corner_count, same_count[start : start + block_faces]))
+    return blocks
 
 
 def _similarity_scale(linear: np.ndarray) -> float | None:

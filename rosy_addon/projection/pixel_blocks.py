@@ -5,13 +5,12 @@ A block bounds the memory of intermediate results and fits the caches of the pro
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 #: Pixels per block.
 BLOCK_PIXELS = 1 << 14
 
 
-def pixel_blocks(count: int) -> Iterator[slice]:
-    """Yield slices of at most `BLOCK_PIXELS` that cover `count` pixels."""
-    for start in range(0, count, BLOCK_PIXELS):
-        yield slice(start, min(start + BLOCK_PIXELS, count))
+def pixel_blocks(count: int) -> list[slice]:
+    """Return slices of at most `BLOCK_PIXELS` that cover `count` pixels."""
+    return [
+        slice(start, min(start + BLOCK_PIXELS, count)) for start in range(0, count, BLOCK_PIXELS)
+    ]

@@ -87,9 +87,11 @@ def values_in_triangles(
 
 
 def _visible_instances(gbuffer: GBuffer) -> Iterator[tuple[MeshInstance, np.ndarray]]:
-    """Yield each instance that is visible, and the indices of its pixels."""
-    for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist():
-        yield gbuffer.instances[instance_id], np.flatnonzero(gbuffer.instance_id == instance_id)
+    """Iterate over the instances that are visible, with the indices of their pixels."""
+    return (
+        (gbuffer.instances[instance_id], np.flatnonzero(gbuffer.instance_id == instance_id))
+        for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
+    )
 
 
 def _texel_footprint(

@@ -256,9 +256,10 @@ class _Occluders:
         ndc : (n, 2) float64 ndarray
             From -1 to 1.
 
-        Yields
-        ------
-        triangle, point : (m,) intp ndarray
+        Returns
+        -------
+        iterator of (triangle, point)
+            (m,) intp ndarrays, block by block.
         """
         row_count = max(int(len(ndc) ** 0.5), 1)
         point_row = _grid_rows(ndc[:, 1], row_count)
@@ -282,9 +283,13 @@ class _Occluders:
         first = np.searchsorted(key, 4.0 * row + low[box, 0])
         count = np.searchsorted(key, 4.0 * row + high[box, 0], side="right") - first
         box, first, count = (array[count > 0] for array in (box, first, count))
-        for part in blocks_by_count(count, PAIRS_PER_BLOCK):
-            triangle = start + kept[np.repeat(box[part], count[part])]
-            yield triangle, order[concatenated_ranges(first[part], count[part])]
+        return (
+            (
+                start + kept[np.repeat(box[part], count[part])],
+                order[concatenated_ranges(first[part], count[part])],
+            )
+            for part in blocks_by_count(count, PAIRS_PER_BLOCK)
+        )
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
         """(n,) bool: whether triangles hide points that are not on them.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import bpy
 import numpy as np
 
@@ -32,14 +30,15 @@ def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list
 
 def rendered_lights(
     depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray
-) -> Iterator[tuple[Light, bpy.types.Object]]:
-    """Yield the lights of `read_lights`, each with its original object."""
+) -> list[tuple[Light, bpy.types.Object]]:
+    """Return the lights of `read_lights`, each with its original object."""
+    lights = []
     for instance in depsgraph.object_instances:
         obj = instance.object
-        if obj.type != "LIGHT" or obj.original.hide_render or not instance.show_self:
-            continue
-        matrix = view_matrix @ np.array(instance.matrix_world)
-        yield _convert_light(obj.data, matrix), obj.original
+        if obj.type == "LIGHT" and not obj.original.hide_render and instance.show_self:
+            matrix = view_matrix @ np.array(instance.matrix_world)
+            lights.append((_convert_light(obj.data, matrix), obj.original))
+    return lights
 
 
 def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:

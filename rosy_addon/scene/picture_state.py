@@ -7,8 +7,9 @@ they are evaluated, without the temporary attributes of `scene_reader`.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
+from itertools import product, starmap
 
 import bpy
 import numpy as np
@@ -255,7 +256,7 @@ class SceneState:
             output=output,
             device="cpu" if is_relit else scene.rosy.device.lower(),
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
-            occluders={name: instances.digest_pair() for name, instances in occluders},
+            occluders={name: instances.digest_pair() for name, instances in occluders.items()},
             lights=self._lights if settings["light"] == "scene" else {},
             reference=(
                 _reference_digest(scene, depsgraph) if settings["tone"] == "picture" else ""
@@ -279,20 +280,20 @@ class SceneState:
 
     def _relevant_occluders(
         self, camera: Camera | None, casts_shadows: bool
-    ) -> Iterator[tuple[str, _Instances]]:
-        """Yield the objects without a field that may change the picture.
+    ) -> dict[str, _Instances]:
+        """Return the objects without a field that may change the picture.
 
         They may cast shadows. Otherwise the bounding box of an instance must be at least partly in
         front of that of a field.
         """
         if casts_shadows or camera is None:
-            yield from self._occluders.items()
-            return
+            return self._occluders
         fields = self._boxes(camera, self._fields.values())
-        for name, instances in self._occluders.items():
-            boxes = self._boxes(camera, [instances])
-            if any(_may_hide(box, other) for box in boxes for other in fields):
-                yield name, instances
+        return {
+            name: instances
+            for name, instances in self._occluders.items()
+            if any(starmap(_may_hide, product(self._boxes(camera, [instances]), fields)))
+        }
 
     @staticmethod
     def _boxes(camera: Camera, objects: Iterable[_Instances]) -> list[np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import bpy
@@ -31,41 +30,42 @@ def stroke_digest(data: bpy.types.ID) -> str:
     return content_hash(*_parts(data)).hex()
 
 
-def _parts(data: bpy.types.ID) -> Iterator[object]:
-    """Yield everything that the digest depends on."""
+def _parts(data: bpy.types.ID) -> list[object]:
+    """Return everything that the digest depends on."""
     if isinstance(data, bpy.types.Curves):
-        yield from _attribute_parts(data.attributes, data.curve_offset_data)
-        return
-    for material in data.materials:
-        style = None if material is None else material.grease_pencil
-        yield None if style is None else tuple(style.color)
+        return _attribute_parts(data.attributes, data.curve_offset_data)
+    styles = [None if material is None else material.grease_pencil for material in data.materials]
+    parts: list[object] = [None if style is None else tuple(style.color) for style in styles]
     for layer in data.layers:
-        yield layer.name if has_grease_pencil_drawings() else layer.info
+        parts.append(layer.name if has_grease_pencil_drawings() else layer.info)
         for frame in layer.frames:
-            yield frame.frame_number
+            parts.append(frame.frame_number)
             if has_grease_pencil_drawings():
-                yield from _attribute_parts(frame.drawing.attributes, frame.drawing.curve_offsets)
+                parts += _attribute_parts(frame.drawing.attributes, frame.drawing.curve_offsets)
             else:
-                yield from _legacy_parts(frame)
+                parts += _legacy_parts(frame)
+    return parts
 
 
-def _attribute_parts(attributes: Any, offsets: Any) -> Iterator[object]:
-    """Yield the values of `STROKE_ATTRIBUTES`, and where each stroke starts."""
+def _attribute_parts(attributes: Any, offsets: Any) -> list[object]:
+    """Return the values of `STROKE_ATTRIBUTES`, and where each stroke starts."""
     position = attributes.get("position")
     if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
-        return
-    yield read_collection(offsets, "value", np.float32)
+        return []
+    parts: list[object] = [read_collection(offsets, "value", np.float32)]
     for name in STROKE_ATTRIBUTES:
         attribute = attributes.get(name)
         if attribute is not None:
-            yield name
             key, columns = _VALUES_BY_TYPE.get(attribute.data_type, ("value", 1))
-            yield read_collection(attribute.data, key, np.float32, columns)
+            parts += [name, read_collection(attribute.data, key, np.float32, columns)]
+    return parts
 
 
-def _legacy_parts(frame: Any) -> Iterator[object]:
-    """Yield the strokes of a frame before Blender 4.3."""
+def _legacy_parts(frame: Any) -> list[object]:
+    """Return the strokes of a frame before Blender 4.3."""
+    parts: list[object] = []
     for stroke in frame.strokes:
-        yield stroke.line_width, stroke.material_index
+        parts.append((stroke.line_width, stroke.material_index))
         for name, columns in LEGACY_POINT_PROPERTIES.items():
-            yield read_collection(stroke.points, name, np.float32, columns)
+            parts.append(read_collection(stroke.points, name, np.float32, columns))
+    return parts

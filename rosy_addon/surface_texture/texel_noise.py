@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..compositor.flow import noise_channel_count
@@ -136,13 +138,10 @@ def _subtract_local_means(
                 values[block] -= share * mean.take(first + offset)
 
 
-def _corner_shares(place: np.ndarray, stride: np.ndarray):
-    """Yield the offset of each corner of a cell in the grid, and the (n,) weights of linear interpolation.
+def _corner_shares(place: np.ndarray, stride: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Iterate over the corners of a cell in the grid: their offsets, and (n,) weights of linear interpolation.
 
     `place` is (n, 3), from 0 to 1.
     """
-    for corner in np.ndindex(2, 2, 2):
-        share = np.ones(len(place), dtype=np.float32)
-        for axis, upper in enumerate(corner):
-            share *= place[:, axis] if upper else 1 - place[:, axis]
-        yield int(np.dot(corner, stride)), share
+    x, y, z = np.stack([1 - place, place]).transpose(2, 0, 1)
+    return ((int(np.dot((i, j, k), stride)), x[i] * y[j] * z[k]) for i, j, k in np.ndindex(2, 2, 2))

@@ -67,7 +67,7 @@ def test_limits_of_control_groups(tmp_path):
         (folder / names[0]).write_text(f"{limit}\n")
         (folder / names[1]).write_text("1000\n")
         (folder / "memory.stat").write_text(f"anon 600\n{names[2]} 300\n")
-    assert list(memory._control_group_memory(tmp_path)) == [4300, 6300]
+    assert memory._control_group_memory(tmp_path) == [4300, 6300]
 
 
 def test_unknown_memory_is_none(monkeypatch, tmp_path):
@@ -81,7 +81,7 @@ def test_unknown_memory_is_none(monkeypatch, tmp_path):
         monkeypatch.setattr(memory, name, fail)
     assert memory.available_memory() is None
     memory.check_memory(1e30, "a picture", "choose a smaller size")
-    monkeypatch.setattr(memory, "_address_space", lambda: iter([-5]))
+    monkeypatch.setattr(memory, "_address_space", lambda: [-5])
     assert memory.available_memory() == 0
 
 

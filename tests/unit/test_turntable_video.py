@@ -27,7 +27,7 @@ from rosy_addon.turntable_video import (
     VideoWriter,
     check_still,
     check_video_path,
-    evicting,
+    draw_next,
     turntable,
     turntable_views,
 )
@@ -117,8 +117,8 @@ def test_streaks_drift_before_a_still_camera_in_whole_cycles():
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 1))
     look = Look(length=8, flow=1.5)
     cache = Cache()
-    views = evicting(turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True), cache)
-    pictures = [draw_picture(view, cache).rgba[..., 0] for view in views]
+    views = turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True)
+    pictures = [draw_next(view, cache).rgba[..., 0] for view in views]
     assert len(pictures) == 12 and len(cache) < 12
     visible = pictures[0] > 0
     likeness = [

@@ -12,8 +12,7 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.rendering.draw import draw_picture
-from rosy_addon.turntable_video import evicting, turntable, turntable_views
+from rosy_addon.turntable_video import draw_next, turntable, turntable_views
 
 from .page import ROOT
 from .shapes import sphere, suzanne
@@ -49,7 +48,6 @@ def write() -> None:
 def _write_loop(surface: Surface, field: RosyField, look: Look, name: str) -> None:
     """Write a loop before a still camera."""
     instance = MeshInstance(surface, np.eye(4), field)
-    cache = Cache()
     views = turntable_views(instance, look, COUNT, (SIDE, SIDE), ANGLES, still=True)
-    draw = partial(draw_picture, cache=cache)
-    turntable(draw, evicting(views, cache), COUNT, IMAGES / name, RATE)
+    draw = partial(draw_next, cache=Cache())
+    turntable(draw, views, COUNT, IMAGES / name, RATE)

@@ -123,26 +123,22 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     return chain(
         format_blocks(surface.vertices, "v "),
         format_blocks(normal, "vn "),
-        _face_lines(surface),
+        (_face_lines(surface, block) for block in row_blocks(surface.face_count, ROWS_PER_BLOCK)),
         [f"# degree {field.degree}\n"],
-        _field_lines(member),
+        (_field_lines(member, block) for block in row_blocks(count, ROWS_PER_BLOCK)),
     )
 
 
-def _face_lines(surface: Surface) -> Iterator[str]:
-    """Lines `f v//v ...` in blocks."""
-    for faces in row_blocks(surface.face_count, ROWS_PER_BLOCK):
-        starts = surface.face_start[faces.start : faces.stop + 1]
-        block = surface.corner_vertex[starts[0] : starts[-1]] + 1
-        corners = [f"{v}//{v}" for v in block.tolist()]
-        offsets = (starts - starts[0]).tolist()
-        yield "".join([f"f {' '.join(corners[a:b])}\n" for a, b in pairwise(offsets)])
+def _face_lines(surface: Surface, faces: slice) -> str:
+    """Lines `f v//v ...` of a block of faces."""
+    starts = surface.face_start[faces.start : faces.stop + 1]
+    vertices = surface.corner_vertex[starts[0] : starts[-1]] + 1
+    corners = [f"{v}//{v}" for v in vertices.tolist()]
+    offsets = (starts - starts[0]).tolist()
+    return "".join([f"f {' '.join(corners[a:b])}\n" for a, b in pairwise(offsets)])
 
 
-def _field_lines(member: np.ndarray) -> Iterator[str]:
-    """Lines `# field i x y z` in blocks."""
-    for rows in row_blocks(len(member), ROWS_PER_BLOCK):
-        lines = format_rows(member[rows])
-        yield "".join(
-            [f"# field {number} {line}\n" for number, line in enumerate(lines, rows.start + 1)]
-        )
+def _field_lines(member: np.ndarray, rows: slice) -> str:
+    """Lines `# field i x y z` of a block of vertices."""
+    lines = enumerate(format_rows(member[rows]), rows.start + 1)
+    return "".join([f"# field {number} {line}\n" for number, line in lines])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import math
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ...progress import progress, report
+from ..blocks import row_blocks
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
 from .raw_field import RawField
@@ -108,9 +110,8 @@ def npy_blocks(directions: np.ndarray) -> Iterator[bytes]:
     rows = np.ascontiguousarray(directions.reshape(len(directions), -1))
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(rows))
-    yield header.getvalue()
-    for start in range(0, len(rows), ROWS_PER_BLOCK):
-        yield rows[start : start + ROWS_PER_BLOCK].tobytes()
+    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
+    return chain([header.getvalue()], (rows[block].tobytes() for block in blocks))
 
 
 def _check_columns(source: str, columns: int) -> None:

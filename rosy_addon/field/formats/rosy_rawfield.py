@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -54,15 +55,13 @@ def read_rawfield(path: Path) -> RawField:
 
 def rosy_text(field: RosyField) -> Iterator[str]:
     """Format the member vectors of a field as a `.rosy` file, in blocks of lines."""
-    yield f"{len(field.vectors)}\n{field.degree}\n"
-    yield from format_blocks(field.vectors)
+    return chain([f"{len(field.vectors)}\n{field.degree}\n"], format_blocks(field.vectors))
 
 
 def rawfield_text(directions: np.ndarray) -> Iterator[str]:
     """Format (F, N, 3) directions as a `.rawfield` file, in blocks of lines."""
     count, degree = directions.shape[:2]
-    yield f"{degree} {count}\n"
-    yield from format_blocks(directions.reshape(count, -1))
+    return chain([f"{degree} {count}\n"], format_blocks(directions.reshape(count, -1)))
 
 
 def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:

@@ -6,6 +6,7 @@ A file holds the degree, a count, and rows with an element and its singularity i
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -46,5 +47,5 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
 
 def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> Iterator[str]:
     """Format singularities as a `.sings` file; the parameters are the results of `read_sings`."""
-    yield f"{degree} {len(element)}\n"
-    yield from format_blocks(np.stack([element, index], axis=1))
+    rows = np.stack([element, index], axis=1)
+    return chain([f"{degree} {len(element)}\n"], format_blocks(rows))

@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
 from ...progress import report
+from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
@@ -166,6 +167,5 @@ def format_rows(rows: np.ndarray) -> list[str]:
 
 def format_blocks(rows: np.ndarray, prefix: str = "") -> Iterator[str]:
     """Format (n, k) numbers as lines of text with a prefix, in blocks of up to `ROWS_PER_BLOCK`."""
-    for start in range(0, len(rows), ROWS_PER_BLOCK):
-        lines = format_rows(rows[start : start + ROWS_PER_BLOCK])
-        yield "".join([f"{prefix}{line}\n" for line in lines])
+    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
+    return ("".join([f"{prefix}{line}\n" for line in format_rows(rows[block])]) for block in blocks)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from typing import Any
 
 import bpy
@@ -18,8 +18,8 @@ from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
-from ..rosy_addon.worker.job import Call, Step, Steps, run
-from ..rosy_addon.worker.pending_call import PendingCall
+from ..rosy_addon.worker.job import Step, Steps, run
+from ..rosy_addon.worker.step_runner import StepRunner
 from .reports import report_error, report_operator_error, report_warning
 
 #: Seconds for which steps in Blender's process go on. Events of the user are handled between them.
@@ -79,16 +79,13 @@ class Job:
     ) -> None:
         """Start the timer, the handlers and the progress display, and make this the current job."""
         global _current_job
-        self.steps = steps
         self.required_data = list(required_data)
         self.scene, self.view_layer = context.scene, context.view_layer
         self.stop_reason: str | None = None
         self.result: Any = None
         self.note = ""
-        self._uses_helper = uses_helper(context)
-        self._pending: PendingCall | None = None
-        self._answer: Any = None
-        self._error: Exception | None = None
+        HELPER.is_usable = uses_helper(context)
+        self._runner = StepRunner(steps, HELPER)
         self.workspaces: list[bpy.types.WorkSpace] = []
         self.window_manager = context.window_manager
         self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
@@ -128,13 +125,10 @@ class Job:
             return False
         deadline = time.monotonic() + SLICE_SECONDS
         try:
-            while True:
-                if self._pending is None:
-                    self._next_step(context)
-                elif not self._has_answer(context):
-                    return False
-                if time.monotonic() > deadline:
-                    return False
+            while self._runner.poll() and time.monotonic() < deadline:
+                with self._waiting(context) if self._runner.is_in_place else nullcontext():
+                    self._runner.advance()
+                self._show_progress(context, self._runner.step)
         except StopIteration as done:
             self.result = done.value
             self.stop("done")
@@ -145,65 +139,30 @@ class Job:
         except BaseException:
             self.stop("an error")
             raise
+        self._show_progress(context, self._runner.step)
+        return False
 
     def finish(self, context: bpy.types.Context) -> bool:
         """Go on until the job is done or stopped, and return whether it is done."""
         while self.stop_reason is None:
             if self.advance(context):
                 return True
-            if self._pending is not None:
-                HELPER.wait(SLICE_SECONDS)
+            HELPER.wait(SLICE_SECONDS)
         return False
 
-    def _next_step(self, context: bpy.types.Context) -> None:
-        """Continue the job until it yields. Let a call be made."""
-        answer, error = self._answer, self._error
-        self._answer = self._error = None
-        step = self.steps.send(answer) if error is None else self.steps.throw(error)
-        if not isinstance(step, Call):
-            self._show_progress(context, step)
-        elif self._uses_helper:
-            try:
-                self._pending = PendingCall(step, HELPER)
-            except HelperLostError:
-                self._call_here(context, step)
-        else:
-            self._call_here(context, step)
-
-    def _has_answer(self, context: bpy.types.Context) -> bool:
-        """Return whether the call is done whose result the job waits for."""
-        pending = self._pending
-        try:
-            if not pending.poll():
-                self._show_progress(context, pending.progress)
-                return False
-        except HelperLostError:
-            self._pending = None
-            self._call_here(context, pending.call)
-            return True
-        except (
-            REPORTED_ERRORS
-        ) as error:  # the helper has ended twice, or its answer takes too much memory
-            pending.cancel()
-            self._error = error
-        else:
-            try:
-                self._answer = pending.result()
-            except Exception as error:
-                self._error = error
-        self._pending = None
-        return True
-
-    def _call_here(self, context: bpy.types.Context, call: Call) -> None:
-        """Make a call in this process, while Blender waits."""
+    @contextmanager
+    def _waiting(self, context: bpy.types.Context) -> Iterator[None]:
+        """Show that Blender is busy, and say once why if the user has not chosen so."""
         global _has_said_no_helper
-        if self._uses_helper and not _has_said_no_helper:
+        if uses_helper(context) and not _has_said_no_helper:
             self.note, _has_said_no_helper = NO_HELPER, True
-        with _wait_cursor(context):
-            try:
-                self._answer = call()
-            except Exception as error:
-                self._error = error
+        if context.window is not None:
+            context.window.cursor_modal_set("WAIT")
+        try:
+            yield
+        finally:
+            if context.window is not None:
+                context.window.cursor_modal_restore()
 
     def _abort_reason(self, context: bpy.types.Context) -> str | None:
         """Return why the job cannot continue; None if it can."""
@@ -219,9 +178,9 @@ class Job:
             return "required data was deleted"
         return None
 
-    def _show_progress(self, context: bpy.types.Context, step: Step) -> None:
+    def _show_progress(self, context: bpy.types.Context, step: Step | None) -> None:
         """Show the progress in the cursor, the status bar and the sidebars, if it has changed."""
-        if step == job_status.current:
+        if step is None or step == job_status.current:
             return
         job_status.current = step
         percent = int(100 * step.fraction)
@@ -241,16 +200,14 @@ class Job:
         self.stop_reason = reason
         _current_job = None
         job_status.current = None
-        if self._pending is not None:
-            self._pending.cancel()
-            with suppress(HelperLostError):
-                HELPER.start()  # for the next job
         try:
-            self.steps.close()
+            self._runner.close()
         except ReferenceError:
             pass  # the data that the job would restore were deleted
         finally:
             self._cleanup()
+        with suppress(HelperLostError):
+            HELPER.start()  # for the next job
 
     def _cleanup(self) -> None:
         """Remove the handlers, the timer and the progress display."""
@@ -263,19 +220,6 @@ class Job:
             with bpy.context.temp_override(workspace=workspace):
                 workspace.status_text_set(None)
         redraw_sidebars()
-
-
-@contextmanager
-def _wait_cursor(context: bpy.types.Context) -> Iterator[None]:
-    """Show that Blender is busy."""
-    window = context.window
-    if window is not None:
-        window.cursor_modal_set("WAIT")
-    try:
-        yield
-    finally:
-        if window is not None:
-            window.cursor_modal_restore()
 
 
 class ModalJobMixin:

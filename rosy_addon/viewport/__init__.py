@@ -11,7 +11,6 @@ rendered in slices of time, one slice per redraw.
     layers         the meshes of view layers, as they were read last
     flow_clock     the clock by which streaks drift
     singularity_dots, arrowheads    what is drawn over the pictures
-    step_runner    steps of pictures, whose calls a helper process makes
     progressive    previews and final pictures, within a time budget
     session        handlers, timers and drawing; `start` and `stop`
 """

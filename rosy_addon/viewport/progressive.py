@@ -12,8 +12,9 @@ from ..errors import RosyError, error_text
 from ..gpu.preparation import prepare_steps
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
+from ..worker.helper import Helper
 from ..worker.job import Step, Steps
-from .step_runner import SharedHelper, StepRunner
+from ..worker.step_runner import StepRunner
 
 #: Seconds that a redraw may take to render a picture at once, and seconds of one slice of refinement.
 FRAME_BUDGET_SECONDS, SLICE_SECONDS = 0.06, 0.08
@@ -170,7 +171,7 @@ class ProgressiveRenderer:
     Parameters
     ----------
     renderer : ViewportRenderer
-    helper : SharedHelper
+    helper : Helper
         Not closed here.
     schedule_redraw : callable
         Called with a number of seconds, after which the views must be redrawn.
@@ -189,7 +190,7 @@ class ProgressiveRenderer:
     def __init__(
         self,
         renderer: ViewportRenderer,
-        helper: SharedHelper,
+        helper: Helper,
         schedule_redraw: Callable[[float], None],
         schedule_poll: Callable[[], None],
     ) -> None:

@@ -25,6 +25,7 @@ from ..scene.lights import read_lights
 from ..scene.look_properties import look_at_frame, read_look
 from ..scene.scene_cache import InstanceState
 from ..scene.tone_inputs import check_tones, make_tone_request
+from ..worker.helper import Helper
 from .arrowheads import draw_arrowheads
 from .background import view_background
 from .flow_clock import FlowClock
@@ -39,7 +40,6 @@ from .singularity_dots import (
     look_up_singularities,
     singularity_dots,
 )
-from .step_runner import SharedHelper
 from .view3d import (
     clip_planes,
     is_timeline_playing,
@@ -108,7 +108,7 @@ class ViewportSession:
     """
 
     def __init__(self, device: str = "auto") -> None:
-        self._helper = SharedHelper()
+        self._helper = Helper()
         self.progressive = self._new_progressive(device)
         self.spaces: set[int] = set()
         self.fallback_reason: str | None = None

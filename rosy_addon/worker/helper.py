@@ -48,9 +48,16 @@ class Helper:
     ----------
     environment : mapping of str to str
         Added to the environment of the process.
+
+    Attributes
+    ----------
+    is_usable : bool
+        Whether a process may be started. It is False once that has failed.
     """
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
+        self.is_usable = True
+        self._user: object | None = None
         self._environment = dict(environment or {})
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
@@ -67,6 +74,8 @@ class Helper:
         if self._process is not None and self._process.poll() is None:
             return
         self.close()
+        if not self.is_usable:
+            raise HelperLostError("no helper process is wanted, or none can be started", False)
         try:
             self._process, connection = start_module(
                 "worker", PACKAGE, environment=self._environment
@@ -92,6 +101,17 @@ class Helper:
         """
         self.start()
         return Handle(self, (function, arguments))
+
+    def take(self, user: object) -> bool:
+        """Reserve the process for one of several users, and return whether nobody else has it."""
+        if self._user is None:
+            self._user = user
+        return self._user is user
+
+    def release(self, user: object) -> None:
+        """Let others use the process, if a user has it."""
+        if self._user is user:
+            self._user = None
 
     def close(self) -> None:
         """End the process, whatever it does."""

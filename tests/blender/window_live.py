@@ -694,7 +694,7 @@ def fallback_to_the_processor():
         yield from wait_for_final_pictures()
         seen, drawn = capture("live-processor-turned", view()[2]), bake_of_view(method="sheets")
         check_agreement("processor", seen, drawn, -1.0, max_difference=0.02)
-        helper = session._helper._helper
+        helper = session._helper
         assert helper.connection is not None, "no other process has drawn"
         switch("OFF")
         assert helper.connection is None

@@ -18,8 +18,8 @@ from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.scene.tangents import mesh_tangents
 from rosy.rosy_addon.worker.helper import Helper
-from rosy.rosy_addon.worker.job import Call, run
-from rosy.rosy_addon.worker.pending_call import PendingCall
+from rosy.rosy_addon.worker.job import run
+from rosy.rosy_addon.worker.step_runner import StepRunner
 from scenes import add_field, pixels
 
 
@@ -35,18 +35,14 @@ def run_with(helper):
     """A function that runs the steps of a job, given "in place" or "helper"."""
 
     def run_beside(steps):
-        answer = None
+        runner = StepRunner(steps, helper)
         while True:
+            while not runner.poll():
+                helper.wait(5.0)
             try:
-                step = steps.send(answer)
+                runner.advance()
             except StopIteration as end:
                 return end.value
-            answer = None
-            if isinstance(step, Call):
-                pending = PendingCall(step, helper)
-                while not pending.poll():
-                    helper.wait(5.0)
-                answer = pending.result()
 
     return lambda where, steps: run(steps) if where == "in place" else run_beside(steps)
 

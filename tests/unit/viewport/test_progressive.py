@@ -16,7 +16,6 @@ from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport import progressive as progressive_module
 from rosy_addon.viewport.progressive import ProgressiveRenderer
-from rosy_addon.viewport.step_runner import SharedHelper
 from rosy_addon.worker.helper import Helper, HelperLostError
 from rosy_addon.worker.job import Call, Step
 
@@ -71,9 +70,7 @@ def view_input():
 
 
 def progressive_of(renderer, helper=None):
-    return ProgressiveRenderer(
-        renderer, helper or SharedHelper(), lambda seconds: None, lambda: None
-    )
+    return ProgressiveRenderer(renderer, helper or Helper(), lambda seconds: None, lambda: None)
 
 
 @pytest.fixture
@@ -200,7 +197,7 @@ class HelpedRenderer(NotingRenderer):
 
 @pytest.fixture
 def helper():
-    helper = SharedHelper()
+    helper = Helper()
     yield helper
     helper.close()
 

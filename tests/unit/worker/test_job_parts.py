@@ -11,10 +11,10 @@ import pytest
 
 from rosy_addon.errors import RosyError
 from rosy_addon.progress import listening
-from rosy_addon.worker.helper import Helper, HelperLostError
+from rosy_addon.worker.helper import Helper
 from rosy_addon.worker.job import Call, Step, job, part, run
-from rosy_addon.worker.pending_call import PendingCall
 from rosy_addon.worker.program import run_program
+from rosy_addon.worker.step_runner import StepRunner
 
 
 @job
@@ -100,36 +100,59 @@ def helper():
     helper.close()
 
 
-def wait_for(pending, helper):
-    while not pending.poll():
-        helper.wait(5.0)
-    return pending.result()
+def finished(runner, helper):
+    """Run steps to their end, and return their result."""
+    while True:
+        while not runner.poll():
+            helper.wait(0.1)
+        try:
+            runner.advance()
+        except StopIteration as end:
+            return end.value
+
+
+def called(function, *arguments):
+    return (yield Call(function, arguments, 0.2, 0.6, "adding"))
+
+
+def test_a_helper_makes_the_calls_of_steps(helper):
+    runner = StepRunner(halves.begin(6), helper)
+    assert finished(runner, helper) == 9 and runner.is_done
+    with pytest.raises(RosyError, match="odd"):
+        finished(StepRunner(halves.begin(5), helper), helper)
+    assert finished(StepRunner(halves.begin("six"), helper), helper) == "no number"
+
+
+def test_runners_share_a_helper(helper):
+    runners = [StepRunner(called(sum, [1, number]), helper) for number in range(3)]
+    for runner in runners:
+        runner.advance()
+        assert runner.step == Step(0.2, "adding")
+    assert not any(runner.poll() for runner in runners)
+    assert [finished(runner, helper) for runner in runners] == [1, 2, 3]
 
 
 def test_a_call_is_made_again_if_its_helper_is_killed(helper):
-    pending = PendingCall(Call(sum, ([1, 2],), 0.2, 0.6, "adding"), helper)
-    assert pending.progress == Step(0.2, "adding")
-    assert wait_for(pending, helper) == 3
-    pending = PendingCall(Call(time.sleep, (30.0,)), helper)
-    for is_last in (False, True):
+    runner = StepRunner(called(time.sleep, 30.0), helper)
+    runner.advance()
+    for _ in range(2):
+        runner.poll()
         while not helper._is_ready:
-            pending.poll()
+            assert not runner.poll()
             time.sleep(0.01)
-        pending.poll()
-        os.kill(helper._process.pid, signal.SIGKILL)
+        os.kill(helper.pid, signal.SIGKILL)
         helper._process.wait()
-        if is_last:
-            with pytest.raises(RosyError, match="ended twice"):
-                pending.poll()
-        else:
-            assert not pending.poll()
+        runner.poll()
+    with pytest.raises(RosyError, match="ended twice"):
+        finished(runner, helper)
 
 
-def test_no_process_can_be_started(helper, monkeypatch):
+def test_calls_are_made_here_if_no_process_can_be_started(helper, monkeypatch):
     monkeypatch.setattr("rosy_addon.worker.helper.start_module", refuse)
-    with pytest.raises(HelperLostError) as caught:
-        PendingCall(Call(sum, ([1, 2],)), helper)
-    assert not caught.value.has_started
+    runner = StepRunner(called(sum, [1, 2]), helper)
+    runner.advance()
+    assert runner.poll() and runner.is_in_place and not helper.is_usable
+    assert finished(runner, helper) == 3
 
 
 def refuse(*_, **__):

@@ -1,4 +1,4 @@
-"""Steps that run between redraws; their calls are made by a helper process."""
+"""`StepRunner`: runs the steps of a job bit by bit; a helper process makes their calls."""
 
 from __future__ import annotations
 
@@ -8,53 +8,20 @@ from functools import partial
 from typing import Any, NoReturn
 
 from ..errors import RosyError
-from ..worker.helper import Handle, Helper, HelperLostError
-from ..worker.job import Call, Step, Steps
-
-
-class SharedHelper:
-    """The helper process of all live views. It makes one call at a time."""
-
-    def __init__(self) -> None:
-        self._helper = Helper()
-        self._runner: StepRunner | None = None
-        #: Whether a process can be started. Otherwise calls are made in Blender's process.
-        self.is_usable = True
-
-    def submit(self, call: Call, runner: StepRunner) -> Handle | None:
-        """Let the process make a call; None if it works for another runner.
-
-        Raises
-        ------
-        HelperLostError
-            If it cannot be started.
-        """
-        if self._runner is not None:
-            return None
-        if not self.is_usable:
-            raise HelperLostError("no helper process can be started", False)
-        handle = self._helper.submit(call.function, *call.arguments)
-        self._runner = runner
-        return handle
-
-    def release(self, runner: StepRunner) -> None:
-        """Let others use the process, if a runner does."""
-        if self._runner is runner:
-            self._runner = None
-
-    def close(self) -> None:
-        """End the process."""
-        self._runner = None
-        self._helper.close()
+from .helper import Handle, Helper, HelperLostError
+from .job import Call, Step, Steps
 
 
 class StepRunner:
     """Runs steps bit by bit: calls in a helper process, the rest in this process.
 
+    Several runners may share a helper, which makes one call at a time. A call whose helper is lost is made
+    once more by another one; if none can be started, it is made in this process.
+
     Parameters
     ----------
     steps : Steps
-    helper : SharedHelper
+    helper : Helper
 
     Attributes
     ----------
@@ -62,24 +29,28 @@ class StepRunner:
         Seconds of work of the helper so far.
     is_done : bool
         Whether the steps have ended, with a result or an error.
+    is_in_place : bool
+        Whether the next step makes a call in this process, as there is no helper.
     """
 
-    def __init__(self, steps: Steps[Any], helper: SharedHelper) -> None:
-        self.helper_seconds, self.is_done = 0.0, False
+    def __init__(self, steps: Steps[Any], helper: Helper) -> None:
+        self.helper_seconds, self.is_done, self.is_in_place = 0.0, False, False
         self._steps, self._helper = steps, helper
         self._step: Step | None = None
         #: A call that the steps wait for, the helper's handle of it, and what returns or raises its result.
         self._call: Call | None = None
         self._handle: Handle | None = None
         self._outcome: Callable[[], Any] | None = None
-        self._call_time = 0.0
+        self._call_time, self._is_repeated = 0.0, False
 
     @property
     def step(self) -> Step | None:
-        """What is done next; None before the first step."""
-        if self._call is not None and self._call.label is None and self._handle is not None:
-            return Step(self._handle.fraction, self._handle.label)
-        return self._step
+        """How far the steps have come; None before the first one."""
+        call, handle = self._call, self._handle
+        if call is None or handle is None:
+            return self._step
+        fraction = call.start + (call.stop - call.start) * handle.fraction
+        return Step(fraction, handle.label if call.label is None else call.label)
 
     @property
     def has_answer(self) -> bool:
@@ -92,17 +63,26 @@ class StepRunner:
             return True
         try:
             if self._handle is None:
-                self._handle = self._helper.submit(self._call, self)
+                if not self._helper.take(self):
+                    return False
+                self._handle = self._helper.submit(self._call.function, *self._call.arguments)
                 self._call_time = time.monotonic()
-            if self._handle is None or not self._handle.poll():
+            if not self._handle.poll():
                 return False
             self._outcome = self._handle.result
-        except HelperLostError as error:
-            if error.has_started:
-                problem = f"{error}, as it does without enough memory: choose a smaller mesh"
-                self._outcome = partial(_raise, RosyError(problem))
+        except HelperLostError as lost:
+            if lost.has_started and not self._is_repeated:
+                self._handle, self._is_repeated = None, True
+                return False
+            if lost.has_started:
+                problem = (
+                    "the process that computes has ended twice, as it does without enough memory"
+                )
+                error = RosyError(f"{problem}: choose a smaller size or a smaller mesh")
+                self._outcome = partial(_raise, error)
             else:
-                self._helper.is_usable, self._outcome = False, self._call.__call__
+                self._helper.is_usable, self.is_in_place = False, True
+                self._outcome = self._call
         self._helper.release(self)
         self.helper_seconds += time.monotonic() - self._call_time
         return True
@@ -116,6 +96,7 @@ class StepRunner:
             With the result, if the steps are done.
         """
         outcome, self._call, self._handle, self._outcome = self._outcome, None, None, None
+        self.is_in_place = self._is_repeated = False
         try:
             step = next(self._steps) if outcome is None else self._continued(outcome)
         except BaseException:
@@ -123,10 +104,10 @@ class StepRunner:
             raise
         if isinstance(step, Call):
             self._call = step
-            self._step = step = Step(step.start, step.label or "starting")
+            self._step = Step(step.start, step.label or "starting")
         else:
             self._step = step
-        return step
+        return self._step
 
     def _continued(self, outcome: Callable[[], Any]) -> Call | Step:
         """Send the steps the result or the error of their call."""

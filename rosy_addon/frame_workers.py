@@ -10,16 +10,14 @@ from __future__ import annotations
 import os
 import re
 import reprlib
-import shutil
 import subprocess
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from .errors import RosyError
-from .worker.start import guarded
+from .worker.start import Guarded, GuardedFolder
 
 #: Largest number of a frame in Blender.
 MAX_FRAME = 1_048_574
@@ -96,15 +94,13 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     """
     process_count = max(min(process_count, len(frames)), 1)
     workers: list[_Worker] = []
-    folder = Path(tempfile.mkdtemp(prefix="rosy-"))
     stack = ExitStack()
+    folder = Path(stack.enter_context(GuardedFolder()))
     try:
         for index in range(process_count):
             log = folder / f"{index}.log"
             workers.append(_Worker(command, frames[index::process_count], log))
-            stack.enter_context(guarded(workers[-1].process))
-        # The files are open. Where they can, they go now, so that none stays if this process is killed.
-        shutil.rmtree(folder, ignore_errors=True)
+            stack.enter_context(Guarded(workers[-1].process))
         running = list(workers)
         while running:
             # A process that has ended prints no more, so what it printed is read after that.
@@ -117,7 +113,6 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
         for worker in workers:
             worker.stop()
         stack.close()
-        shutil.rmtree(folder, ignore_errors=True)
     failures = [
         f"frames {format_frames(worker.frames)}: {error_line(worker.lines)}"
         for worker in workers

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import bpy
 
@@ -24,6 +23,7 @@ from .turntable_video import (
     turntable_views,
 )
 from .worker.job import Call, Step, Steps, job, part
+from .worker.start import GuardedFolder
 
 #: Least samples along each side of a pixel: streaks that move must not flicker.
 MIN_SUPERSAMPLING = 2
@@ -88,7 +88,7 @@ def render_turntable(
     is_gif = path.suffix.lower() == ".gif"
     if is_gif:
         check_gif_memory(count, *size)
-    with TemporaryDirectory() as folder:
+    with GuardedFolder() as folder:
         frames = []
         for index, view in enumerate(views):
             start, stop = (ENCODING_START * done / count for done in (index, index + 1))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
 from .rendering.draw import bake_picture, draw_picture
 from .rendering.view_input import ViewInput
+from .worker.start import GuardedFolder
 
 #: Suffixes of videos that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")
@@ -176,7 +176,7 @@ class VideoWriter:
         self._is_gif = path.suffix.lower() == ".gif"
         if encode is None and not self._is_gif:
             raise RosyError(f"{path}: {NO_ENCODER}")
-        self._temp_folder = tempfile.TemporaryDirectory()
+        self._folder = None if self._is_gif else GuardedFolder()
         self._gif_frames: list[np.ndarray] = []
         self._count, self._size = 0, (0, 0)
 
@@ -184,7 +184,8 @@ class VideoWriter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._temp_folder.cleanup()
+        if self._folder is not None:
+            self._folder.cleanup()
 
     def check_memory(self, count: int, width: int, height: int) -> None:
         """Check that a number of pictures can take the memory that they need as a .gif.
@@ -206,10 +207,10 @@ class VideoWriter:
             As `Picture.rgba`. All pictures have the same size. An .mp4 needs even sides, so the
             last row or column of an odd one is cut off.
         """
-        if self._is_gif:
+        if self._folder is None:
             self._gif_frames.append(gif_frame(rgba))
             return
-        path = Path(self._temp_folder.name) / f"{self._count:05d}.png"
+        path = Path(self._folder.name) / f"{self._count:05d}.png"
         write_bytes(path, png_frame(rgba))
         self._size = rgba.shape[1] // 2 * 2, rgba.shape[0] // 2 * 2
         self._count += 1
@@ -222,10 +223,10 @@ class VideoWriter:
         RosyError
             If it cannot be encoded or written.
         """
-        if self._is_gif:
+        if self._folder is None:
             write_bytes(self._path, gif_bytes(self._gif_frames, self._fps))
             return
-        folder = Path(self._temp_folder.name)
+        folder = Path(self._folder.name)
         video_path = folder / "video.mp4"
         assert self._encode is not None
         self._encode(folder, self._count, self._size, self._fps, video_path)

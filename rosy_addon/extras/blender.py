@@ -31,7 +31,7 @@ from ..cli.presets import user_presets_folder
 from ..errors import RosyError
 from ..turntable_video import Encoder
 from ..worker.program import run_program
-from ..worker.start import guarded
+from ..worker.start import Guarded
 
 #: The oldest version of Blender that RoSy runs in.
 OLDEST_VERSION = (4, 2)
@@ -289,7 +289,7 @@ def run_job(program: str, job: dict[str, Any]) -> int:
             env=os.environ | {"ROSY_PRESETS": str(user_presets_folder())},
             **inheritance,
         )
-        stack.enter_context(guarded(process))
+        stack.enter_context(Guarded(process))
         try:
             with _signals_as_exceptions():
                 process.wait()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from .job import Step, Steps, job
-from .start import guarded
+from .start import Guarded
 
 #: Seconds for which each step waits.
 WAIT_SECONDS = 0.02
@@ -37,7 +37,7 @@ def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
             command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT
         )
         try:
-            with guarded(process):
+            with Guarded(process):
                 while process.poll() is None:
                     yield Step(0.0, label)
                     with suppress(subprocess.TimeoutExpired):

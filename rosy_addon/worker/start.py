@@ -1,20 +1,23 @@
 """Starting processes, none of which outlives the one that started it.
 
 A module of this package is started with one end of a connection, and ends with it (`start_module`). Other programs
-are guarded (`guarded`): if this process ends, however it ends, a process that it has told of them kills them.
+and temporary folders are guarded: if this process ends, however it ends, a process that it has told of them
+kills them and removes them.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from multiprocessing import connection
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 #: The name of this package, which differs between Blender, a helper and an installed wheel.
@@ -83,43 +86,65 @@ def own_end(handle: str) -> Connection:
     return kind(int(handle))
 
 
-@contextmanager
-def guarded(process: subprocess.Popen[Any]) -> Iterator[None]:
-    """Have a process killed if this one ends within the ``with`` block, however it ends."""
-    with suppress(OSError):  # without a guard, signals that can be handled still end it
-        if _guard is None:
-            _start_guard()
-        _guard.send(("watch", process.pid))
-    try:
-        yield
-    finally:
-        with suppress(OSError, AttributeError):
-            _guard.send(("leave", process.pid))
+class Guarded:
+    """A ``with`` block in which a process is killed if this one ends, however it ends.
+
+    Parameters
+    ----------
+    process : subprocess.Popen
+    """
+
+    def __init__(self, process: subprocess.Popen[Any]) -> None:
+        self._pid = process.pid
+
+    def __enter__(self) -> None:
+        _tell_guard("watch", self._pid)
+
+    def __exit__(self, *_: object) -> None:
+        _tell_guard("leave", self._pid)
+
+
+class GuardedFolder(TemporaryDirectory[str]):
+    """A temporary folder that is removed, too, if this process is killed."""
+
+    def __init__(self) -> None:
+        super().__init__(prefix="rosy-")
+        _tell_guard("watch", self.name)
+
+    def cleanup(self) -> None:
+        """Remove the folder."""
+        super().cleanup()
+        _tell_guard("leave", self.name)
 
 
 #: The connection to the process that watches others, once there are any.
 _guard: Connection | None = None
 
 
-def _start_guard() -> None:
-    """Start the process that watches others. It ends with this one."""
+def _tell_guard(what: str, item: int | str) -> None:
+    """Tell the guard of a process or a folder. It is started when it is first needed, and ends with this process."""
     global _guard
-    _, _guard = start_module("worker.start")
+    with suppress(OSError):  # without a guard, signals that can be handled still end what there is
+        if _guard is None:
+            _, _guard = start_module("worker.start")
+        _guard.send((what, item))
 
 
 def _watch(guard: Connection) -> None:
-    """Be told of processes until the other process ends, and kill those that are left."""
+    """Be told of processes and folders until the other process ends, and remove those that are left."""
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    watched: set[int] = set()
-    try:
+    watched: set[int | str] = set()
+    with suppress(EOFError, OSError):
         while True:
-            what, pid = guard.recv()
-            (watched.add if what == "watch" else watched.discard)(pid)
-    except (EOFError, OSError):
-        for pid in watched:
-            with suppress(OSError):
-                os.kill(pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+            what, item = guard.recv()
+            (watched.add if what == "watch" else watched.discard)(item)
+    for item in watched:
+        if isinstance(item, str):
+            shutil.rmtree(item, ignore_errors=True)
+            continue
+        with suppress(OSError):
+            os.kill(item, getattr(signal, "SIGKILL", signal.SIGTERM))
 
 
 if __name__ == "__main__":

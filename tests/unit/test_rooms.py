@@ -74,7 +74,7 @@ MAY_IMPORT = {
     "frame_workers": BASE_ROOMS | {"worker"},
     "render_turntable": BASE_ROOMS
     | {"rendering", "image_io", "worker", "scene", "gpu", "turntable_video"},
-    "turntable_video": BASE_ROOMS | {"projection", "compositor", "rendering", "image_io"},
+    "turntable_video": BASE_ROOMS | {"projection", "compositor", "worker", "rendering", "image_io"},
     "ui": BASE_ROOMS
     | {
         "preset_files",

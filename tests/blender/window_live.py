@@ -401,6 +401,7 @@ def clipped_region():
         bpy.ops.view3d.clip_border(
             xmin=middle, xmax=region.width - 5, ymin=5, ymax=region.height - 5
         )
+    region.tag_redraw()
     yield 0.7
     off = capture("live-clipped-off", region)
     switch("ON")

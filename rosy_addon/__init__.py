@@ -7,8 +7,9 @@ A package imports only from those above it::
     compositor            pictures from G-buffers
     line_drawing          streamlines on surfaces, as strokes
     surface_texture       textures of the surface, for UV maps
-    rendering, image_io   the renderer interface and its numpy renderer; image files
-    gpu, presets          the renderer on the graphics card; stored looks and stroke settings
+    worker                jobs, and the helper processes that compute for them
+    rendering, image_io   pictures of views, drawn with numpy; image files
+    gpu, preset_files     the renderer on the graphics card; stored looks and stroke settings
     scene                 reading and writing Blender data
     viewport              the live preview in the 3D view
     ui                    properties, panels, preferences and overlay
@@ -19,8 +20,8 @@ The modules outside the packages are of two kinds. The base modules, such as `er
 `cache` and `settings`, are imported by many packages. The main jobs are run by operators and by the
 command line: `bake`, `animation`, `draw_strokes` and `turntable_video`.
 
-``field``, ``projection``, ``compositor``, ``line_drawing``, ``surface_texture``, ``rendering``,
-``image_io`` and ``presets`` do not import bpy and need only numpy. The public names are those of `api`. They are
+``field``, ``projection``, ``compositor``, ``line_drawing``, ``surface_texture``, ``worker``, ``rendering``,
+``image_io`` and ``preset_files`` do not import bpy and need only numpy. The public names are those of `api`. They are
 loaded when they are first used.
 """
 

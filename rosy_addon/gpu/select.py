@@ -10,7 +10,7 @@ from ..errors import DeviceError
 from ..rendering.draw import bake_picture
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
-from ..worker.job import Call, Step, Steps
+from ..worker.job import Call, Steps
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer, check_method
@@ -55,12 +55,7 @@ def select_device(device: str, look: Look) -> str:
 
 
 def picture_steps(
-    view: ViewInput,
-    device: str,
-    *,
-    keep_gbuffers: bool = True,
-    workers: int = 0,
-    part: tuple[float, float] = (0.0, 1.0),
+    view: ViewInput, device: str, *, keep_gbuffers: bool = True, workers: int = 0
 ) -> Steps[Picture]:
     """Draw a picture as part of a job: on the graphics card in steps, or with numpy in one call.
 
@@ -71,28 +66,14 @@ def picture_steps(
         From `select_device`.
     keep_gbuffers, workers
         As for `bake_picture`.
-    part : (float, float)
-        Fractions of the job at which the drawing begins and ends.
 
     Returns
     -------
     Picture
     """
     if device == "cpu":
-        return (yield Call(bake_picture, (view, keep_gbuffers, workers), *part))
-    (start, stop), answer = part, None
-    steps = GpuRenderer(blender_device()).picture_steps(view)
-    while True:
-        try:
-            step = steps.send(answer)
-        except StopIteration as end:
-            return end.value
-        if isinstance(step, Step):
-            step = Step(start + (stop - start) * step.fraction, step.label)
-        else:
-            ends = (start + (stop - start) * end for end in (step.start, step.stop))
-            step = Call(step.function, step.arguments, *ends, step.label)
-        answer = yield step
+        return (yield Call(bake_picture, (view, keep_gbuffers, workers)))
+    return (yield from GpuRenderer(blender_device()).picture_steps(view))
 
 
 def automatic_device(look: Look) -> str:

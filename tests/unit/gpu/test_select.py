@@ -10,7 +10,7 @@ from rosy_addon.gpu.cpu_viewport import CpuViewportRenderer
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.rendering.draw import bake_picture
 from rosy_addon.rendering.view_input import ViewInput
-from rosy_addon.worker.job import Call, Step, Steps, run
+from rosy_addon.worker.job import Call, Step, Steps, part, run
 
 REFUSED = {"members": "brute", "ibfv": "sheets"}
 
@@ -42,7 +42,7 @@ def test_methods_that_the_processor_draws_instead(method, error_of):
 def test_pictures_are_a_part_of_a_job(monkeypatch):
     """The processor draws in one call; the card in steps, with calls of its own."""
     view = ViewInput((), None, Look())
-    (call,) = select.picture_steps(view, "cpu", workers=3, part=(0.2, 0.6))
+    (call,) = part(select.picture_steps(view, "cpu", workers=3), 0.2, 0.6)
     assert call == Call(bake_picture, (view, True, 3), 0.2, 0.6)
 
     class Card:
@@ -55,7 +55,7 @@ def test_pictures_are_a_part_of_a_job(monkeypatch):
 
     monkeypatch.setattr(select, "blender_device", lambda: None)
     monkeypatch.setattr(select, "GpuRenderer", Card)
-    steps: Steps = select.picture_steps(view, "gpu", part=(0.2, 0.6))
+    steps: Steps = part(select.picture_steps(view, "gpu"), 0.2, 0.6)
     assert next(steps) == Step(pytest.approx(0.4), "drawing")
     assert next(steps)[2:] == (pytest.approx(0.4), pytest.approx(0.6), "counting")
     assert run(select.picture_steps(view, "gpu")) == 2

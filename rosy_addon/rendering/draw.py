@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -101,7 +102,8 @@ def _draw_fields(
         check_picture_memory(view, groups, workers)
     if len(groups) == 1:
         return _draw_strips(view, groups[0], cache, gbuffer_cache)
-    pictures = POOL.map(draw_rows, [(view, group) for group in groups], workers)
+    draw_here = partial(draw_rows, cache=Cache() if cache is None else cache)
+    pictures = POOL.map(draw_rows, [(view, group) for group in groups], workers, draw_here)
     if all(picture is None for picture in pictures):
         raise_nothing_in_view(view.instances, view.shaded_camera)
     parts = [_whole(group) for group in groups]
@@ -119,7 +121,9 @@ def picture_groups(view: ViewInput, workers: int) -> list[Sequence[Strip]]:
     return [strips] if view.draws_thresholds else group_strips(strips, *scene, workers)
 
 
-def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray | None:
+def draw_rows(
+    view: ViewInput, strips: Sequence[Strip], cache: Cache = BAKE_CACHE
+) -> np.ndarray | None:
     """Draw some neighboring strips of a picture.
 
     Parameters
@@ -127,6 +131,8 @@ def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray | None:
     view : ViewInput
     strips : sequence of Strip
         A group of `group_strips`.
+    cache : Cache
+        Keeps what does not depend on the camera. By default that of the process, for helpers.
 
     Returns
     -------
@@ -134,10 +140,11 @@ def draw_rows(view: ViewInput, strips: Sequence[Strip]) -> np.ndarray | None:
         The `drawn_rows` of the strips together. Linear RGBA, not premultiplied. None if nothing is visible.
     """
     try:
-        picture = _draw_strips(view, strips, BAKE_CACHE, None)
+        picture = _draw_strips(view, strips, cache, None)
     except NothingInViewError:
         return None
-    BAKE_CACHE.evict_over_limit()
+    if cache is BAKE_CACHE:  # others have owners that evict
+        cache.evict_over_limit()
     return picture.rgba
 
 

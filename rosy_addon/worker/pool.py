@@ -38,7 +38,11 @@ class Pool:
         self.helpers: list[Helper] = []
 
     def map(
-        self, function: Callable[..., Any], arguments: Sequence[tuple[Any, ...]], count: int = 0
+        self,
+        function: Callable[..., Any],
+        arguments: Sequence[tuple[Any, ...]],
+        count: int = 0,
+        function_here: Callable[..., Any] | None = None,
     ) -> list[Any]:
         """Call a function with each of several tuples of arguments, in several processes.
 
@@ -51,6 +55,8 @@ class Pool:
         arguments : sequence of tuple
         count : int
             Number of processes; 0 is one for each core.
+        function_here : function, optional
+            Called in this process instead, such as the same with a cache of the caller.
 
         Returns
         -------
@@ -60,7 +66,8 @@ class Pool:
         helper_count = max(min(count or core_count(), len(arguments)) - 1, 0)
         while len(self.helpers) < helper_count:
             self.helpers.append(Helper(ENVIRONMENT))
-        return _SharedCalls(self.helpers[:helper_count], function, arguments).make()
+        helpers = self.helpers[:helper_count]
+        return _SharedCalls(helpers, function, arguments, function_here or function).make()
 
     def close(self) -> None:
         """End all helpers."""
@@ -77,8 +84,10 @@ class _SharedCalls:
         helpers: Sequence[Helper],
         function: Callable[..., Any],
         arguments: Sequence[tuple[Any, ...]],
+        function_here: Callable[..., Any],
     ) -> None:
         self._function, self._arguments = function, arguments
+        self._function_here = function_here
         self._results: list[Any] = [None] * len(arguments)
         #: Numbers of the calls that nobody makes yet, and of those that helpers make.
         self._waiting = deque(range(len(arguments)))
@@ -94,7 +103,7 @@ class _SharedCalls:
                 if self._waiting:
                     number = self._waiting.popleft()
                     with listening(self._hear):
-                        self._results[number] = self._function(*self._arguments[number])
+                        self._results[number] = self._function_here(*self._arguments[number])
                 elif self._given:
                     wait([helper.connection for helper in self._given], WAIT_SECONDS)
                     self._hear(1.0, "waiting for other processes")

@@ -15,6 +15,7 @@ import pytest
 from conftest import ROOT, long
 from shapes import torus
 
+from rosy_addon.cache import BAKE_CACHE, Cache
 from rosy_addon.compositor.look import Look
 from rosy_addon.errors import NothingInViewError
 from rosy_addon.field.generate import axis_field
@@ -64,6 +65,14 @@ def test_the_number_of_processes_changes_nothing(count, expected):
     assert len(picture_groups(VIEW, count)) == count
     assert drawn(VIEW, count) == expected
     assert len(POOL.helpers) == count - 1
+
+
+@pytest.mark.slow
+def test_nothing_is_kept_here_without_a_cache(expected):
+    before, cache = len(BAKE_CACHE), Cache()
+    assert drawn(VIEW, 2) == expected
+    assert draw_picture(VIEW, cache, workers=2).rgba.tobytes() == expected
+    assert len(BAKE_CACHE) == before and len(cache)
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from ..rosy_addon.bake import BakeResult, bake
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
-from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
 from ..rosy_addon.worker.job import Steps

@@ -11,7 +11,7 @@ from ..rosy_addon.animation import SequenceResult, bake_animation
 from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
-from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.worker.job import Steps
 from .modal_job import DialogJobMixin

@@ -8,7 +8,7 @@ import bpy
 
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
 from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
-from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.worker.job import Steps
 from .modal_job import ModalJobMixin
 from .poll import poll_has_field

@@ -9,7 +9,7 @@ import bpy
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
-from ..rosy_addon.scene.scene_reader import field_objects
+from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.scene.write_field import assign_fields
 from ..rosy_addon.ui import job_status, live_views, overlay
 from ..rosy_addon.ui.preferences import apply_preferences

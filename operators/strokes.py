@@ -10,13 +10,13 @@ from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes
 from ..rosy_addon.errors import counted
 from ..rosy_addon.line_drawing.polyline_files import DRAWING_SUFFIXES
 from ..rosy_addon.scene.cameras import CameraSource, render_camera
-from ..rosy_addon.scene.scene_reader import field_objects
 from ..rosy_addon.scene.stroke_objects import (
     edited_strokes,
     remove_strokes,
     stroke_objects,
     target_objects,
 )
+from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from ..rosy_addon.worker.job import Steps
 from .bake import view_camera

@@ -34,6 +34,7 @@ from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.blender_images import frame_path, write_frame
 from .scene.cameras import CameraSource, frame_camera
+from .scene.evaluated_field import temp_attributes
 from .scene.file_names import picture_stem
 from .scene.keys import update_keys
 from .scene.look_properties import look_at_frame, read_look
@@ -45,8 +46,10 @@ from .scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from .scene.read_view import nonfinite_policy, read_views, scene_depsgraph
-from .scene.scene_reader import SceneData, field_objects, temp_attributes
+from .scene.read_request import nonfinite_policy
+from .scene.read_view import read_views, scene_depsgraph
+from .scene.scene_reader import SceneData
+from .scene.visible_objects import field_objects
 from .worker.job import Call, Step, Steps, job, part
 
 #: Suffix of a sidecar file, after the name of the picture.
@@ -138,13 +141,7 @@ def bake_animation(
         if show:
             check_targets(targets, settings)
         exit_stack.enter_context(
-            temp_attributes(
-                depsgraph,
-                targets,
-                nonfinite_policy(scene),
-                cache,
-                {} if objects is None else None,
-            )
+            temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
         )
         for index, frame in enumerate(frames):
             start, stop = index / len(frames), (index + 1) / len(frames)
@@ -253,7 +250,8 @@ def _frame_steps(
         cache=cache,
     )
     cache.evict_unused()
-    states = read_picture_states(scene, depsgraph, sources, is_frame=True)
+    mesh_states = scene_views.scene_data.mesh_states
+    states = read_picture_states(scene, depsgraph, sources, mesh_states, is_frame=True)
     results = []
     for index, view in enumerate(scene_views.views):
         start, stop = index / len(sources), (index + 1) / len(sources)

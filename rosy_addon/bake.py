@@ -95,7 +95,7 @@ def bake(
     )
     BAKE_CACHE.evict_over_limit()
     check_targets(scene_views.scene_data.objects, settings)
-    states = read_picture_states(scene, depsgraph, sources)
+    states = read_picture_states(scene, depsgraph, sources, scene_views.scene_data.mesh_states)
     device = select_device(settings.device, look)
     rendered_views = []
     for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):

@@ -20,7 +20,8 @@ from .line_drawing.svg import Pen
 from .projection.gbuffer import MeshInstance
 from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
 from .scene.lights import read_lights
-from .scene.read_view import nonfinite_policy, scene_depsgraph
+from .scene.read_request import ReadRequest, nonfinite_policy
+from .scene.read_view import scene_depsgraph
 from .scene.scene_reader import SceneData, read_scene
 from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 from .worker.job import Call, Step, Steps, job
@@ -113,7 +114,7 @@ def draw_strokes(
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     source = render_camera(scene) if camera is None else camera
     view = resolve_camera(scene, depsgraph, source, render_size(scene) if size is None else size)
-    scene_data = read_scene(depsgraph, objects, nonfinite_policy(scene), BAKE_CACHE)
+    scene_data = read_scene(depsgraph, objects, ReadRequest(nonfinite_policy(scene)), BAKE_CACHE)
     BAKE_CACHE.evict_over_limit()
     followed = None
     if kind == "CURVES" and settings.follow:

@@ -52,7 +52,7 @@ def requested_objects(options: argparse.Namespace) -> list[Any] | None:
     """Return the objects that the options name; None for all whose fields can be drawn."""
     import bpy
 
-    from ..scene.scene_reader import field_objects
+    from ..scene.visible_objects import field_objects
 
     return None if options.object is None else field_objects(bpy.context.view_layer, options.object)
 

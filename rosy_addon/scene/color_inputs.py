@@ -10,8 +10,7 @@ import numpy as np
 from ..cache import Cache, content_hash
 from ..compositor.look import Look, colors_values
 from ..errors import RosyError
-from ..field.surface import Surface
-from .face_values import COLOR_TYPES, corner_scalars, filled_attribute, scalar_values
+from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 
 #: Types of attributes that messages list. Booleans are mostly Blender's own.
 LISTED_TYPES = ("FLOAT", "INT", *COLOR_TYPES)
@@ -24,7 +23,6 @@ def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
 
 def read_color_values(
     mesh: bpy.types.Mesh,
-    surface: Surface,
     name: str | None,
     label: str,
     cache: Cache | None = None,
@@ -35,8 +33,6 @@ def read_color_values(
     ----------
     mesh : bpy.types.Mesh
         Evaluated.
-    surface : Surface
-        The surface of the mesh.
     name : str or None
         Of the attribute.
     label : str
@@ -58,7 +54,7 @@ def read_color_values(
     if attribute is None:
         return None
     source = f"{label}, attribute '{attribute.name}'"
-    values = corner_scalars(attribute, surface, source).astype(np.float32)
+    values = corner_scalars(attribute, mesh, source).astype(np.float32)
     values[~np.isfinite(values)] = np.nan
     if cache is None:
         return values
@@ -70,13 +66,11 @@ def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
 
     If it cannot be read, it is the digest of the error.
     """
-    attribute = filled_attribute(mesh, name) if name else None
-    if attribute is None:
-        return b""
     try:
-        return content_hash(attribute.domain, scalar_values(attribute, attribute.name))
+        values = read_color_values(mesh, name, mesh.name)
     except RosyError as error:
         return content_hash(str(error))
+    return b"" if values is None else content_hash(values)
 
 
 def check_colored(

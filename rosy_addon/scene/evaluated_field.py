@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 
 from ..cache import Cache, content_hash
+from ..errors import RosyError
 from ..field.frames import dot, normalize, transport
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -18,13 +21,30 @@ from ..field.validate import (
     tangent_normals,
 )
 from ..progress import report
-from .field_attributes import VECTOR_TYPE, cached_field, field_values
-from .meshes import read_attribute
+from .compat import is_editable
+from .field_attributes import (
+    VECTOR_TYPE,
+    attribute_name,
+    cached_field,
+    field_degree,
+    field_values,
+    is_face_vector_field,
+)
+from .meshes import mesh_surface, read_attribute
+from .owned_data import user_modifiers
+from .read_field import read_mesh_field
 from .rest_shape import follow_mesh, read_rest_shape
 
 #: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
 #: field's vectors are tangent. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
+
+#: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
+#: another form.
+TEMP_FIELD_ATTRIBUTE = "rosy_stand_in"
+
+#: Why the fields of objects cannot be drawn.
+Errors = dict[bpy.types.Object, RosyError]
 
 
 @dataclass(frozen=True)
@@ -160,3 +180,96 @@ def _transport(
         vectors = transport(vectors, original_normals, normals)
         report(0.7, label)
     return project_to_tangent(vectors, normals, 180.0, source, "face")
+
+
+@contextmanager
+def temp_attributes(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object],
+    nonfinite: str,
+    cache: Cache,
+    errors: Errors,
+) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
+    """Add temporary attributes that modifiers copy to evaluated meshes, and remove them at exit.
+
+    The attributes are the rest positions, the normals of the original faces, and vectors on faces
+    for fields that are stored in another form. All fields are checked on the original meshes.
+
+    If a context that is already open covers the same objects, nothing is added again. For many
+    calls of `read_scene`, keep one context open around them.
+
+    Parameters
+    ----------
+    errors : dict of bpy.types.Object to RosyError
+        Gets the errors of the fields that cannot be read; these objects are left out.
+
+    Yields
+    ------
+    dict of bpy.types.Object to FieldLayout
+        The attributes that hold each object's field on its evaluated mesh.
+    """
+    layouts: dict[bpy.types.Object, FieldLayout] = {}
+    rest_enabled: list[bpy.types.Object] = []
+    temp_meshes: list[bpy.types.Mesh] = []
+    try:
+        for obj in objects:
+            mesh = obj.data
+            try:
+                layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
+            except RosyError as error:
+                errors[obj] = error
+                continue
+            deforms = bool(user_modifiers(obj) or mesh.shape_keys)
+            if deforms and is_editable(obj) and not obj.add_rest_position_attribute:
+                obj.add_rest_position_attribute = True
+                rest_enabled.append(obj)
+            if deforms and FACE_NORMAL_ATTRIBUTE not in mesh.attributes and _can_modify(mesh):
+                temp_meshes.append(mesh)
+                surface = mesh_surface(mesh, f"object '{obj.name}'", cache=cache)
+                add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
+        if rest_enabled or temp_meshes:
+            depsgraph.update()
+        yield layouts
+    finally:
+        for obj in rest_enabled:
+            obj.add_rest_position_attribute = False
+        for mesh in set(temp_meshes):
+            temp_names = [
+                a.name
+                for a in mesh.attributes
+                if a.name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE))
+            ]
+            for name in temp_names:
+                mesh.attributes.remove(mesh.attributes[name])
+            mesh.update_tag()
+        if rest_enabled or temp_meshes:
+            depsgraph.update()
+
+
+def _prepare_field(
+    obj: bpy.types.Object, nonfinite: str, temp_meshes: list[bpy.types.Mesh], cache: Cache
+) -> FieldLayout:
+    """Return the layout of a field as vectors on faces. Add them temporarily if missing."""
+    mesh, label = obj.data, f"object '{obj.name}'"
+    name = attribute_name(mesh)
+    if mesh.is_editmode and is_face_vector_field(mesh):
+        return FieldLayout(name, field_degree(mesh))  # only the evaluated mesh can be read
+    field = read_mesh_field(mesh, nonfinite=nonfinite, label=label, cache=cache)
+    if is_face_vector_field(mesh):
+        return FieldLayout(name, field.degree)
+    if not _can_modify(mesh):
+        raise RosyError(
+            f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}, and only fields "
+            "stored as vectors on faces can be read there: use Store Field first"
+        )
+    if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
+        temp_meshes.append(mesh)
+        return add_temp_field(mesh, field, TEMP_FIELD_ATTRIBUTE)
+    return FieldLayout(
+        TEMP_FIELD_ATTRIBUTE, field.degree, field.direction_ratios is not None, field.family_count
+    )
+
+
+def _can_modify(mesh: bpy.types.Mesh) -> bool:
+    """Whether attributes can be added to a mesh."""
+    return is_editable(mesh) and not mesh.is_editmode

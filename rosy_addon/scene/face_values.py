@@ -7,10 +7,10 @@ import numpy as np
 
 from ..color import REC709_LUMINANCE
 from ..errors import RosyError
-from ..field.surface import Surface, mean_per_face
+from ..field.surface import mean_per_face
 from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
-from .meshes import mesh_label, mesh_surface
+from .meshes import mesh_label, mesh_surface, polygon_arrays
 
 #: Types of attributes that are numbers, with dtypes for them, and those that are colors.
 NUMBER_TYPES = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
@@ -99,14 +99,13 @@ def filled_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | N
     return attribute if attribute is not None and len(attribute.data) else None
 
 
-def corner_scalars(attribute: bpy.types.Attribute, surface: Surface, source: str) -> np.ndarray:
+def corner_scalars(attribute: bpy.types.Attribute, mesh: bpy.types.Mesh, source: str) -> np.ndarray:
     """Return the values of a scalar attribute at the corners of its mesh, (C,) float64.
 
     Parameters
     ----------
     attribute : bpy.types.Attribute
-    surface : Surface
-        The surface of the mesh.
+    mesh : bpy.types.Mesh
     source : str
         Name of the attribute in messages.
 
@@ -116,9 +115,10 @@ def corner_scalars(attribute: bpy.types.Attribute, surface: Surface, source: str
         As of `scalar_values`.
     """
     values = scalar_values(attribute, source)
+    corner_vertex, face_start = polygon_arrays(mesh)
     if attribute.domain == "POINT":
-        return values[surface.corner_vertex]
-    return values[surface.corner_face] if attribute.domain == "FACE" else values
+        return values[corner_vertex]
+    return np.repeat(values, np.diff(face_start)) if attribute.domain == "FACE" else values
 
 
 def scalar_values(attribute: bpy.types.Attribute, source: str) -> np.ndarray:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
-from typing import Any
 
 import bpy
 import numpy as np
@@ -41,7 +39,6 @@ def mesh_surface(
     mesh: bpy.types.Mesh,
     name: str | None = None,
     *,
-    read_rest: bool = False,
     occluder_only: bool = False,
     cache: Cache | None = None,
 ) -> Surface:
@@ -53,8 +50,6 @@ def mesh_surface(
         Original or evaluated. In edit mode, the current state of editing is read.
     name : str, optional
         Name for messages. By default `mesh_label`.
-    read_rest : bool
-        Read the undeformed positions from the attribute `REST_ATTRIBUTE`, if it exists.
     occluder_only : bool
         Treat all faces as flat, which is cheaper. For meshes that only occlude others.
     cache : Cache, optional
@@ -71,68 +66,83 @@ def mesh_surface(
         is not finite.
     """
     name = mesh_label(mesh) if name is None else name
-    flush_edit_mode(mesh)
+    shape = _read_shape(mesh, occluder_only=occluder_only)
     if not len(mesh.polygons):
-        content = "only vertices and loose edges" if len(mesh.vertices) else "it is empty"
-        raise RosyError(f"{name}: the mesh has no faces, {content}")
-    arguments = _topology(mesh, occluder_only) | {
-        "vertices": vertex_positions(mesh),
-        "name": name,
-        "corner_normal": read_collection(mesh.corner_normals, "vector", np.float32, 3),
-        "rest_vertices": read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3) if read_rest else None,
+        raise no_faces_error(mesh, name)
+    topology = {
+        key: value for key, value in shape.items() if key not in ("vertices", "corner_normal")
     }
+    if occluder_only:
+        topology["flat_faces"] = np.ones(len(mesh.polygons), dtype=bool)
+
+    def build_fans() -> np.ndarray:
+        return smooth_fans(shape["vertices"], **topology)
+
+    def build() -> Surface:
+        with progress(0.0, 0.7):
+            # They depend on the topology alone, so a deformation does not change them.
+            fans = (
+                build_fans()
+                if cache is None
+                else cache.get_or_create(("fans", content_hash(*topology.values())), build_fans)
+            )
+        normals = shape["corner_normal"]
+        if normals is None:
+            normals = _corner_normals(mesh)
+        with progress(0.7, 1.0):
+            return build_surface(
+                shape["vertices"],
+                **topology,
+                name=name,
+                corner_normal=normals,
+                corner_fan=fans,
+                **_triangles(mesh),
+            )
+
     if cache is None:
-        return build_surface(**arguments, **_triangles(mesh))
-    # Triangles are not part of the key: they are slow to read, and follow from the other arrays.
-    key = "surface", content_hash(*arguments.values())
-    if cache.get(key) is None:
-        arguments |= _triangles(mesh)
-    return cache.get_or_create(key, partial(_with_fans, arguments, cache))
+        return build()
+    key = "surface", name, occluder_only, content_hash(*shape.values())
+    return cache.get_or_create(key, build)
 
 
-def _topology(mesh: bpy.types.Mesh, occluder_only: bool = False) -> dict[str, np.ndarray | None]:
-    """Return the arguments of `build_surface` that smooth fans depend on."""
-    corner_vertex, face_start = polygon_arrays(mesh)
-    return {
-        "corner_vertex": corner_vertex,
-        "face_start": face_start,
-        "sharp_edges": None if occluder_only else _sharp_edges(mesh),
-        "flat_faces": (
-            np.ones(len(mesh.polygons), dtype=bool)
-            if occluder_only
-            else read_attribute(mesh, "sharp_face", bool, 1)
-        ),
-    }
-
-
-def _with_fans(arguments: dict[str, Any], cache: Cache) -> Surface:
-    """Build a surface from the arguments of `build_surface`, with smooth fans from the cache.
-
-    The fans depend on the topology alone, so a deformation does not change them.
-    """
-    names = "corner_vertex", "face_start", "sharp_edges", "flat_faces"
-    topology = {name: arguments[name] for name in names}
-    key = "fans", content_hash(*topology.values())
-    with progress(0.0, 0.7):
-        fans = cache.get_or_create(key, partial(smooth_fans, arguments["vertices"], **topology))
-    with progress(0.7, 1.0):
-        return build_surface(**arguments, corner_fan=fans)
+def no_faces_error(mesh: bpy.types.Mesh, name: str) -> RosyError:
+    """Return the error for a mesh without faces, which is called `name`."""
+    content = "only vertices and loose edges" if len(mesh.vertices) else "it is empty"
+    return RosyError(f"{name}: the mesh has no faces, {content}")
 
 
 def shape_digest(mesh: bpy.types.Mesh, *, occluder_only: bool = False) -> bytes:
-    """Return a digest of everything that `mesh_surface` reads, apart from the rest positions.
+    """Return a digest of everything that `mesh_surface` reads. Much faster than reading the surface."""
+    return content_hash(*_read_shape(mesh, occluder_only=occluder_only).values())
 
-    Much faster than reading the surface: normals are left out where they follow from the rest.
+
+def _read_shape(mesh: bpy.types.Mesh, *, occluder_only: bool) -> dict[str, np.ndarray | None]:
+    """Return the arguments of `build_surface` from which all others follow.
+
+    Triangles and normals are left out, as Blender computes them from the rest, unless normals are
+    custom.
     """
     flush_edit_mode(mesh)
-    parts = [vertex_positions(mesh), *polygon_arrays(mesh)]
+    corner_vertex, face_start = polygon_arrays(mesh)
+    shape = {
+        "vertices": vertex_positions(mesh),
+        "corner_vertex": corner_vertex,
+        "face_start": face_start,
+        "sharp_edges": None,
+        "flat_faces": None,
+        "corner_normal": None,
+    }
     if not occluder_only:
-        sharp_faces = read_attribute(mesh, "sharp_face", bool, 1)
-        is_smooth = sharp_faces is None or not sharp_faces.any()
-        parts += [_sharp_edges(mesh), None if is_smooth else sharp_faces]
-        if mesh.has_custom_normals:
-            parts.append(read_collection(mesh.corner_normals, "vector", np.float32, 3))
-    return content_hash(*parts)
+        flat_faces = read_attribute(mesh, "sharp_face", bool, 1)
+        shape["sharp_edges"] = _sharp_edges(mesh)
+        shape["flat_faces"] = flat_faces if flat_faces is not None and flat_faces.any() else None
+        shape["corner_normal"] = _corner_normals(mesh) if mesh.has_custom_normals else None
+    return shape
+
+
+def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the shading normals at the corners, (C, 3) float32."""
+    return read_collection(mesh.corner_normals, "vector", np.float32, 3)
 
 
 def read_uvs(mesh: bpy.types.Mesh, name: str, label: str, purpose: str) -> np.ndarray:

@@ -14,6 +14,7 @@ from ..projection.gbuffer import MeshInstance
 from ..worker.job import Call, Steps, job
 from .compat import is_editable
 from .meshes import mesh_surface
+from .read_request import ReadRequest
 from .scene_reader import SceneData, read_scene
 
 #: Default name of the attribute.
@@ -53,7 +54,7 @@ def store_occlusion(
     """
     for obj in objects:
         _check_writable(obj, name)
-    scene_data = read_scene(depsgraph, objects, "zero")
+    scene_data = read_scene(depsgraph, objects, ReadRequest("zero"))
     values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
     for index, obj in enumerate(objects):
         start, stop = index / len(objects), (index + 1) / len(objects)

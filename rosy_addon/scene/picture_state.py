@@ -14,36 +14,23 @@ from itertools import product, starmap
 import bpy
 import numpy as np
 
-from ..cache import content_hash
 from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
 from ..errors import RosyError
-from ..field.rosy_field import MAX_DEGREE
 from ..file_io import read_bytes
 from ..projection.camera import Camera
 from ..settings import settings_of
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
-from .color_inputs import color_attribute_of, color_values_digest
-from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
+from .color_inputs import color_values_digest
+from .field_attributes import attribute_name, field_degree
 from .lights import rendered_lights
 from .look_properties import read_look
-from .meshes import (
-    evaluated_mesh,
-    polygon_arrays,
-    read_attribute,
-    read_uvs,
-    shape_digest,
-    vertex_positions,
-)
-from .owned_data import user_modifiers
-from .scene_reader import field_objects, rendered_instances
-from .tone_inputs import (
-    ToneRequest,
-    make_tone_request,
-    reference_path,
-    tone_source_digest,
-)
+from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
+from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
+from .read_request import ReadRequest, read_request
+from .tone_inputs import reference_path
+from .visible_objects import field_objects, rendered_instances
 
 #: Properties of ``scene.rosy`` that decide how a picture is stored and shown, and not how it is
 #: drawn.
@@ -125,50 +112,7 @@ class _Instances:
 
     def digest_pair(self) -> list[str]:
         """Return a digest of all transforms, and one of all meshes. Their order does not matter."""
-        return [_digest(*sorted(column)) for column in zip(*self.digests, strict=True)]
-
-
-@dataclass(frozen=True, eq=False)
-class MeshState:
-    """A digest of an evaluated mesh, with its field if that is drawn, and its bounding box.
-
-    Attributes
-    ----------
-    digest : str
-    bounds : (2, 3) float32 ndarray
-        Object space.
-    face_count : int
-    lacks_tone : bool
-        Whether the mesh does not have the tone that the look asks for. It is lit instead.
-    """
-
-    digest: str
-    bounds: np.ndarray
-    face_count: int
-    lacks_tone: bool = False
-
-
-#: What has been read of meshes, by the object, the evaluated mesh and, for fields, their sources.
-#: None: the mesh has no faces.
-MeshStates = dict[tuple, MeshState | None]
-
-
-@dataclass(frozen=True)
-class _Sources:
-    """What the settings of a scene ask of its objects.
-
-    Attributes
-    ----------
-    tone_request : ToneRequest or None
-    color_attribute : str or None
-    uses_lights : bool
-    ignores_bad_vectors : bool
-    """
-
-    tone_request: ToneRequest | None
-    color_attribute: str | None
-    uses_lights: bool
-    ignores_bad_vectors: bool
+        return [digest(*sorted(column)) for column in zip(*self.digests, strict=True)]
 
 
 class SceneState:
@@ -181,11 +125,6 @@ class SceneState:
         The evaluated depsgraph of a view layer.
     mesh_states : dict, optional
         States of meshes that have not changed since they were read. New ones are added.
-
-    Attributes
-    ----------
-    face_count : int
-        The number of faces in all meshes.
     """
 
     def __init__(
@@ -194,38 +133,35 @@ class SceneState:
         depsgraph: bpy.types.Depsgraph,
         mesh_states: MeshStates | None = None,
     ) -> None:
-        self.face_count = 0
         self._lacks_tone = False
         self._fields: dict[str, _Instances] = {}
         self._occluders: dict[str, _Instances] = {}
-        self._lights: dict[str, list[str]] = {}
         self._texture_states: dict[tuple, PictureState] = {}
-        sources = _read_sources(scene)
-        self._read_meshes(depsgraph, sources, {} if mesh_states is None else mesh_states)
-        if sources.uses_lights:
-            self._lights = _light_digests(depsgraph)
+        look = read_look(scene.rosy)
+        self._read_meshes(
+            depsgraph, read_request(scene, look), {} if mesh_states is None else mesh_states
+        )
+        self._lights = _light_digests(depsgraph) if _uses_lights(look) else {}
 
     def _read_meshes(
-        self, depsgraph: bpy.types.Depsgraph, sources: _Sources, mesh_states: MeshStates
+        self, depsgraph: bpy.types.Depsgraph, request: ReadRequest, mesh_states: MeshStates
     ) -> None:
-        with_field = set(field_objects(depsgraph.view_layer))
-        for instance in rendered_instances(depsgraph):
+        targets = field_objects(depsgraph.view_layer)
+        for instance, draws_field in rendered_instances(depsgraph, targets):
             obj, owner = instance.object, instance.object.original
-            draws_field = owner in with_field
-            key = owner.session_uid, obj.data.as_pointer(), sources if draws_field else None
+            mesh_request = request if draws_field else None
+            key = mesh_state_key(obj, owner, mesh_request)
             if key not in mesh_states:
-                mesh_states[key] = (
-                    _field_mesh_state(obj, owner, sources) if draws_field else _occluder_state(obj)
-                )
+                with evaluated_mesh(obj) as mesh:
+                    mesh_states[key] = read_mesh_state(mesh, owner, mesh_request)
             mesh_state = mesh_states[key]
             if mesh_state is None:
                 continue
-            self.face_count += mesh_state.face_count
             self._lacks_tone |= mesh_state.lacks_tone
             matrix = np.array(instance.matrix_world)
             group = self._fields if draws_field else self._occluders
             instances = group.setdefault(owner.name_full, _Instances())
-            instances.digests.append((_digest(matrix + 0.0), mesh_state.digest))
+            instances.digests.append((digest(matrix + 0.0), mesh_state.digest))
             instances.corners.append(_box_corners(mesh_state.bounds, matrix))
 
     def picture_state(
@@ -252,7 +188,7 @@ class SceneState:
         return PictureState(
             look=settings,
             size=[] if camera is None else [camera.width, camera.height],
-            camera="" if camera is None else _digest(camera.view + 0.0, camera.projection + 0.0),
+            camera="" if camera is None else digest(camera.view + 0.0, camera.projection + 0.0),
             output=output,
             device="cpu" if is_relit else scene.rosy.device.lower(),
             objects={name: instances.digest_pair() for name, instances in self._fields.items()},
@@ -306,7 +242,7 @@ def _light_digests(depsgraph: bpy.types.Depsgraph) -> dict[str, list[str]]:
     """Return the digests of the lights of a scene, by the names of their objects."""
     lights: dict[str, list[str]] = {}
     for light, owner in rendered_lights(depsgraph, np.eye(4)):
-        lights.setdefault(owner.name_full, []).append(_digest(*vars(light).values()))
+        lights.setdefault(owner.name_full, []).append(digest(*vars(light).values()))
     return {name: sorted(digests) for name, digests in lights.items()}
 
 
@@ -314,10 +250,14 @@ def read_picture_states(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     sources: Iterable[CameraSource],
+    mesh_states: MeshStates,
     is_frame: bool = False,
 ) -> list[PictureState]:
-    """Return the state of the picture from each camera, or of a frame of an animation."""
-    scene_state = SceneState(scene, depsgraph)
+    """Return the state of the picture from each camera, or of a frame of an animation.
+
+    `mesh_states` are those of the meshes that were read for the pictures (`SceneData`).
+    """
+    scene_state = SceneState(scene, depsgraph, mesh_states)
     return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
 
 
@@ -335,7 +275,7 @@ def read_texture_state(
     """
     settings, mesh = scene.rosy, obj.data
     look = read_look(settings)
-    shape = [shape_digest(mesh), *_field_parts(mesh, mesh), settings.undefined]
+    shape = [shape_digest(mesh), *field_parts(mesh, mesh), settings.undefined]
     uv_parts = [settings.texture_margin]
     with evaluated_mesh(obj.evaluated_get(depsgraph)) as evaluated:
         if evaluated is not None:
@@ -357,34 +297,28 @@ def read_texture_state(
         names = DIRECTION_SETTINGS
     lights, place = {}, ""
     if bakes_light(settings, look):
-        lights, place = _light_digests(depsgraph), _digest(np.array(obj.matrix_world) + 0.0)
+        lights, place = _light_digests(depsgraph), digest(np.array(obj.matrix_world) + 0.0)
     return PictureState(
         look={name: getattr(look, name) for name in names},
         size=[settings.texture_size, settings.texture_size],
-        camera=_digest(*uv_parts),
+        camera=digest(*uv_parts),
         output=output,
         device="cpu",
-        objects={obj.name_full: [place, _digest(*shape)]},
+        objects={obj.name_full: [place, digest(*shape)]},
         occluders={},
         lights=lights,
         reference="",
     )
 
 
-def _read_sources(scene: bpy.types.Scene) -> _Sources:
-    """Return what the settings of a scene ask of its objects."""
-    look = read_look(scene.rosy)
-    uses_lights = look.light == "scene" and look.shading > 0
-    return _Sources(
-        make_tone_request(scene, look),
-        color_attribute_of(scene, look),
-        uses_lights,
-        scene.rosy.undefined,
-    )
+def _uses_lights(look: Look) -> bool:
+    """Whether a look is lit by the lights of the scene."""
+    return look.light == "scene" and look.shading > 0
 
 
 def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tuple:
     """Return the settings on which a `SceneState` depends. Blender reports only some changes."""
+    look = read_look(scene.rosy)
     objects = []
     for obj in field_objects(view_layer):
         image = obj.rosy.tone_image
@@ -392,7 +326,7 @@ def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tup
         mesh = obj.data
         tone_key = image_key, obj.rosy.tone_uv_map
         objects.append((obj.session_uid, attribute_name(mesh), field_degree(mesh), tone_key))
-    return _read_sources(scene), tuple(objects)
+    return read_request(scene, look), _uses_lights(look), tuple(objects)
 
 
 def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
@@ -421,63 +355,6 @@ def _resolved_camera(
         return None
 
 
-# --- meshes ---------------------------------------------------------------------------------------
-
-
-def _field_mesh_state(
-    obj: bpy.types.Object, owner: bpy.types.Object, sources: _Sources
-) -> MeshState | None:
-    """Return the state of an evaluated object whose field is drawn; None if it has no faces."""
-    original = owner.data
-    with evaluated_mesh(obj) as mesh:
-        if mesh is None:
-            return None
-        tone_digest = tone_source_digest(mesh, owner, sources.tone_request)
-        parts = [shape_digest(mesh), *_field_parts(mesh, original), tone_digest]
-        parts.append(color_values_digest(mesh, sources.color_attribute))
-        bounds, face_count = _bounds(mesh), len(mesh.polygons)
-    if user_modifiers(owner) or original.shape_keys:
-        # The rest shape and its normals, from which the field is transported.
-        parts += [shape_digest(original), *_field_parts(original, original)]
-    if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
-        parts.append(sources.ignores_bad_vectors)
-    lacks_tone = sources.tone_request is not None and not tone_digest
-    return MeshState(_digest(*parts), bounds, face_count, lacks_tone)
-
-
-def _occluder_state(obj: bpy.types.Object) -> MeshState | None:
-    """Return the state of an evaluated object that only occludes; None if it has no faces."""
-    with evaluated_mesh(obj) as mesh:
-        if mesh is None:
-            return None
-        digest = _digest(shape_digest(mesh, occluder_only=True))
-        return MeshState(digest, _bounds(mesh), len(mesh.polygons))
-
-
-def _field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
-    """Return the domains and values of the attributes that hold a field, and its degree."""
-    name = attribute_name(original)
-    if name in original.attributes:
-        names, parts = [name], [field_degree(original)]
-    else:
-        names = [f"dir{index}" for index in range(MAX_DEGREE) if f"dir{index}" in mesh.attributes]
-        parts = []
-    for name in names:
-        attribute = mesh.attributes.get(name)
-        if attribute is None or attribute.data_type not in (VECTOR_TYPE, ANGLE_TYPE):
-            parts.append(None)
-            continue
-        is_vector = attribute.data_type == VECTOR_TYPE
-        parts += [attribute.domain, read_attribute(mesh, name, np.float32, 3 if is_vector else 1)]
-    return parts
-
-
-def _bounds(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return the lowest and the highest coordinates of a mesh, (2, 3) float32."""
-    positions = vertex_positions(mesh)
-    return np.stack([positions.min(axis=0), positions.max(axis=0)])
-
-
 def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> str:
     """Return a digest of the reference render of a scene: its file, and its camera."""
     try:
@@ -486,12 +363,7 @@ def _reference_digest(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) ->
         contents = np.frombuffer(read_bytes(path), dtype=np.uint8)
     except (RosyError, OSError) as error:
         return f"{error}"
-    return _digest(contents, camera.view + 0.0, camera.projection + 0.0)
-
-
-def _digest(*parts: object) -> str:
-    """Return a digest as text. It is short, as it is stored in .blend files."""
-    return content_hash(*parts).hex()[:16]
+    return digest(contents, camera.view + 0.0, camera.projection + 0.0)
 
 
 # --- bounding boxes in a picture ------------------------------------------------------------------

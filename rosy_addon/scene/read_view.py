@@ -15,10 +15,10 @@ from ..errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
-from .color_inputs import color_attribute_of
 from .lights import read_lights
+from .read_request import read_request
 from .scene_reader import SceneData, read_scene
-from .tone_inputs import load_reference, make_tone_request
+from .tone_inputs import load_reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,15 +86,7 @@ def read_views(
             f"several cameras have the name '{repeated}', and their pictures would replace each other: "
             "rename them in their libraries, or draw from one"
         )
-    tone_request = make_tone_request(scene, look)
-    scene_data = read_scene(
-        depsgraph,
-        objects,
-        nonfinite_policy(scene),
-        cache,
-        tone_request,
-        color_attribute=color_attribute_of(scene, look),
-    )
+    scene_data = read_scene(depsgraph, objects, read_request(scene, look), cache)
     reference = None
     if look.tone == "picture":
         reference_camera = reference_camera or render_camera(scene)
@@ -123,21 +115,9 @@ def read_turntable(
     RosyError
         See `read_scene`.
     """
-    tone_request = make_tone_request(scene, look)
-    scene_data = read_scene(
-        depsgraph,
-        [obj],
-        nonfinite_policy(scene),
-        tone_request=tone_request,
-        color_attribute=color_attribute_of(scene, look),
-    )
+    scene_data = read_scene(depsgraph, [obj], read_request(scene, look))
     lights = read_lights(depsgraph, np.eye(4)) if look.light == "scene" else []
     return scene_data.instances[0], lights
-
-
-def nonfinite_policy(scene: bpy.types.Scene) -> str:
-    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
-    return "zero" if scene.rosy.undefined else "error"
 
 
 def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

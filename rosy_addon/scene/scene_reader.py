@@ -1,40 +1,52 @@
-"""Reading a scene as mesh instances: evaluated meshes with their fields, and occluders."""
+"""Reading a scene as mesh instances: evaluated meshes with their fields, and occluders.
+
+Bakes and live views read by the same `SceneReader`. Nothing is changed in the file as long as modifiers
+only deform an object: its original mesh has the rest positions and the field. If they change the
+topology, or may change the attribute of the field, both are read from meshes with temporary attributes,
+by `SceneReader.resolve_topologies`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 
 import bpy
 import numpy as np
 
-from ..cache import Cache
-from ..errors import RosyError
+from ..cache import Cache, content_hash
+from ..errors import REPORTED_ERRORS, RosyError
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface
+from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .color_inputs import check_colored, read_color_values
-from .compat import has_rosy_properties, is_editable
-from .evaluated_field import (
-    FACE_NORMAL_ATTRIBUTE,
-    FieldLayout,
-    add_temp_field,
-    add_temp_vectors,
-    read_evaluated_field,
+from .evaluated_field import Errors, FieldLayout, read_evaluated_field, temp_attributes
+from .field_attributes import attribute_name, field_degree, is_face_vector_field, surface_key
+from .libraries import remedy_for_absence
+from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
+from .meshes import (
+    REST_ATTRIBUTE,
+    evaluated_mesh,
+    mesh_surface,
+    no_faces_error,
+    polygon_arrays,
+    read_attribute,
 )
-from .field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
-from .libraries import check_object_type, remedy_for_absence
-from .meshes import evaluated_mesh, mesh_surface, read_uvs
-from .owned_data import OWNED_TAG, user_modifiers
+from .owned_data import user_modifiers
 from .read_field import read_mesh_field
-from .tone_inputs import ToneRequest, check_tones, read_tone
+from .read_request import FIELDS_ONLY, ReadRequest
+from .tone_inputs import check_tones, read_tone, tone_image_key
+from .visible_objects import Instances, field_objects, rendered_instances
 
-#: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
-#: another form.
-TEMP_FIELD_ATTRIBUTE = "rosy_stand_in"
+#: The mesh instances of the last reading, in the cache.
+_INSTANCES_KEY = "instances of the last reading"
+
+#: Consecutive calls of `SceneReader.resolve_topologies` for an object that may not suffice.
+MAX_ATTEMPTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,68 +61,27 @@ class SceneData:
         The original object of each instance with a field, in the same order.
     warnings : tuple of str
         For each object that was left out because its field cannot be drawn: which one, and why.
-    uvs : dict of bpy.types.Object to (C, 2) float32 ndarray
-        u and v at the corners of the objects whose UV maps were asked for.
+    mesh_states : dict
+        What was read, as digests; see `mesh_states`.
     """
 
     instances: list[MeshInstance]
     objects: list[bpy.types.Object]
     warnings: tuple[str, ...] = ()
-    uvs: Mapping[bpy.types.Object, np.ndarray] = dataclass_field(default_factory=dict)
-
-
-def field_objects(
-    view_layer: bpy.types.ViewLayer, names: Iterable[str] | None = None
-) -> list[bpy.types.Object]:
-    """Return the mesh objects with a field that are visible in renders, sorted by name.
-
-    Objects in instanced collections are included. Objects whose field is switched off are not.
-
-    Parameters
-    ----------
-    view_layer : bpy.types.ViewLayer
-    names : iterable of str, optional
-        Return only these objects, in this order.
-
-    Raises
-    ------
-    RosyError
-        If there is no object with one of the names, or it has no field, is hidden or switched off.
-    """
-    candidates = {
-        obj.name: obj
-        for obj in _visible_objects(view_layer)
-        if has_field(obj) and is_field_enabled(obj)
-    }
-    if names is None:
-        return [candidates[name] for name in sorted(candidates)]
-    return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
-
-
-def read_instances(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object] | None = None,
-    nonfinite: str = "error",
-) -> list[MeshInstance]:
-    """Return the mesh instances of `read_scene`."""
-    return read_scene(depsgraph, objects, nonfinite).instances
+    mesh_states: MeshStates = dataclass_field(default_factory=dict)
 
 
 def read_scene(
     depsgraph: bpy.types.Depsgraph,
     objects: Sequence[bpy.types.Object] | None = None,
-    nonfinite: str = "error",
+    request: ReadRequest = FIELDS_ONLY,
     cache: Cache | None = None,
-    tone_request: ToneRequest | None = None,
-    uv_maps: Mapping[bpy.types.Object, str] | None = None,
-    color_attribute: str | None = None,
 ) -> SceneData:
     """Read every mesh that is visible in renders, as arrays.
 
     Meshes are evaluated: modifiers (with their viewport settings), shape keys and armatures are
     applied. Each instance is returned as a separate mesh instance. The rest positions of deforming
-    objects with a field are read too. For this, Blender's option to keep them
-    (``add_rest_position_attribute``) is switched on while the scene is read.
+    objects with a field are read too.
 
     Parameters
     ----------
@@ -119,16 +90,9 @@ def read_scene(
     objects : sequence of bpy.types.Object, optional
         Original objects whose fields are drawn. All other objects only occlude. By default all of
         `field_objects` whose fields can be drawn.
-    nonfinite : {"error", "zero"}
-        Raise an error if a vector is not finite, or treat it as undefined.
+    request : ReadRequest
     cache : Cache, optional
         Keeps mesh instances that have not changed since an earlier call.
-    tone_request : ToneRequest, optional
-        The source of the surface tones.
-    uv_maps : mapping of bpy.types.Object to str, optional
-        Names of UV maps that are read, too. Empty: the active one.
-    color_attribute : str, optional
-        Name of the attribute whose numbers are read for the color map.
 
     Returns
     -------
@@ -140,334 +104,404 @@ def read_scene(
         If no object has a field that can be drawn, or no object has the requested tone or numbers. If one of
         the given objects is hidden, or its field cannot be read or is lost in its modifiers.
     """
-    view_layer = depsgraph.view_layer
-    errors: Errors | None = {} if objects is None else None
-    objects = field_objects(view_layer) if objects is None else list(objects)
-    if not objects:
+    targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
+    if not targets:
         remedy = remedy_for_absence("make or import one first")
         raise RosyError(f"no visible object has a RoSy field: {remedy}")
-    cache = Cache() if cache is None else cache
-    with temp_attributes(depsgraph, objects, nonfinite, cache, errors) as layouts:
-        reader = _SceneReader(
-            layouts, nonfinite, cache, tone_request, errors, uv_maps or {}, color_attribute
-        )
-        depsgraph.update()
-        for instance in rendered_instances(depsgraph):
-            reader.add(instance)
-    reader.check_complete(objects)
-    if errors and not reader.field_instances:
-        raise next(iter(errors.values()))
-    check_tones(
-        tone_request, [(instance.tone, owner) for instance, owner in reader.field_instances]
-    )
-    check_colored(
-        color_attribute,
-        [(instance.color_values, owner) for instance, owner in reader.field_instances],
-    )
+    depsgraph.update()
+    reader = SceneReader(cache, mesh_states={})
+    entries = reader.read(rendered_instances(depsgraph, targets), request)
+    while reader.has_unresolved:
+        reader.resolve_topologies(depsgraph)
+        entries = reader.read(rendered_instances(depsgraph, targets), request)
+    errors = _field_errors(reader.errors, entries, targets)
+    if errors and (objects is not None or len(errors) == len(targets)):
+        raise errors[0]
+    with_field = [entry for entry in entries if entry.instance.field is not None]
+    check_sources(with_field, request)
+    occluders = [entry.instance for entry in entries if entry.instance.field is None]
     return SceneData(
-        [instance for instance, _ in reader.field_instances] + reader.occluders,
-        [owner for _, owner in reader.field_instances],
-        tuple(f"{error}. It was left out" for error in (errors or {}).values()),
-        reader.uvs,
+        [entry.instance for entry in with_field] + occluders,
+        [entry.owner for entry in with_field],
+        tuple(f"{error}. It was left out" for error in errors),
+        reader.mesh_states,
     )
 
 
-#: Why the fields of objects cannot be drawn.
-Errors = dict[bpy.types.Object, RosyError]
+def _field_errors(
+    errors: Mapping[str, Exception],
+    entries: Sequence[SceneInstance],
+    targets: Sequence[bpy.types.Object],
+) -> list[RosyError]:
+    """Return why the fields of objects cannot be drawn; raise what is not about a field."""
+    names = [obj.name_full for obj in targets]
+    for name, error in errors.items():
+        if name not in names or not isinstance(error, RosyError):
+            raise error
+    seen = {entry.owner.name_full for entry in entries} | errors.keys()
+    return [
+        errors.get(name)
+        or RosyError(
+            f"object '{obj.name}' has a field, but is hidden in the viewport: show it, or "
+            "switch off its drawing"
+        )
+        for name, obj in zip(names, targets, strict=True)
+        if name in errors or name not in seen
+    ]
+
+
+def check_sources(with_field: Sequence[SceneInstance], request: ReadRequest) -> None:
+    """Check that at least one of the instances with a field has the requested tone and numbers.
+
+    Raises
+    ------
+    RosyError
+        If none has.
+    """
+    check_tones(request.tone, [(entry.instance.tone, entry.owner) for entry in with_field])
+    check_colored(
+        request.color_attribute,
+        [(entry.instance.color_values, entry.owner) for entry in with_field],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SceneInstance:
+    """One mesh instance of a scene: of an object with a field, or of an occluder.
+
+    Attributes
+    ----------
+    instance : MeshInstance
+        The same one as in the last reading if nothing has changed.
+    owner : bpy.types.Object
+        The original object.
+    visibility_object : bpy.types.Object
+        The original object that decides in which 3D views the instance is visible.
+    """
+
+    instance: MeshInstance
+    owner: bpy.types.Object
+    visibility_object: bpy.types.Object
+
 
 #: A surface, its field, its tone and its numbers for the color map. Occluders have only the surface.
 _MeshData = tuple[Surface, RosyField | None, SurfaceTone | None, np.ndarray | None]
 
+#: The full name of an object, and the `_topology_hash` of one of its evaluated meshes.
+_TopologyKey = tuple[str, bytes]
 
-class _SceneReader:
-    """Collects mesh instances. All instances of an evaluated mesh share its surface and field.
+#: Rest positions and field of an evaluated mesh whose topology differs from the original's.
+_Topology = tuple[np.ndarray | None, RosyField]
+
+
+class SceneReader:
+    """Reads the meshes of one view layer, and again those that have changed.
+
+    Parameters
+    ----------
+    cache : Cache, optional
+        Keeps surfaces, fields and mesh instances by their contents.
+    mesh_states : dict, optional
+        Gets a digest of each mesh that is read.
 
     Attributes
     ----------
-    field_instances : list of (MeshInstance, bpy.types.Object)
-        Instances with a field, and their original objects.
-    occluders : list of MeshInstance
-        All other instances.
-    uvs : dict of bpy.types.Object to (C, 2) float32 ndarray
-        As in `SceneData`.
-    mesh_data : dict
-        The data of each evaluated mesh; None if it has no faces. The key is the pointer of the mesh,
-        and the original object or, for an occluder, None.
+    cache : Cache
+    mesh_states : dict or None
+    errors : dict of str to Exception
+        By the full name of an object: why its field is not drawn, or why it does not occlude.
+    is_complete : bool
+        Whether the last call of `read` ended before its deadline.
     """
 
-    def __init__(
+    def __init__(self, cache: Cache | None = None, mesh_states: MeshStates | None = None) -> None:
+        self.cache = Cache() if cache is None else cache
+        self.mesh_states = mesh_states
+        self.errors: dict[str, Exception] = {}
+        self.is_complete = True
+        self._request = FIELDS_ONLY
+        self._deadline = math.inf
+        self._has_read_any = False
+        # By the full name of the object, the pointer of its mesh, `tone_image_key`, and whether its
+        # field is drawn. None: no faces.
+        self._meshes: dict[tuple, _MeshData | None] = {}
+        # The error of a mesh that could not be read is valid until its object changes.
+        self._topologies: dict[_TopologyKey, _Topology | Exception] = {}
+        # Meshes that need `resolve_topologies`.
+        self._unresolved: set[_TopologyKey] = set()
+        # By the name of an object: consecutive calls of `resolve_topologies` that did not suffice.
+        self._attempts: dict[str, int] = {}
+
+    def invalidate(self, names: set[str] | None = None, *, topology_changed: bool = True) -> None:
+        """Mark objects as changed, so that they are read again.
+
+        Parameters
+        ----------
+        names : set of str, optional
+            Full names of the objects. By default all.
+        topology_changed : bool
+            Whether the faces or fields may have changed, not only the positions of the vertices.
+        """
+        for key in [key for key in self._meshes if names is None or key[0] in names]:
+            del self._meshes[key]
+        for key in [key for key in self._topologies if names is None or key[0] in names]:
+            if topology_changed or isinstance(self._topologies[key], Exception):
+                del self._topologies[key]
+        for by_name in (self._attempts, self.errors):
+            for name in [name for name in by_name if names is None or name in names]:
+                del by_name[name]
+
+    def read(
         self,
-        layouts: dict[bpy.types.Object, FieldLayout],
-        nonfinite: str,
-        cache: Cache,
-        tone_request: ToneRequest | None,
-        errors: Errors | None,
-        uv_maps: Mapping[bpy.types.Object, str],
-        color_attribute: str | None,
-    ) -> None:
-        self.layouts = layouts
-        self.uv_maps = uv_maps
-        self.uvs: dict[bpy.types.Object, np.ndarray] = {}
-        self.errors = errors
-        self.nonfinite = nonfinite
-        self.cache = cache
-        self.tone_request = tone_request
-        self.color_attribute = color_attribute
-        self.field_instances: list[tuple[MeshInstance, bpy.types.Object]] = []
-        self.occluders: list[MeshInstance] = []
-        self.mesh_data: dict[tuple, _MeshData | None] = {}
+        instances: Instances,
+        request: ReadRequest = FIELDS_ONLY,
+        deadline: float = math.inf,
+    ) -> list[SceneInstance]:
+        """Return mesh instances in their current state.
 
-    def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
-        """Add an instance to `field_instances` or `occluders`."""
-        obj = instance.object
-        original = obj.original
-        layout = self.layouts.get(original)
-        mesh_key = (obj.data.as_pointer(), original if layout else None)
-        if mesh_key not in self.mesh_data:
-            try:
-                self.mesh_data[mesh_key] = self._read_mesh(obj, layout)
-            except RosyError as error:
-                record_error(self.errors, original, error)
-                self.mesh_data[mesh_key] = self._read_mesh(obj, None)
-        if self.mesh_data[mesh_key] is None:
-            return
-        surface, field, tone, values = self.mesh_data[mesh_key]
-        matrix = np.array(instance.matrix_world, dtype=np.float64)
-        ids = id(surface), id(field), id(tone), id(values)
-        mesh_instance = self.cache.get_or_create(
-            ("instance", *ids, matrix.tobytes()),
-            lambda: MeshInstance(surface, matrix, field, tone, values),
-        )
-        if field is None:
-            self.occluders.append(mesh_instance)
-        else:
-            self.field_instances.append((mesh_instance, original))
+        Objects that need `resolve_topologies` first, or that cannot be read, are left out; see
+        `has_unresolved` and `errors`. Nothing is changed in the file.
 
-    def _read_mesh(self, obj: bpy.types.Object, layout: FieldLayout | None) -> _MeshData | None:
-        """Read an evaluated mesh; None if it has no faces."""
-        with evaluated_mesh(obj) as mesh:
-            if mesh is None:
-                return None
-            if layout is None or not layout.is_on(mesh):
-                return (
-                    mesh_surface(mesh, obj.name, occluder_only=True, cache=self.cache),
-                    None,
-                    None,
-                    None,
+        Parameters
+        ----------
+        instances : iterator of (bpy.types.DepsgraphObjectInstance, bool)
+            Instances of meshes, and whether their fields are drawn. The others only occlude.
+        request : ReadRequest
+        deadline : float
+            Seconds, monotonic. Meshes that were not read by then, except one, are left for the next
+            call; see `is_complete`.
+        """
+        if self.is_complete:
+            self.errors.clear()
+        if request != self._request:
+            self._meshes.clear()
+            self._request = request
+        self._deadline, self._has_read_any, self.is_complete = deadline, False, True
+        self._unresolved.clear()
+        entries: list[SceneInstance] = []
+        last_instances = self.cache.get(_INSTANCES_KEY) or {}
+        mesh_instances: dict[tuple, MeshInstance] = {}
+        faceless: set[bpy.types.Object] = set()
+        for instance, draws_field in instances:
+            obj, owner = instance.object, instance.object.original
+            mesh_data = self._mesh_data(obj, owner, draws_field)
+            if mesh_data is None and draws_field and owner.name_full in self.errors:
+                mesh_data = self._mesh_data(obj, owner, False)  # it hides what is behind it
+            if mesh_data is None:
+                if draws_field:
+                    faceless.add(owner)
+                continue
+            matrix = np.array(instance.matrix_world, dtype=np.float64)
+            key = *(id(part) for part in mesh_data), matrix.tobytes()
+            if key not in mesh_instances:
+                surface, *values = mesh_data
+                mesh_instances[key] = last_instances.get(key) or MeshInstance(
+                    surface, matrix, *values
                 )
-            label = f"object '{obj.name}'"
-            surface = mesh_surface(mesh, label, read_rest=True, cache=self.cache)
-            field = read_evaluated_field(mesh, layout, surface, self.nonfinite, label, self.cache)
-            tone = read_tone(mesh, obj.original, surface, self.tone_request, self.cache)
-            values = read_color_values(mesh, surface, self.color_attribute, label, self.cache)
-            uv_map = self.uv_maps.get(obj.original)
-            if uv_map is not None:
-                self.uvs[obj.original] = read_uvs(mesh, uv_map, label, "the texture")
-            return surface, field, tone, values
+            is_shown_by_parent = instance.is_instance and instance.parent
+            visibility_object = instance.parent.original if is_shown_by_parent else owner
+            entries.append(SceneInstance(mesh_instances[key], owner, visibility_object))
+        waiting = {name for name, _ in self._unresolved}
+        self._attempts = {name: n for name, n in self._attempts.items() if name in waiting}
+        if self.is_complete:
+            for owner in faceless - {entry.owner for entry in entries}:
+                if owner.name_full not in waiting:
+                    self.errors.setdefault(owner.name_full, lost_field_error(owner, None))
+        # The instances of the last call are released only now: while their surfaces are alive, no
+        # new object can have the same id.
+        self.cache.put(_INSTANCES_KEY, mesh_instances)
+        self.cache.evict_over_limit()
+        return entries
 
-    def check_complete(self, objects: Sequence[bpy.types.Object]) -> None:
-        """Record or raise an error for each object whose field was not read."""
-        drawn_objects = {owner for _, owner in self.field_instances}
-        for obj in objects:
-            if obj not in drawn_objects and obj not in (self.errors or ()):
-                record_error(self.errors, obj, self._lost_error(obj))
+    @property
+    def has_unresolved(self) -> bool:
+        """Whether there are objects that need `resolve_topologies`."""
+        return bool(self._unresolved)
 
-    def _lost_error(self, obj: bpy.types.Object) -> RosyError:
-        """Return why an object's field was not read."""
-        if obj not in {key[1] for key in self.mesh_data}:
-            return RosyError(
-                f"object '{obj.name}' has a field, but is hidden in the viewport: show it, or "
-                "switch off its drawing"
+    def resolve_topologies(
+        self, depsgraph: bpy.types.Depsgraph, deadline: float = math.inf
+    ) -> None:
+        """Read the rest positions and fields of meshes whose modifiers change the topology.
+
+        This adds temporary attributes to the meshes, so it must not be called while Blender draws.
+        Objects that were not read by the deadline, except one, are left for the next call.
+        """
+        while self._unresolved:
+            names = {name for name, _ in self._unresolved}
+            self._resolve(depsgraph, names if deadline == math.inf else {min(names)})
+            if time.monotonic() > deadline:
+                return
+
+    def _resolve(self, depsgraph: bpy.types.Depsgraph, names: set[str]) -> None:
+        """Read the rest positions and fields of the meshes of some objects."""
+        unresolved = {key for key in self._unresolved if key[0] in names}
+        self._unresolved -= unresolved
+        for name in names:
+            self._attempts[name] = self._attempts.get(name, 0) + 1
+        for key in [key for key in self._topologies if key[0] in names]:
+            del self._topologies[key]
+        objects = [obj for obj in bpy.data.objects if obj.name_full in names]
+        problems: dict[str, Exception] = {
+            obj.name_full: lost_field_error(obj, attribute_name(obj.data)) for obj in objects
+        }
+        errors: Errors = {}
+        nonfinite = self._request.nonfinite
+        try:
+            with temp_attributes(depsgraph, objects, nonfinite, self.cache, errors) as layouts:
+                self._read_topologies(depsgraph, layouts, problems)
+        except MemoryError as error:
+            problems = dict.fromkeys(problems, error)
+        problems |= {obj.name_full: error for obj, error in errors.items()}
+        # Whatever was not read now is not tried again before the object changes.
+        for key in unresolved:
+            if key[0] in problems:  # otherwise the object was deleted
+                self._topologies.setdefault(key, problems[key[0]])
+
+    def _read_topologies(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        layouts: Mapping[bpy.types.Object, FieldLayout],
+        problems: dict[str, Exception],
+    ) -> None:
+        """Add the meshes of objects that have their field to `_topologies`, others to `problems`."""
+        for instance in depsgraph.object_instances:
+            obj, owner = instance.object, instance.object.original
+            layout = layouts.get(owner)
+            if obj.type != "MESH" or layout is None:
+                continue
+            with evaluated_mesh(obj) as mesh:
+                if mesh is None or not layout.is_on(mesh):
+                    continue
+                key = owner.name_full, _topology_hash(mesh, owner.data)
+                if key in self._topologies:
+                    continue
+                label = f"object '{owner.name}'"
+                try:
+                    rest = read_attribute(mesh, REST_ATTRIBUTE, np.float32, 3)
+                    surface = self._with_rest(mesh_surface(mesh, label, cache=self.cache), rest)
+                    field = read_evaluated_field(
+                        mesh, layout, surface, self._request.nonfinite, label, self.cache
+                    )
+                    self._topologies[key] = rest, field
+                except RosyError as error:
+                    problems[owner.name_full] = error
+
+    def _mesh_data(
+        self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool
+    ) -> _MeshData | None:
+        """Return what is read of the mesh of an evaluated object; None if it cannot be read now."""
+        pointer, request = obj.data.as_pointer(), self._request
+        key = owner.name_full, pointer, tone_image_key(owner, request.tone), draws_field
+        if key in self._meshes:
+            return self._meshes[key]
+        if draws_field and owner.name_full in self.errors:
+            return None
+        if self._has_read_any and time.monotonic() > self._deadline:
+            self.is_complete = False
+            return None
+        self._has_read_any = True
+        try:
+            with evaluated_mesh(obj) as mesh:
+                mesh_data = self._read_mesh(mesh, obj, owner, draws_field)
+                is_waiting = mesh is not None and mesh_data is None
+                if self.mesh_states is not None and not is_waiting:
+                    state_request = request if draws_field else None
+                    state_key = mesh_state_key(obj, owner, state_request)
+                    self.mesh_states[state_key] = read_mesh_state(mesh, owner, state_request)
+        except REPORTED_ERRORS as error:
+            self.errors[owner.name_full] = error
+            return None
+        if not is_waiting:
+            self._meshes[key] = mesh_data
+        return mesh_data
+
+    def _read_mesh(
+        self,
+        mesh: bpy.types.Mesh | None,
+        obj: bpy.types.Object,
+        owner: bpy.types.Object,
+        draws_field: bool,
+    ) -> _MeshData | None:
+        """Read an evaluated mesh; None if there are no faces, or it is unresolved."""
+        if mesh is None:
+            return None
+        if draws_field:
+            return self._read_field_mesh(mesh, owner)
+        label = f"object '{obj.name}'"
+        return mesh_surface(mesh, label, occluder_only=True, cache=self.cache), None, None, None
+
+    def _read_field_mesh(self, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> _MeshData | None:
+        """Read an evaluated mesh with its field; None if it is unresolved."""
+        request, label, original = self._request, f"object '{owner.name}'", owner.data
+        surface = mesh_surface(mesh, label, cache=self.cache)
+        tone = read_tone(mesh, owner, request.tone, self.cache)
+        values = read_color_values(mesh, request.color_attribute, label, self.cache)
+        if original.is_editmode:
+            return surface, self._edit_mode_field(mesh, owner, surface, label), tone, values
+        is_deformed = bool(user_modifiers(owner) or original.shape_keys)
+        original_surface = (
+            mesh_surface(original, label, cache=self.cache) if is_deformed else surface
+        )
+        keeps_field = all(modifier.type != "NODES" for modifier in user_modifiers(owner))
+        if keeps_field and have_same_polygons(surface, original_surface):
+            field = read_mesh_field(
+                original,
+                nonfinite=request.nonfinite,
+                label=label,
+                surface=original_surface,
+                cache=self.cache,
             )
-        faceless = all(value is None for key, value in self.mesh_data.items() if key[1] == obj)
-        return lost_field_error(obj, None if faceless else self.layouts[obj].name)
+            return self._with_rest(surface, original_surface.vertices), field, tone, values
+        key = owner.name_full, _topology_hash(mesh, original)
+        topology = self._topologies.get(key)
+        if topology is None:
+            if self._attempts.get(owner.name_full, 0) >= MAX_ATTEMPTS:
+                raise RosyError(f"{label}: its modifiers make other faces at each evaluation")
+            self._unresolved.add(key)
+            return None
+        if isinstance(topology, Exception):
+            raise topology
+        rest, field = topology
+        return self._with_rest(surface, rest), field, tone, values
+
+    def _edit_mode_field(
+        self, mesh: bpy.types.Mesh, owner: bpy.types.Object, surface: Surface, label: str
+    ) -> RosyField:
+        """Return the field of a mesh in edit mode. Only its evaluated mesh can be read."""
+        original = owner.data
+        name = attribute_name(original)
+        if name in original.attributes and name not in mesh.attributes:
+            raise lost_field_error(owner, name)
+        if name not in mesh.attributes or not is_face_vector_field(mesh, name):
+            raise RosyError(
+                f"{label}: in edit mode, only fields stored as vectors on faces can be read: leave edit mode (Tab)"
+            )
+        layout = FieldLayout(name, field_degree(original))
+        return read_evaluated_field(mesh, layout, surface, self._request.nonfinite, label)
+
+    def _with_rest(self, surface: Surface, rest: np.ndarray | None) -> Surface:
+        """Return a surface with rest positions, if there are any that differ from its own."""
+        if rest is None or np.array_equal(rest, surface.vertices):
+            return surface
+        rest = np.asarray(rest, dtype=np.float64)
+        key = surface_key(surface, "rest", rest)
+        return self.cache.get_or_create(
+            key, lambda: (surface, replace(surface, rest_vertices=rest))
+        )[1]
 
 
 def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
     """Return the error for an object whose modifiers lose an attribute, or, if None, all faces."""
+    if attribute is None and not len(obj.data.polygons):
+        return no_faces_error(obj.data, f"object '{obj.name}'")
     names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"
     problem = "has no faces" if attribute is None else f"has no attribute '{attribute}'"
     return RosyError(f"object '{obj.name}': after its modifiers ({names}) the mesh {problem}")
 
 
-@contextmanager
-def temp_attributes(
-    depsgraph: bpy.types.Depsgraph,
-    objects: Sequence[bpy.types.Object],
-    nonfinite: str,
-    cache: Cache,
-    errors: Errors | None = None,
-) -> Iterator[dict[bpy.types.Object, FieldLayout]]:
-    """Add temporary attributes that modifiers copy to evaluated meshes, and remove them at exit.
-
-    The attributes are the rest positions, the normals of the original faces, and vectors on faces
-    for fields that are stored in another form. All fields are checked on the original meshes.
-
-    If a context that is already open covers the same objects, nothing is added again. For many
-    calls of `read_scene`, keep one context open around them.
-
-    Parameters
-    ----------
-    errors : dict of bpy.types.Object to RosyError, optional
-        Gets the errors of the fields that cannot be read; these objects are left out.
-
-    Yields
-    ------
-    dict of bpy.types.Object to FieldLayout
-        The attributes that hold each object's field on its evaluated mesh.
-
-    Raises
-    ------
-    RosyError
-        If a field cannot be read, and there is no `errors`.
-    """
-    layouts: dict[bpy.types.Object, FieldLayout] = {}
-    rest_enabled: list[bpy.types.Object] = []
-    temp_meshes: list[bpy.types.Mesh] = []
-    try:
-        for obj in objects:
-            mesh = obj.data
-            try:
-                layouts[obj] = _prepare_field(obj, nonfinite, temp_meshes, cache)
-            except RosyError as error:
-                record_error(errors, obj, error)
-                continue
-            deforms = bool(user_modifiers(obj) or mesh.shape_keys)
-            if deforms and is_editable(obj) and not obj.add_rest_position_attribute:
-                obj.add_rest_position_attribute = True
-                rest_enabled.append(obj)
-            if deforms and FACE_NORMAL_ATTRIBUTE not in mesh.attributes and _can_modify(mesh):
-                temp_meshes.append(mesh)
-                surface = mesh_surface(mesh, f"object '{obj.name}'", cache=cache)
-                add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
-        if rest_enabled or temp_meshes:
-            depsgraph.update()
-        yield layouts
-    finally:
-        for obj in rest_enabled:
-            obj.add_rest_position_attribute = False
-        for mesh in set(temp_meshes):
-            temp_names = [
-                a.name
-                for a in mesh.attributes
-                if a.name.startswith((FACE_NORMAL_ATTRIBUTE, TEMP_FIELD_ATTRIBUTE))
-            ]
-            for name in temp_names:
-                mesh.attributes.remove(mesh.attributes[name])
-            mesh.update_tag()
-        if rest_enabled or temp_meshes:
-            depsgraph.update()
-
-
-def record_error(errors: Errors | None, obj: bpy.types.Object, error: RosyError) -> None:
-    """Note why an object's field cannot be drawn, or raise the error if there is no dict for it."""
-    if errors is None:
-        raise error
-    errors[obj] = error
-
-
-def _prepare_field(
-    obj: bpy.types.Object, nonfinite: str, temp_meshes: list[bpy.types.Mesh], cache: Cache
-) -> FieldLayout:
-    """Return the layout of a field as vectors on faces. Add them temporarily if missing."""
-    mesh, label = obj.data, f"object '{obj.name}'"
-    name = attribute_name(mesh)
-    if mesh.is_editmode and is_face_vector_field(mesh):
-        return FieldLayout(name, field_degree(mesh))  # only the evaluated mesh can be read
-    field = read_mesh_field(mesh, nonfinite=nonfinite, label=label, cache=cache)
-    if is_face_vector_field(mesh):
-        return FieldLayout(name, field.degree)
-    if not _can_modify(mesh):
-        raise RosyError(
-            f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}, and only fields "
-            "stored as vectors on faces can be read there: use Store Field first"
-        )
-    if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
-        temp_meshes.append(mesh)
-        return add_temp_field(mesh, field, TEMP_FIELD_ATTRIBUTE)
-    return FieldLayout(
-        TEMP_FIELD_ATTRIBUTE, field.degree, field.direction_ratios is not None, field.family_count
-    )
-
-
-def _can_modify(mesh: bpy.types.Mesh) -> bool:
-    """Whether attributes can be added to a mesh."""
-    return is_editable(mesh) and not mesh.is_editmode
-
-
-def rendered_instances(
-    depsgraph: bpy.types.Depsgraph,
-) -> Iterator[bpy.types.DepsgraphObjectInstance]:
-    """Yield the instances of meshes that are visible in renders, each valid until the next one."""
-    visible_objects = set(_visible_objects(depsgraph.view_layer))
-    for instance in depsgraph.object_instances:
-        if _is_rendered(instance, visible_objects):
-            yield instance
-
-
-def _is_rendered(
-    instance: bpy.types.DepsgraphObjectInstance, visible_objects: set[bpy.types.Object]
-) -> bool:
-    """Whether an instance is a mesh that is visible in renders."""
-    obj = instance.object
-    # The depsgraph lists the meshes of curves, texts, surfaces and metaballs as separate instances.
-    if obj.type != "MESH" or not instance.show_self or not obj.visible_camera:
-        return False
-    if obj.original.get(OWNED_TAG):  # a stroke object, made a mesh by Geometry Nodes
-        return False
-    if instance.is_instance:
-        instancer = instance.parent
-        return not obj.original.hide_render and (
-            instancer is None or instancer.original in visible_objects
-        )
-    return obj.original in visible_objects
-
-
-def is_field_enabled(obj: bpy.types.Object) -> bool:
-    """Whether drawing an object's field is switched on."""
-    return obj.rosy.include if has_rosy_properties() else True
-
-
-def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """Return the original objects visible in renders, including those in instanced collections."""
-    visible: dict[bpy.types.Object, None] = {}
-
-    def add_object(obj: bpy.types.Object) -> None:
-        """Add an object and the objects of the collection that it instances."""
-        if obj.hide_render or obj in visible:
-            return
-        visible[obj] = None
-        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None:
-            for child in obj.instance_collection.all_objects:
-                add_object(child)
-
-    def visit_layer(layer: bpy.types.LayerCollection) -> None:
-        """Add the objects of a layer collection and its children."""
-        if layer.exclude or layer.collection.hide_render:
-            return
-        for obj in layer.collection.objects:
-            add_object(obj)
-        for child in layer.children:
-            visit_layer(child)
-
-    visit_layer(view_layer.layer_collection)
-    return list(visible)
-
-
-def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bpy.types.Object:
-    """Return a candidate by name, or raise an error that says why there is none."""
-    if name in candidates:
-        return candidates[name]
-    obj = bpy.data.objects.get(name)
-    if obj is None:
-        raise RosyError(f"there is no object '{name}': {remedy_for_absence('check its name')}")
-    check_object_type(obj, "MESH")
-    if not has_field(obj):
-        field_name = attribute_name(obj.data)
-        raise RosyError(
-            f"object '{name}' has no attribute '{field_name}' with a field: make or import a field first"
-        )
-    raise RosyError(
-        f"object '{name}' is hidden in renders of this view layer, or its drawing is switched off: "
-        "show it, and switch it on"
-    )
+def _topology_hash(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> bytes:
+    """Return a hash of the faces and the field attribute of an evaluated mesh, without positions."""
+    values = None
+    if is_face_vector_field(mesh, attribute_name(original)):
+        values = read_attribute(mesh, attribute_name(original), np.float32, 3)
+    return content_hash(*polygon_arrays(mesh), values)

@@ -19,6 +19,7 @@ from .meshes import (
 )
 from .owned_data import OWNED_TAG, user_modifiers
 from .read_field import read_mesh_field
+from .read_request import ReadRequest
 from .scene_reader import read_scene
 
 #: Attributes of the points: the singularity index in units of 1 / N, and the degree N.
@@ -66,7 +67,7 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     rosy_addon.field.singularities.find_singularities : The same for a surface and a field.
     """
     if user_modifiers(obj) or obj.data.shape_keys:
-        scene_data = read_scene(depsgraph, [obj], nonfinite="zero")
+        scene_data = read_scene(depsgraph, [obj], ReadRequest("zero"))
         instance = scene_data.instances[0]
         surface, field = instance.surface, instance.field
     else:

@@ -11,15 +11,8 @@ import bpy
 
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
-#: Number of faces in a scene above which a panel does not read it at every redraw, but only after
-#: Blender has reported a change.
-MAX_UNWATCHED_FACES = 20_000
-
-#: Seconds for which a panel uses the state of such a scene although something has changed since, so
-#: that playback and sculpting stay fluent.
-STATE_TTL_SECONDS = 1.0
-
-#: The same as a multiple of the time that reading the state has taken.
+#: For how long a panel uses the state of a scene although something has changed since, so that
+#: playback and sculpting stay fluent: a multiple of the time that reading the state has taken.
 TTL_READINGS = 10.0
 
 #: Lists of `bpy.app.handlers` that are called when objects may have changed.
@@ -38,11 +31,10 @@ _OUTPUT_LABELS = {
 
 
 class SceneStateCache:
-    """The present states of scenes, for panels, which ask at every redraw.
+    """The present state of a scene, for panels, which ask at every redraw.
 
-    For a scene with many faces, handlers note which objects change, and only their meshes are read
-    again. The handlers exist from the first time that a panel shows such a scene with pictures until
-    it shows another one, a file is loaded, or `clear` is called.
+    Handlers note which objects change, and only their meshes are read again. They exist from the first
+    time that a panel shows a scene with pictures until a file is loaded or `clear` is called.
     """
 
     def __init__(self) -> None:
@@ -59,6 +51,7 @@ class SceneStateCache:
         if key != self._key or not self._is_watching():
             self.clear()
             self._key = key
+            self._watch()
         if self._scene_state is None or (
             self._is_outdated and time.monotonic() >= self._next_reading
         ):
@@ -66,9 +59,7 @@ class SceneStateCache:
             self._scene_state = SceneState(scene, depsgraph, self._mesh_states)
             self._is_outdated = False
             end = time.monotonic()
-            self._next_reading = end + max(STATE_TTL_SECONDS, TTL_READINGS * (end - start))
-            if self._scene_state.face_count > MAX_UNWATCHED_FACES and not self._is_watching():
-                self._watch()
+            self._next_reading = end + TTL_READINGS * (end - start)
         return self._scene_state
 
     def seconds_to_wait(self) -> float:

@@ -23,9 +23,9 @@ from .curves import new_curves
 from .grease_pencil import new_grease_pencil
 from .look_properties import read_settings
 from .owned_data import OWNED_TAG, rollback_on_error
-from .scene_reader import field_objects
 from .stroke_digest import stroke_digest
 from .surface_strokes import follow_surface, stop_following
+from .visible_objects import field_objects
 
 #: The function that creates the data of each kind of object.
 DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {

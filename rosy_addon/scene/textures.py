@@ -20,11 +20,12 @@ from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_re
 from .blender_images import new_image, new_tiled_image
 from .file_names import picture_stem
 from .hatching_nodes import hatching_group
+from .meshes import evaluated_mesh, read_uvs
 from .owned_data import delete_unused, rollback_on_error
 from .picture_nodes import new_group, set_picture_modifier
 from .picture_state import PictureState
 from .pictures import OutputSettings
-from .read_view import nonfinite_policy
+from .read_request import ReadRequest, nonfinite_policy
 from .scene_reader import read_scene
 from .texture_nodes import (
     Hatching,
@@ -85,15 +86,11 @@ def read_texture_input(
         If there is no field, no UV map or no such attribute, or a modifier loses one of them.
     """
     name = uv_map_name(obj)
-    scene_data = read_scene(
-        depsgraph,
-        [obj],
-        nonfinite_policy(scene),
-        cache,
-        uv_maps={obj: name},
-        color_attribute=color_attribute,
-    )
-    return TextureInput(scene_data.instances[0], scene_data.uvs[obj], TextureSource(obj, name))
+    request = ReadRequest(nonfinite_policy(scene), color_attribute=color_attribute)
+    instance = read_scene(depsgraph, [obj], request, cache).instances[0]
+    with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+        uv = read_uvs(mesh, name, f"object '{obj.name}'", "the texture")
+    return TextureInput(instance, uv, TextureSource(obj, name))
 
 
 def apply_texture(

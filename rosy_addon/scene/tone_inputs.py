@@ -15,12 +15,11 @@ from ..color import luminance, to_linear
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
-from ..field.surface import Surface
 from ..file_io import check_readable
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .compat import has_rosy_properties
-from .face_values import corner_scalars, filled_attribute, scalar_values
+from .face_values import corner_scalars, filled_attribute
 from .meshes import read_uvs
 
 
@@ -49,7 +48,6 @@ def make_tone_request(scene: bpy.types.Scene, look: Look) -> ToneRequest | None:
 def read_tone(
     mesh: bpy.types.Mesh,
     owner: bpy.types.Object,
-    surface: Surface,
     tone_request: ToneRequest | None,
     cache: Cache | None = None,
 ) -> SurfaceTone | None:
@@ -61,8 +59,6 @@ def read_tone(
         Evaluated.
     owner : bpy.types.Object
         The original object.
-    surface : Surface
-        The surface of the mesh.
     tone_request : ToneRequest or None
     cache : Cache, optional
         Keeps tones that have not changed since an earlier call.
@@ -80,47 +76,41 @@ def read_tone(
     """
     if tone_request is None:
         return None
-    label = f"object '{owner.name}'"
+    label, image = f"object '{owner.name}'", None
     if tone_request.kind == "attribute":
-        values, image = _corner_scalars(mesh, surface, tone_request.attribute, label), None
+        name = tone_request.attribute or mesh.color_attributes.active_color_name
+        attribute = filled_attribute(mesh, name)
+        if attribute is None:
+            return None
+        source = f"{label}, attribute '{attribute.name}'"
+        numbers = corner_scalars(attribute, mesh, source)
+        if not np.isfinite(numbers).all():
+            raise RosyError(f"{source}: has values that are not finite")
+        values = numbers[:, None].astype(np.float32)
     else:
-        image = owner.rosy.tone_image if has_rosy_properties() else None
-        values = (
-            None
-            if image is None
-            else read_uvs(mesh, owner.rosy.tone_uv_map, label, "the image of the tone")
-        )
-        image = None if image is None else image_luminance(image)
-    if values is None:
-        return None
+        tone_image = owner.rosy.tone_image if has_rosy_properties() else None
+        if tone_image is None:
+            return None
+        values = read_uvs(mesh, owner.rosy.tone_uv_map, label, "the image of the tone")
+        image = image_luminance(tone_image)
     if cache is None:
         return SurfaceTone(values, image)
     key = "tone", content_hash(values, image)
     return cache.get_or_create(key, lambda: SurfaceTone(values, image))
 
 
-def tone_source_digest(
+def tone_digest(
     mesh: bpy.types.Mesh, owner: bpy.types.Object, tone_request: ToneRequest | None
 ) -> bytes:
     """Return a digest of what `read_tone` reads; empty if the mesh has no tone.
 
     If the tone cannot be read, it is the digest of the error.
     """
-    if tone_request is None:
-        return b""
     try:
-        if tone_request.kind == "attribute":
-            attribute = _tone_attribute(mesh, tone_request.attribute)
-            if attribute is None:
-                return b""
-            return content_hash(attribute.domain, scalar_values(attribute, attribute.name))
-        image = owner.rosy.tone_image if has_rosy_properties() else None
-        if image is None:
-            return b""
-        uvs = read_uvs(mesh, owner.rosy.tone_uv_map, owner.name, "the image of the tone")
-        return content_hash(uvs, image_luminance(image))
+        tone = read_tone(mesh, owner, tone_request)
     except RosyError as error:
         return content_hash(str(error))
+    return b"" if tone is None else content_hash(tone.values, tone.image)
 
 
 def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
@@ -165,25 +155,6 @@ def check_tones(
     raise RosyError(
         f"{names}: there is no attribute '{tone_request.attribute}' for the tone, only {listing}"
     )
-
-
-def _corner_scalars(
-    mesh: bpy.types.Mesh, surface: Surface, name: str, label: str
-) -> np.ndarray | None:
-    """Return an attribute at the corners, (C, 1) float32; None if it is missing or unreadable."""
-    attribute = _tone_attribute(mesh, name)
-    if attribute is None:
-        return None
-    source = f"{label}, attribute '{attribute.name}'"
-    values = corner_scalars(attribute, surface, source)
-    if not np.isfinite(values).all():
-        raise RosyError(f"{source}: has values that are not finite")
-    return values[:, None].astype(np.float32)
-
-
-def _tone_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
-    """Return an attribute, by default the active color; None if it is missing or unreadable."""
-    return filled_attribute(mesh, name or mesh.color_attributes.active_color_name)
 
 
 def image_luminance(image: bpy.types.Image) -> np.ndarray:

@@ -11,8 +11,8 @@ from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field
 from ..scene.field_difference import other_field_names
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
-from ..scene.scene_reader import field_objects
 from ..scene.staleness import SCENE_STATES
+from ..scene.visible_objects import field_objects
 from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import bpy
 
 from ..compositor.look import Look
-from ..scene.color_inputs import color_attribute_of
-from ..scene.read_view import nonfinite_policy
-from ..scene.scene_cache import InstanceState, SceneCache
-from ..scene.tone_inputs import make_tone_request
+from ..scene.read_request import ReadRequest, read_request
+from ..scene.scene_reader import SceneInstance, SceneReader
+from ..scene.visible_objects import shown_instances
 
 #: Types of data-blocks whose changes may change a picture.
 RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
@@ -28,22 +27,24 @@ class LayerState:
 
     Attributes
     ----------
-    scene_cache : SceneCache
-    instances : list of InstanceState
+    reader : SceneReader
+    instances : list of SceneInstance
         As they were read last.
     stale : bool
         Whether they must be read again.
-    request_key : hashable
-        The options with which they were read: whether with occluders, and with which tones and
-        numbers.
+    request : ReadRequest or None
+        What was read.
+    has_occluders : bool
+        Whether they were read with all other meshes, since they may occlude.
     is_starting : bool
         Whether they were not read completely yet. They are read in slices of time until then.
     """
 
-    scene_cache: SceneCache = field(default_factory=SceneCache)
-    instances: list[InstanceState] = field(default_factory=list)
+    reader: SceneReader = field(default_factory=SceneReader)
+    instances: list[SceneInstance] = field(default_factory=list)
     stale: bool = True
-    request_key: Hashable = None
+    request: ReadRequest | None = None
+    has_occluders: bool = False
     is_starting: bool = True
 
 
@@ -83,22 +84,18 @@ class LayerStates:
             self._layers[key] = LayerState()
             return self._layers[key]
         layer = self._layers[key]
-        tone_request = make_tone_request(context.scene, look)
-        color_attribute = color_attribute_of(context.scene, look)
-        request_key = include_occluders, tone_request, color_attribute
-        if layer.stale or layer.request_key != request_key:
-            layer.instances = layer.scene_cache.read(
-                depsgraph,
-                nonfinite_policy(context.scene),
-                include_occluders=include_occluders,
-                tone_request=tone_request,
-                color_attribute=color_attribute,
+        request = read_request(context.scene, look)
+        if layer.stale or (layer.request, layer.has_occluders) != (request, include_occluders):
+            layer.instances = layer.reader.read(
+                shown_instances(depsgraph, include_occluders=include_occluders),
+                request,
                 deadline=time.monotonic() + SLICE_SECONDS if layer.is_starting else math.inf,
             )
-            layer.stale, layer.request_key = not layer.scene_cache.is_complete, request_key
-            if layer.scene_cache.has_unresolved:
+            layer.stale = not layer.reader.is_complete
+            layer.request, layer.has_occluders = request, include_occluders
+            if layer.reader.has_unresolved:
                 self._schedule_resolving()
-            elif layer.scene_cache.is_complete:
+            elif layer.reader.is_complete:
                 layer.is_starting = False
         return layer
 
@@ -115,7 +112,7 @@ class LayerStates:
         """Drop everything that was read."""
         self._layers = {
             # What is cached by its contents is still right.
-            key: LayerState(SceneCache(layer.scene_cache.cache), is_starting=layer.is_starting)
+            key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)
             for key, layer in self._layers.items()
         }
 
@@ -140,18 +137,20 @@ class LayerStates:
             is_relevant = True
             if datablock.id_type == "IMAGE":
                 changed_names |= {
-                    obj.name for obj in bpy.data.objects if obj.rosy.tone_image == datablock
+                    obj.name_full for obj in bpy.data.objects if obj.rosy.tone_image == datablock
                 }
             if not update.is_updated_geometry:
                 continue
             if datablock.id_type == "MESH":
-                remeshed_names |= {obj.name for obj in bpy.data.objects if obj.data == datablock}
+                remeshed_names |= {
+                    obj.name_full for obj in bpy.data.objects if obj.data == datablock
+                }
             elif datablock.id_type == "OBJECT":
-                changed_names.add(datablock.name)
+                changed_names.add(datablock.name_full)
         for (scene_name, _), layer in self._layers.items():
             if scene_name == scene.name and (is_relevant or depsgraph is None):
-                layer.scene_cache.invalidate(changed_names, topology_changed=False)
-                layer.scene_cache.invalidate(remeshed_names)
+                layer.reader.invalidate(changed_names, topology_changed=False)
+                layer.reader.invalidate(remeshed_names)
                 layer.stale = True
 
     def resolve_topologies(self) -> bool:
@@ -168,15 +167,13 @@ class LayerStates:
         try:
             for window in bpy.context.window_manager.windows:
                 layer = self.get(window.scene, window.view_layer)
-                if layer is None or not layer.scene_cache.has_unresolved:
+                if layer is None or not layer.reader.has_unresolved:
                     continue
                 with bpy.context.temp_override(window=window):
                     depsgraph = bpy.context.evaluated_depsgraph_get()
-                    layer.scene_cache.resolve_topologies(
-                        depsgraph, nonfinite_policy(window.scene), deadline
-                    )
+                    layer.reader.resolve_topologies(depsgraph, deadline)
                 layer.stale = True
-                if layer.scene_cache.has_unresolved:
+                if layer.reader.has_unresolved:
                     return False
             return True
         finally:

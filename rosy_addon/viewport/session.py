@@ -20,11 +20,10 @@ from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.arrowheads import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
-from ..scene.color_inputs import check_colored, color_attribute_of
 from ..scene.lights import read_lights
 from ..scene.look_properties import look_at_frame, read_look
-from ..scene.scene_cache import InstanceState
-from ..scene.tone_inputs import check_tones, make_tone_request
+from ..scene.read_request import read_request
+from ..scene.scene_reader import SceneInstance, check_sources
 from ..worker.helper import Helper
 from .arrowheads import draw_arrowheads
 from .background import view_background
@@ -353,7 +352,7 @@ class ViewportSession:
         context: bpy.types.Context,
         space: bpy.types.SpaceView3D,
         region: bpy.types.Region,
-        instances: list[InstanceState],
+        instances: list[SceneInstance],
         view_input: ViewInput,
         look: Look,
     ) -> None:
@@ -405,7 +404,7 @@ class ViewportSession:
         space: bpy.types.SpaceView3D,
         region: bpy.types.Region,
         look: Look,
-    ) -> tuple[list[InstanceState], ViewInput | None]:
+    ) -> tuple[list[SceneInstance], ViewInput | None]:
         """Read what a view shows; no input if there is nothing to draw yet.
 
         Raises
@@ -432,17 +431,12 @@ class ViewportSession:
         ]
         with_field = [entry for entry in visible if entry.instance.field is not None]
         if not with_field:
-            if layer.scene_cache.errors or layer.scene_cache.has_unresolved:
+            if layer.reader.errors or layer.reader.has_unresolved:
                 return visible, None
             raise RosyError(
                 "no object with a field is visible here: make a field, or show its object"
             )
-        tone_request = make_tone_request(context.scene, look)
-        check_tones(tone_request, [(entry.instance.tone, entry.owner) for entry in with_field])
-        check_colored(
-            color_attribute_of(context.scene, look),
-            [(entry.instance.color_values, entry.owner) for entry in with_field],
-        )
+        check_sources(with_field, read_request(context.scene, look))
         reference = self._references.current(context.scene, depsgraph, look)
         if look.tone == "picture" and reference is None:
             return visible, None  # not loaded yet
@@ -488,7 +482,7 @@ class ViewportSession:
             lines.append(f"{view.progress.label} ...")
         if pointers in self._problems:
             lines.append(self._problems[pointers])
-        errors = list(layer.scene_cache.errors.values()) if layer else []
+        errors = [error_text(error) for error in layer.reader.errors.values()] if layer else []
         lines += errors[:MAX_OBJECT_ERRORS]
         if len(errors) > MAX_OBJECT_ERRORS:
             lines.append(
@@ -508,12 +502,12 @@ class ViewportSession:
         )
 
 
-def _picture_key(instances: list[InstanceState], view_input: ViewInput) -> Hashable:
+def _picture_key(instances: list[SceneInstance], view_input: ViewInput) -> Hashable:
     """Return a key that changes whenever the picture of a view would change."""
     camera = view_input.camera
     planes = view_input.clip_planes
     return (
-        tuple(entry.version for entry in instances),
+        tuple(entry.instance for entry in instances),
         camera.view.tobytes(),
         camera.projection.tobytes(),
         (camera.width, camera.height),

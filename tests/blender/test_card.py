@@ -132,7 +132,7 @@ def test_parity_of_a_scene(rosy, card, scene, suzanne, kind):
     for obj in (mirrored, occluder):
         scene.collection.objects.link(obj)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    instances = module_of(PACKAGE, "scene.scene_reader").read_instances(depsgraph)
+    instances = module_of(PACKAGE, "scene.scene_reader").read_scene(depsgraph).instances
     assert [instance.field is None for instance in instances] == [False, False, True]
     view = module_of(PACKAGE, "scene.cameras").camera_of_object(scene, depsgraph, camera, 512, 512)
     look = rosy.Look(shading=0.0)

@@ -133,12 +133,8 @@ def bake_of_view(space=None, region=None, method="brute"):
     scene = bpy.context.scene
     look = replace(rosy("rosy_addon.scene.look_properties").read_look(scene.rosy), method=method)
     depsgraph, tones = bpy.context.evaluated_depsgraph_get(), rosy("rosy_addon.scene.tone_inputs")
-    tone_request = tones.make_tone_request(scene, look)
-    instances = (
-        rosy("rosy_addon.scene.scene_reader")
-        .read_scene(depsgraph, tone_request=tone_request)
-        .instances
-    )
+    request = rosy("rosy_addon.scene.read_request").read_request(scene, look)
+    instances = rosy("rosy_addon.scene.scene_reader").read_scene(depsgraph, None, request).instances
     lights = rosy("rosy_addon.scene.lights").read_lights(depsgraph, camera.view)
     reference = tones.load_reference(scene, depsgraph, scene.camera, look)
     gbuffer = rosy("rosy_addon.projection.project").project(instances, camera, look.display)

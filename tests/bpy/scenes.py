@@ -7,6 +7,9 @@ import numpy as np
 from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
 from rosy.rosy_addon.scene.meshes import mesh_surface
+from rosy.rosy_addon.scene.read_request import FIELDS_ONLY
+from rosy.rosy_addon.scene.scene_reader import read_scene
+from rosy.rosy_addon.scene.visible_objects import shown_instances
 from rosy.rosy_addon.scene.write_field import write_mesh_field
 from rosy.rosy_addon.worker.job import Call
 
@@ -158,3 +161,15 @@ def contents():
             scene.render.engine,
         ]
     return result
+
+
+def read_instances(depsgraph):
+    """Read the mesh instances of a scene, as bakes do."""
+    return read_scene(depsgraph).instances
+
+
+def read_live(reader, request=FIELDS_ONLY, **options):
+    """Read the objects with a field as the live view does, in one step."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    instances = shown_instances(depsgraph, include_occluders=False)
+    return reader.read(instances, request, **options)

@@ -11,7 +11,6 @@ from rosy.rosy_addon.color import to_display
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene import pictures as pictures_room
-from rosy.rosy_addon.scene import staleness
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.look_properties import apply_look, read_look
@@ -288,8 +287,7 @@ def delete_camera(scene, camera, monkey):
         delete_camera,
     ],
 )
-def test_stale_reasons(scene, camera, monkey, change, monkeypatch):
-    monkeypatch.setattr(staleness, "STATE_TTL_SECONDS", 0.0)
+def test_stale_reasons(scene, camera, monkey, change):
     bake(scene)
     assert list_bakes(scene)[0].stale_reason == ""
     reason = change(scene, camera, monkey)

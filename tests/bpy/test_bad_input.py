@@ -20,7 +20,7 @@ from rosy.rosy_addon.scene.guides import (
 )
 from rosy.rosy_addon.scene.meshes import marked_edges, mesh_surface
 from rosy.rosy_addon.scene.read_field import read_mesh_field
-from rosy.rosy_addon.scene.scene_reader import field_objects
+from rosy.rosy_addon.scene.visible_objects import field_objects
 from rosy.rosy_addon.scene.write_field import assign_fields, write_mesh_field
 from scenes import (
     add_camera,

@@ -15,11 +15,11 @@ from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.color_inputs import color_attribute_of
 from rosy.rosy_addon.scene.look_properties import read_look
+from rosy.rosy_addon.scene.read_request import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
-from rosy.rosy_addon.scene.scene_cache import SceneCache
-from rosy.rosy_addon.scene.scene_reader import read_scene
+from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
 from rosy.rosy_addon.ui.look_panels import _draw_color_source
-from scenes import add_field, add_plane, pixels
+from scenes import add_field, add_plane, pixels, read_live
 
 
 def depsgraph():
@@ -39,7 +39,7 @@ def wall(scene, camera):
 
 
 def values_of(name, obj):
-    scene_data = read_scene(depsgraph(), color_attribute=name)
+    scene_data = read_scene(depsgraph(), None, ReadRequest(color_attribute=name))
     return scene_data.instances[scene_data.objects.index(obj)].color_values
 
 
@@ -64,11 +64,11 @@ def test_mistakes_are_one_line_that_lists_the_attributes(wall):
     set_values(wall.data, np.zeros(4), "FACE", name="Error")
     only = "'Error'$"
     with pytest.raises(RosyError, match=f"^'Plane': there is no attribute 'Angel' .*only {only}"):
-        read_scene(depsgraph(), color_attribute="Angel")
+        read_scene(depsgraph(), None, ReadRequest(color_attribute="Angel"))
     with pytest.raises(RosyError, match=f"^'Plane': choose an attribute for the colors.*: {only}"):
-        read_scene(depsgraph(), color_attribute="")
+        read_scene(depsgraph(), None, ReadRequest(color_attribute=""))
     with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected a number"):
-        read_scene(depsgraph(), color_attribute="rosy")
+        read_scene(depsgraph(), None, ReadRequest(color_attribute="rosy"))
 
 
 def test_looks_that_color_an_attribute(scene):
@@ -118,14 +118,14 @@ def test_when_the_panel_shows_the_attribute(scene, wall, hue, magnitude, shown, 
 
 def test_a_live_view_reads_numbers_again_when_they_change(wall):
     set_values(wall.data, np.zeros(9))
-    scene_cache = SceneCache()
-    first, second = (scene_cache.read(depsgraph(), color_attribute="Angle")[0] for _ in range(2))
-    assert second.version == first.version and not first.instance.color_values.any()
+    reader, request = SceneReader(), ReadRequest(color_attribute="Angle")
+    first, second = (read_live(reader, request)[0] for _ in range(2))
+    assert second.instance is first.instance and not first.instance.color_values.any()
     set_values(wall.data, np.ones(9))
-    scene_cache.invalidate({"Plane"})
-    (changed,) = scene_cache.read(depsgraph(), color_attribute="Angle")
-    assert changed.version != first.version and changed.instance.color_values.all()
-    (without,) = scene_cache.read(depsgraph())
+    reader.invalidate({"Plane"})
+    (changed,) = read_live(reader, request)
+    assert changed.instance is not first.instance and changed.instance.color_values.all()
+    (without,) = read_live(reader)
     assert without.instance.color_values is None
 
 

@@ -17,8 +17,7 @@ from rosy.rosy_addon.scene.font_shapes import FontShapes
 from rosy.rosy_addon.scene.keys import round_length, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
-from rosy.rosy_addon.scene.scene_reader import read_instances
-from scenes import add_camera, aim, contents, pixels, render
+from scenes import add_camera, aim, contents, pixels, read_instances, render
 
 LOOK = Look(magnitude="colour", singularity_dots="visible", supersampling=2)
 

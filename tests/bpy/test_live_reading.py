@@ -6,24 +6,37 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.scene import scene_cache as scene_cache_module
-from rosy.rosy_addon.scene.scene_cache import SceneCache
-from rosy.rosy_addon.scene.scene_reader import read_instances
-from scenes import add_field, add_mesh, add_plane, contents, link, member_vectors, set_vectors
+from rosy.rosy_addon.scene import scene_reader
+from rosy.rosy_addon.scene.scene_reader import SceneReader
+from scenes import (
+    add_field,
+    add_mesh,
+    add_plane,
+    contents,
+    link,
+    member_vectors,
+    read_instances,
+    read_live,
+    set_vectors,
+)
 
 
 def depsgraph():
     return bpy.context.evaluated_depsgraph_get()
 
 
-def read(scene_cache):
+def read(reader):
     """Read as the live view does until it rests, and return the names of the drawn objects."""
-    states = scene_cache.read(depsgraph())
-    if scene_cache.has_unresolved:
-        scene_cache.resolve_topologies(depsgraph())
-        states = scene_cache.read(depsgraph())
-    assert not scene_cache.has_unresolved, "the scene would be read for ever"
-    return [state.owner.name for state in states if state.instance.field is not None]
+    entries = read_live(reader)
+    if reader.has_unresolved:
+        reader.resolve_topologies(depsgraph())
+        entries = read_live(reader)
+    assert not reader.has_unresolved, "the scene would be read for ever"
+    return names_with_field(entries)
+
+
+def names_with_field(entries):
+    return [entry.owner.name for entry in entries if entry.instance.field is not None]
 
 
 def add_nodes(obj, *node_types):
@@ -101,29 +114,29 @@ def test_a_field_lost_in_modifiers_is_named_once(monkey, loss, monkeypatch):
     """The error is known after one attempt, stays, and is gone with the modifier."""
     lose, words = LOSSES[loss]
     lose(monkey)
-    before, scene_cache = contents(), SceneCache()
-    assert read(scene_cache) == []
-    message = scene_cache.errors["Suzanne"]
+    before, reader = contents(), SceneReader()
+    assert read(reader) == []
+    message = str(reader.errors["Suzanne"])
     assert all(word in message for word in ("'Suzanne'", *words)), message
     assert contents() == before
-    monkeypatch.setattr(scene_cache_module, "temp_attributes", None)  # a second attempt would fail
-    assert read(scene_cache) == [] and scene_cache.errors["Suzanne"] == message
+    monkeypatch.setattr(scene_reader, "temp_attributes", None)  # a second attempt would fail
+    assert read(reader) == [] and str(reader.errors["Suzanne"]) == message
     monkey.modifiers.clear()
-    scene_cache.invalidate({"Suzanne"}, topology_changed=False)
-    assert read(scene_cache) == ["Suzanne"] and not scene_cache.errors
+    reader.invalidate({"Suzanne"}, topology_changed=False)
+    assert read(reader) == ["Suzanne"] and not reader.errors
 
 
 def test_an_attribute_that_is_kept_again(monkey):
     """The modifiers keep the faces, but no longer lose the attribute."""
     monkey.modifiers.new("Subdivision", "SUBSURF")
     removed_attribute(monkey)
-    scene_cache = SceneCache()
-    assert read(scene_cache) == []
+    reader = SceneReader()
+    assert read(reader) == []
     bpy.data.node_groups["Chain"].nodes["Remove Named Attribute"].inputs[
         "Name"
     ].default_value = "other"
-    scene_cache.invalidate({"Suzanne"}, topology_changed=False)
-    assert read(scene_cache) == ["Suzanne"]
+    reader.invalidate({"Suzanne"}, topology_changed=False)
+    assert read(reader) == ["Suzanne"]
 
 
 def test_a_field_that_nodes_change_is_that_of_a_bake(monkey):
@@ -144,12 +157,12 @@ def test_a_field_that_nodes_change_is_that_of_a_bake(monkey):
     group.links.new(normal.outputs[0], cross.inputs[1])
     value = next(socket for socket in store.inputs if socket.name == "Value" and socket.enabled)
     group.links.new(cross.outputs[0], value)
-    scene_cache = SceneCache()
-    assert read(scene_cache) == ["Suzanne"]
-    (state,) = scene_cache.read(depsgraph())
+    reader = SceneReader()
+    assert read(reader) == ["Suzanne"]
+    (entry,) = read_live(reader)
     (instance,) = read_instances(depsgraph())
-    np.testing.assert_array_equal(state.instance.field.vectors, instance.field.vectors)
-    turned = np.abs((state.instance.field.vectors * member_vectors(monkey.data)).sum(axis=1))
+    np.testing.assert_array_equal(entry.instance.field.vectors, instance.field.vectors)
+    turned = np.abs((entry.instance.field.vectors * member_vectors(monkey.data)).sum(axis=1))
     assert np.median(turned) < 0.05
 
 
@@ -166,15 +179,15 @@ def test_instances_with_other_faces_than_their_owner(monkey):
     links.new(source, join.inputs[0])
     links.new(to_instance.outputs[0], join.inputs[0])
     links.new(join.outputs[0], nodes["Group Output"].inputs[0])
-    scene_cache = SceneCache()
-    assert read(scene_cache) == ["Suzanne", "Suzanne"] and not scene_cache.errors
-    counts = [len(state.instance.surface.face_start) - 1 for state in scene_cache.read(depsgraph())]
+    reader = SceneReader()
+    assert read(reader) == ["Suzanne", "Suzanne"] and not reader.errors
+    counts = [len(entry.instance.surface.face_start) - 1 for entry in read_live(reader)]
     assert sorted(counts) == [len(monkey.data.polygons), len(monkey.data.loops)]
 
 
 def test_reading_in_slices_ends(scene):
     """With a deadline that has passed, each call does one step, also if it cannot be drawn."""
-    scene_cache, calls = SceneCache(), 0
+    reader, calls = SceneReader(), 0
     for index in range(6):
         plane = add_plane(f"Plane {index}")
         add_field(plane, kind="axis")
@@ -182,14 +195,14 @@ def test_reading_in_slices_ends(scene):
             new_geometry(plane)
         elif index % 3 == 1:
             edges_only(plane)
-    states = scene_cache.read(depsgraph(), deadline=0.0)
-    while not scene_cache.is_complete or scene_cache.has_unresolved:
+    entries = read_live(reader, deadline=0.0)
+    while not reader.is_complete or reader.has_unresolved:
         calls += 1
         assert calls < 200
-        scene_cache.resolve_topologies(depsgraph(), deadline=0.0)
-        states = scene_cache.read(depsgraph(), deadline=0.0)
-    assert [state.owner.name for state in states] == ["Plane 2", "Plane 5"]
-    assert sorted(scene_cache.errors) == [f"Plane {index}" for index in (0, 1, 3, 4)]
+        reader.resolve_topologies(depsgraph(), deadline=0.0)
+        entries = read_live(reader, deadline=0.0)
+    assert names_with_field(entries) == ["Plane 2", "Plane 5"]
+    assert sorted(reader.errors) == [f"Plane {index}" for index in (0, 1, 3, 4)]
 
 
 def test_an_object_that_is_deleted_between_two_steps(monkey):
@@ -199,43 +212,43 @@ def test_an_object_that_is_deleted_between_two_steps(monkey):
         obj = monkey.copy()
         obj.name, obj.data = "Copy", monkey.data.copy()
         link(obj)
-        scene_cache = SceneCache()
+        reader = SceneReader()
         for step in range(10):
             if step == steps:
                 bpy.data.objects.remove(bpy.data.objects["Copy"])
-                scene_cache.invalidate({"Copy"})
-            if scene_cache.has_unresolved:
-                scene_cache.resolve_topologies(depsgraph(), deadline=0.0)
-            states = scene_cache.read(depsgraph(), deadline=0.0)
-        names = sorted(state.owner.name for state in states)
-        assert names == ["Plane", "Suzanne"] and not scene_cache.errors, steps
+                reader.invalidate({"Copy"})
+            if reader.has_unresolved:
+                reader.resolve_topologies(depsgraph(), deadline=0.0)
+            entries = read_live(reader, deadline=0.0)
+        names = sorted(names_with_field(entries))
+        assert names == ["Plane", "Suzanne"] and not reader.errors, steps
 
 
 def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatch):
     monkey.modifiers.new("Subdivision", "SUBSURF")
     salt = iter(range(100))
-    monkeypatch.setattr(scene_cache_module, "_topology_hash", lambda *_: bytes([next(salt)]))
-    scene_cache = SceneCache()
+    monkeypatch.setattr(scene_reader, "_topology_hash", lambda *_: bytes([next(salt)]))
+    reader = SceneReader()
     for _ in range(8):
-        scene_cache.read(depsgraph())
-        if not scene_cache.has_unresolved:
+        read_live(reader)
+        if not reader.has_unresolved:
             break
-        scene_cache.resolve_topologies(depsgraph())
-    assert "at each evaluation" in scene_cache.errors["Suzanne"]
+        reader.resolve_topologies(depsgraph())
+    assert "at each evaluation" in str(reader.errors["Suzanne"])
 
 
 def test_other_objects_are_drawn(monkey):
     plane = add_field(add_plane(), kind="axis")
     remesh(monkey)
-    scene_cache = SceneCache()
-    assert read(scene_cache) == [plane.name] and list(scene_cache.errors) == ["Suzanne"]
+    reader = SceneReader()
+    assert read(reader) == [plane.name] and list(reader.errors) == ["Suzanne"]
 
 
 def test_a_mesh_without_faces_is_named(scene):
     bare = add_mesh("Bare", [(0, 0, 0), (1, 0, 0)], [])
     bare.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
-    scene_cache = SceneCache()
-    assert read(scene_cache) == [] and "no faces" in scene_cache.errors["Bare"]
+    reader = SceneReader()
+    assert read(reader) == [] and "no faces" in str(reader.errors["Bare"])
 
 
 @pytest.mark.parametrize("mesh_kind", ["bare", "remesh"])
@@ -247,9 +260,9 @@ def test_too_little_memory_is_a_message(monkey, monkeypatch, mesh_kind):
         raise MemoryError
 
     for reader in ("read_mesh_field", "read_evaluated_field"):
-        monkeypatch.setattr(scene_cache_module, reader, fail)
-    scene_cache = SceneCache()
-    assert read(scene_cache) == [] and "not enough memory" in scene_cache.errors["Suzanne"]
+        monkeypatch.setattr(scene_reader, reader, fail)
+    reader = SceneReader()
+    assert read(reader) == [] and isinstance(reader.errors["Suzanne"], MemoryError)
 
 
 def test_edit_mode_names_a_field_that_cannot_be_read(scene):
@@ -257,10 +270,10 @@ def test_edit_mode_names_a_field_that_cannot_be_read(scene):
     set_vectors(plane.data, np.tile([1.0, 0.0, 0.0], (9, 1)), domain="POINT")
     bpy.context.view_layer.objects.active = plane
     bpy.ops.object.mode_set(mode="EDIT")
-    scene_cache = SceneCache()
+    reader = SceneReader()
     try:
-        assert read(scene_cache) == [] and "leave edit mode" in scene_cache.errors["Plane"]
+        assert read(reader) == [] and "leave edit mode" in str(reader.errors["Plane"])
     finally:
         bpy.ops.object.mode_set(mode="OBJECT")
-    scene_cache.invalidate({"Plane"})
-    assert read(scene_cache) == ["Plane"] and not scene_cache.errors
+    reader.invalidate({"Plane"})
+    assert read(reader) == ["Plane"] and not reader.errors

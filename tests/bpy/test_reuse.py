@@ -162,12 +162,12 @@ def test_a_change_adds_only_results_of_its_object(scene, camera, monkey, run_sta
     entries = len(BAKE_CACHE)
     plane.location.z -= 0.5
     bake(scene)
-    # Its instance, a G-buffer, a pixel field, noise, and LIC images.
-    assert len(BAKE_CACHE) == entries + 5
+    # A G-buffer, a pixel field, noise, and LIC images.
+    assert len(BAKE_CACHE) == entries + 4
     set_vectors(plane.data, np.zeros((len(plane.data.polygons), 3)) + (1, 0, 0.5))
     bake(scene)
-    # Its original and its evaluated field, its instance, its corner field, and those four.
-    assert len(BAKE_CACHE) == entries + 13
+    # Its field, its corner field, and those four.
+    assert len(BAKE_CACHE) == entries + 10
 
 
 def test_the_least_recently_used_entries_are_evicted():

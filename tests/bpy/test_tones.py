@@ -14,15 +14,15 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.errors import RosyError
 from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.pictures import read_output_settings
-from rosy.rosy_addon.scene.scene_cache import SceneCache
-from rosy.rosy_addon.scene.scene_reader import read_scene
+from rosy.rosy_addon.scene.read_request import ReadRequest
+from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
 from rosy.rosy_addon.scene.tone_inputs import (
     ToneRequest,
     image_luminance,
     load_reference,
     make_tone_request,
 )
-from scenes import add_field, add_mesh, add_plane, link, pixels
+from scenes import add_field, add_mesh, add_plane, link, pixels, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -66,7 +66,7 @@ def wall(scene, camera):
 
 
 def tone_of(tone_request, name="Plane"):
-    scene_data = read_scene(depsgraph(), tone_request=tone_request)
+    scene_data = read_scene(depsgraph(), None, ReadRequest(tone=tone_request))
     return scene_data.instances[[owner.name for owner in scene_data.objects].index(name)].tone
 
 
@@ -125,7 +125,7 @@ def test_objects_without_the_attribute_have_no_tone(wall, monkey):
 def test_missing_attributes(wall, monkey):
     add_attribute(wall.data, "Paint", "POINT", "FLOAT", np.zeros(9))
     with pytest.raises(RosyError) as caught:
-        read_scene(depsgraph(), tone_request=ToneRequest("attribute", "Pain"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Pain")))
     message = str(caught.value)
     assert (
         "'Pain'" in message
@@ -134,15 +134,15 @@ def test_missing_attributes(wall, monkey):
         and "'Suzanne'" in message
     )
     with pytest.raises(RosyError, match="no color attribute"):
-        read_scene(depsgraph(), tone_request=ToneRequest("attribute"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute")))
 
 
 def test_unsuitable_attributes(wall):
     with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected"):
-        read_scene(depsgraph(), tone_request=ToneRequest("attribute", "rosy"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "rosy")))
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.full(9, np.nan))
     with pytest.raises(RosyError, match="attribute 'Ink': has values that are not finite"):
-        read_scene(depsgraph(), tone_request=ToneRequest("attribute", "Ink"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("attribute", "Ink")))
 
 
 # --- images ---------------------------------------------------------------------------------------
@@ -193,16 +193,16 @@ def test_images_on_uv_maps_are_drawn(scene, wall):
 
 def test_missing_images_and_uv_maps(wall):
     with pytest.raises(RosyError, match="'Plane': choose an image for the tone"):
-        read_scene(depsgraph(), tone_request=ToneRequest("image"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     wall.rosy.tone_image = add_image()
     bpy.context.view_layer.update()
     with pytest.raises(RosyError, match="object 'Plane': its mesh has no UV map"):
-        read_scene(depsgraph(), tone_request=ToneRequest("image"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     add_uv(wall.data)
     assert tone_of(ToneRequest("image")).image.shape == (2, 2)
     wall.rosy.tone_uv_map = "Other"
     with pytest.raises(RosyError, match="no UV map 'Other'"):
-        read_scene(depsgraph(), tone_request=ToneRequest("image"))
+        read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
 
 
 # --- pictures -------------------------------------------------------------------------------------
@@ -291,16 +291,16 @@ def test_tone_requests_of_looks(scene):
 
 def test_a_live_view_reads_tones_again_when_they_change(wall):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
-    tone_request, scene_cache = ToneRequest("attribute", "Ink"), SceneCache()
-    (first,) = scene_cache.read(depsgraph(), tone_request=tone_request)
-    (second,) = scene_cache.read(depsgraph(), tone_request=tone_request)
-    assert second.version == first.version and not first.instance.tone.values.any()
+    reader, request = SceneReader(), ReadRequest(tone=ToneRequest("attribute", "Ink"))
+    (first,) = read_live(reader, request)
+    (second,) = read_live(reader, request)
+    assert second.instance is first.instance and not first.instance.tone.values.any()
     wall.data.attributes["Ink"].data.foreach_set("value", np.ones(9, dtype=np.float32))
     wall.data.update()
-    scene_cache.invalidate({"Plane"})
-    (changed,) = scene_cache.read(depsgraph(), tone_request=tone_request)
-    assert changed.version != first.version and changed.instance.tone.values.all()
-    (without_tone,) = scene_cache.read(depsgraph())
+    reader.invalidate({"Plane"})
+    (changed,) = read_live(reader, request)
+    assert changed.instance is not first.instance and changed.instance.tone.values.all()
+    (without_tone,) = read_live(reader)
     assert without_tone.instance.tone is None
 
 

@@ -509,9 +509,7 @@ def bake_word(scene):
 
 @pytest.fixture
 def watched(monkeypatch):
-    """All scenes count as large, so that only handlers note their changes."""
-    monkeypatch.setattr(staleness, "MAX_UNWATCHED_FACES", 0)
-    monkeypatch.setattr(staleness, "STATE_TTL_SECONDS", 0.0)
+    """Scenes are read again as soon as handlers have noted a change."""
     monkeypatch.setattr(staleness, "TTL_READINGS", 0.0)
     yield
     staleness.SCENE_STATES.clear()
@@ -644,7 +642,7 @@ def test_records_of_other_versions(tmp_path, state):
     assert bake_word(scene) == ""
 
 
-def test_a_3d_view(tmp_path):
+def test_a_3d_view(tmp_path, watched):
     scene = build(tmp_path)
     view = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 30, 20, name=VIEW_NAME)
     bake(scene, cameras=[view])
@@ -657,7 +655,7 @@ def test_a_3d_view(tmp_path):
     assert bake_word(scene) == "'In Front' was moved"
 
 
-def test_a_large_scene_is_read_again_only_after_changes(tmp_path, watched, monkeypatch):
+def test_a_scene_is_read_again_only_after_changes(tmp_path, watched, monkeypatch):
     scene = build(tmp_path)
     bake(scene)
     reads = []
@@ -671,7 +669,7 @@ def test_a_large_scene_is_read_again_only_after_changes(tmp_path, watched, monke
         list_bakes(scene, for_panel=True)
     assert len(reads) == 1
     handlers = len(bpy.app.handlers.depsgraph_update_post)
-    monkeypatch.setattr(staleness, "STATE_TTL_SECONDS", 60.0)
+    monkeypatch.setattr(staleness, "TTL_READINGS", 1e6)
     for position in (2.0, 3.0):
         obj("Plain").location.x = position
         bpy.context.view_layer.update()

@@ -1,0 +1,113 @@
+"""Digests of evaluated meshes and their fields, by which pictures know that they are out of date.
+
+A digest is much faster than reading a surface, and needs no temporary attributes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..cache import content_hash
+from ..field.rosy_field import MAX_DEGREE
+from .color_inputs import color_values_digest
+from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
+from .meshes import read_attribute, shape_digest, vertex_positions
+from .owned_data import user_modifiers
+from .read_request import ReadRequest
+from .tone_inputs import tone_digest
+
+
+@dataclass(frozen=True, eq=False)
+class MeshState:
+    """A digest of an evaluated mesh, with its field if that is drawn, and its bounding box.
+
+    Attributes
+    ----------
+    digest : str
+    bounds : (2, 3) float32 ndarray
+        Object space.
+    lacks_tone : bool
+        Whether the mesh does not have the tone that the look asks for. It is lit instead.
+    """
+
+    digest: str
+    bounds: np.ndarray
+    lacks_tone: bool = False
+
+
+#: What has been read of meshes, by `mesh_state_key`. None: the mesh has no faces.
+MeshStates = dict[tuple, MeshState | None]
+
+
+def mesh_state_key(
+    obj: bpy.types.Object, owner: bpy.types.Object, request: ReadRequest | None
+) -> tuple:
+    """Return the key in `MeshStates` of an evaluated object; the first part is that of its owner.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        Evaluated.
+    owner : bpy.types.Object
+        The original object.
+    request : ReadRequest or None
+        None: the object only occludes.
+    """
+    return owner.session_uid, obj.data.as_pointer(), request
+
+
+def read_mesh_state(
+    mesh: bpy.types.Mesh | None, owner: bpy.types.Object, request: ReadRequest | None
+) -> MeshState | None:
+    """Return the state of an evaluated mesh; None if it has no faces.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh or None
+        Of `evaluated_mesh`.
+    owner, request
+        See `mesh_state_key`.
+    """
+    if mesh is None:
+        return None
+    positions = vertex_positions(mesh)
+    bounds = np.stack([positions.min(axis=0), positions.max(axis=0)])
+    if request is None:
+        return MeshState(digest(shape_digest(mesh, occluder_only=True)), bounds)
+    original = owner.data
+    digest_of_tone = tone_digest(mesh, owner, request.tone)
+    parts = [shape_digest(mesh), *field_parts(mesh, original), digest_of_tone]
+    parts.append(color_values_digest(mesh, request.color_attribute))
+    if user_modifiers(owner) or original.shape_keys:
+        # The rest shape and its normals, from which the field is transported.
+        parts += [shape_digest(original), *field_parts(original, original)]
+    if any(isinstance(part, np.ndarray) and not np.isfinite(part).all() for part in parts):
+        parts.append(request.nonfinite)
+    lacks_tone = request.tone is not None and not digest_of_tone
+    return MeshState(digest(*parts), bounds, lacks_tone)
+
+
+def field_parts(mesh: bpy.types.Mesh, original: bpy.types.Mesh) -> list:
+    """Return the domains and values of the attributes that hold a field, and its degree."""
+    name = attribute_name(original)
+    if name in original.attributes:
+        names, parts = [name], [field_degree(original)]
+    else:
+        names = [f"dir{index}" for index in range(MAX_DEGREE) if f"dir{index}" in mesh.attributes]
+        parts = []
+    for name in names:
+        attribute = mesh.attributes.get(name)
+        if attribute is None or attribute.data_type not in (VECTOR_TYPE, ANGLE_TYPE):
+            parts.append(None)
+            continue
+        is_vector = attribute.data_type == VECTOR_TYPE
+        parts += [attribute.domain, read_attribute(mesh, name, np.float32, 3 if is_vector else 1)]
+    return parts
+
+
+def digest(*parts: object) -> str:
+    """Return a digest as text. It is short, as it is stored in .blend files."""
+    return content_hash(*parts).hex()[:16]

@@ -1,0 +1,138 @@
+"""Which objects of a view layer are visible in renders, and which of them have a field."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+
+import bpy
+
+from ..errors import RosyError
+from .compat import has_rosy_properties
+from .field_attributes import attribute_name, has_field
+from .libraries import check_object_type, remedy_for_absence
+from .owned_data import OWNED_TAG
+
+
+def field_objects(
+    view_layer: bpy.types.ViewLayer, names: Iterable[str] | None = None
+) -> list[bpy.types.Object]:
+    """Return the mesh objects with a field that are visible in renders, sorted by name.
+
+    Objects in instanced collections are included. Objects whose field is switched off are not.
+
+    Parameters
+    ----------
+    view_layer : bpy.types.ViewLayer
+    names : iterable of str, optional
+        Return only these objects, in this order.
+
+    Raises
+    ------
+    RosyError
+        If there is no object with one of the names, or it has no field, is hidden or switched off.
+    """
+    candidates = {
+        obj.name: obj
+        for obj in _visible_objects(view_layer)
+        if has_field(obj) and is_field_enabled(obj)
+    }
+    if names is None:
+        return [candidates[name] for name in sorted(candidates)]
+    return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
+
+
+#: An instance of a mesh, valid until the next one, and whether its field is drawn.
+Instances = Iterator[tuple[bpy.types.DepsgraphObjectInstance, bool]]
+
+
+def rendered_instances(
+    depsgraph: bpy.types.Depsgraph, targets: Collection[bpy.types.Object]
+) -> Instances:
+    """Yield the instances of meshes that are visible in renders.
+
+    `targets` are the original objects whose fields are drawn. The others only occlude.
+    """
+    visible_objects = set(_visible_objects(depsgraph.view_layer))
+    with_field = set(targets)
+    for instance in depsgraph.object_instances:
+        if _is_rendered(instance, visible_objects):
+            yield instance, instance.object.original in with_field
+
+
+def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) -> Instances:
+    """Yield the instances of meshes with a field that are visible in 3D views, or of all meshes."""
+    for instance in depsgraph.object_instances:
+        obj, owner = instance.object, instance.object.original
+        if obj.type != "MESH" or not instance.show_self:
+            continue
+        draws_field = has_field(owner) and is_field_enabled(owner)
+        if draws_field or (include_occluders and not owner.get(OWNED_TAG)):
+            yield instance, draws_field
+
+
+def _is_rendered(
+    instance: bpy.types.DepsgraphObjectInstance, visible_objects: set[bpy.types.Object]
+) -> bool:
+    """Whether an instance is a mesh that is visible in renders."""
+    obj = instance.object
+    # The depsgraph lists the meshes of curves, texts, surfaces and metaballs as separate instances.
+    if obj.type != "MESH" or not instance.show_self or not obj.visible_camera:
+        return False
+    if obj.original.get(OWNED_TAG):  # a stroke object, made a mesh by Geometry Nodes
+        return False
+    if instance.is_instance:
+        instancer = instance.parent
+        return not obj.original.hide_render and (
+            instancer is None or instancer.original in visible_objects
+        )
+    return obj.original in visible_objects
+
+
+def is_field_enabled(obj: bpy.types.Object) -> bool:
+    """Whether drawing an object's field is switched on."""
+    return obj.rosy.include if has_rosy_properties() else True
+
+
+def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """Return the original objects visible in renders, including those in instanced collections."""
+    visible: dict[bpy.types.Object, None] = {}
+
+    def add_object(obj: bpy.types.Object) -> None:
+        """Add an object and the objects of the collection that it instances."""
+        if obj.hide_render or obj in visible:
+            return
+        visible[obj] = None
+        if obj.instance_type == "COLLECTION" and obj.instance_collection is not None:
+            for child in obj.instance_collection.all_objects:
+                add_object(child)
+
+    def visit_layer(layer: bpy.types.LayerCollection) -> None:
+        """Add the objects of a layer collection and its children."""
+        if layer.exclude or layer.collection.hide_render:
+            return
+        for obj in layer.collection.objects:
+            add_object(obj)
+        for child in layer.children:
+            visit_layer(child)
+
+    visit_layer(view_layer.layer_collection)
+    return list(visible)
+
+
+def _find_field_object(name: str, candidates: dict[str, bpy.types.Object]) -> bpy.types.Object:
+    """Return a candidate by name, or raise an error that says why there is none."""
+    if name in candidates:
+        return candidates[name]
+    obj = bpy.data.objects.get(name)
+    if obj is None:
+        raise RosyError(f"there is no object '{name}': {remedy_for_absence('check its name')}")
+    check_object_type(obj, "MESH")
+    if not has_field(obj):
+        field_name = attribute_name(obj.data)
+        raise RosyError(
+            f"object '{name}' has no attribute '{field_name}' with a field: make or import a field first"
+        )
+    raise RosyError(
+        f"object '{name}' is hidden in renders of this view layer, or its drawing is switched off: "
+        "show it, and switch it on"
+    )

@@ -713,11 +713,11 @@ def bad_fields_are_named():
     switch("ON")
     yield from wait_for_final_pictures()
     (layer,) = session_module()._session.layers._layers.values()
-    assert "Cube" in layer.scene_cache.errors and "FLOAT_COLOR" in layer.scene_cache.errors["Cube"]
+    assert "Cube" in layer.reader.errors and "FLOAT_COLOR" in str(layer.reader.errors["Cube"])
     capture("live-error", view()[2])
     bpy.data.objects.remove(cube)
     yield from check_is_bake("live-no-error")
-    assert not layer.scene_cache.errors
+    assert not layer.reader.errors
     switch("OFF")
     yield 0.5
 

@@ -14,6 +14,7 @@ from .representation import (
     face_representation,
     matching_angles,
     to_representation,
+    unit_complex,
 )
 from .rosy_field import RosyField
 from .surface import Surface, build_edges
@@ -59,15 +60,13 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     the mesh. Faces where the field is undefined are ignored.
     """
     x, y = face_frames(surface)
-    z = to_representation(field.vectors, x, y, field.degree)
-    modulus = np.abs(z)
-    z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
+    z = unit_complex(to_representation(field.vectors, x, y, field.degree))
     edges = build_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     face_a, face_b = surface.corner_face[a], surface.corner_face[b]
     angle = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
     length, center_distance = edge_lengths(surface, a, b)
-    defined = (modulus[face_a] > 0) & (modulus[face_b] > 0) & (center_distance > 0)
+    defined = (z[face_a] != 0) & (z[face_b] != 0) & (center_distance > 0)
     weight = np.divide(length, center_distance, out=np.zeros_like(length), where=defined)
     return float((weight * 2 * (1 - np.cos(angle)))[defined].sum())
 

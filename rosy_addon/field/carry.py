@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .frames import dot, normalize, tangent_frame
-from .representation import complex_bincount
+from .representation import complex_bincount, unit_complex
 from .surface import Surface, mean_per_face
 
 #: Largest sine of the angle between a vector and the plane of its face before the motion. Steeper
@@ -102,9 +102,7 @@ def vectors_on_rest_shape(
     squared_norm = np.bincount(face, np.abs(w) ** 2, count)
     ww, uw = (complex_bincount(face, product, count) for product in (w * w, u * w))
     rotation = squared_norm * complex_bincount(face, u * w.conj(), count) - ww.conj() * uw
-    modulus = np.abs(rotation)
-    rotation = np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
-    z = (dot(vectors, x) + 1j * dot(vectors, y)) * rotation.conj()
+    z = (dot(vectors, x) + 1j * dot(vectors, y)) * unit_complex(rotation).conj()
     return z.real[:, None] * rest_x + z.imag[:, None] * rest_y
 
 

@@ -17,7 +17,7 @@ from ..progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .prescribed import index_at_nodes
-from .representation import face_frames, from_representation
+from .representation import face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
@@ -81,9 +81,7 @@ def cheapest_singularities(
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component)
-    modulus = np.abs(z)
-    z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
-    field = RosyField(degree, from_representation(z, x, y, degree))
+    field = RosyField(degree, from_representation(unit_complex(z), x, y, degree))
     with progress(0.6, 0.65):
         found, found_index = find_singularities(surface, field)
     total = index_at_nodes(surface, graph, found, found_index)

@@ -15,13 +15,13 @@ from .directional_field import field_matching
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
 from .prescribed import TurningError, change_singularities
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .singularity_pairs import opposite_pairs
-from .smoothest import corner_frame_angles, node_sum_per_face
 from .sparse_multigrid import from_coo
 from .surface import Surface, connected_components
+from .surface_averages import SurfaceAverages
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,14 +208,9 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     z = to_representation(field.vectors, x, y, degree)
     with progress(0.0, 0.1):
         connection = build_connection(surface)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
+    averages = SurfaceAverages(surface, connection, x, y)
     report(0.1, "smoothing the field")
-    corner_area = np.repeat(connection.area / 3, 3)
-    corner_face = np.repeat(surface.triangle_face, 3)
-    to_node = np.exp(-1j * degree * frame_angle)
-    rhs = complex_bincount(
-        connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
-    )
+    rhs = averages.node_sums(z, degree)
     matrix = laplacian(connection, degree)
     report(0.2, "smoothing the field")
     mass = connection.positive_mass
@@ -231,11 +226,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
         solution = conjugate_gradient(matrix, rhs)
     report(0.95, "smoothing the field")
     area = np.bincount(surface.triangle_face, connection.area, surface.face_count)
-    mean = (
-        node_sum_per_face(surface, connection, solution, frame_angle, degree)
-        / np.where(area > 0, area, 1)
-        / 3
-    )
+    mean = averages.face_sums(solution, degree) / np.where(area > 0, area, 1) / 3
     return RosyField(degree, from_representation(mean, x, y, degree))
 
 

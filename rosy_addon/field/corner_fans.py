@@ -6,7 +6,7 @@ import numpy as np
 
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
-from .representation import complex_bincount, power
+from .representation import complex_bincount, power, unit_complex
 from .surface import Surface, face_blocks, next_corners
 
 
@@ -44,8 +44,7 @@ def corner_rotations(
         transported_x = transport(face_x[face], face_normal[face], normal)
         x, y = tangent_frame(normal)
         rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
-        modulus = np.abs(rotation)
-        return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
+        return unit_complex(rotation)
 
     return by_rows(rotations, corner_face, corner_normal, label=label)
 

@@ -242,7 +242,7 @@ class BrushStroke:
         if brush.front_faces:
             is_reached &= normal[near] @ normal[on_face].sum(axis=0) > 0
         direction = (1 - t)[:, None] * tangents[0] + t[:, None] * tangents[-1]
-        x, y = self._system.x[near], self._system.y[near]
+        x, y = self._system.averages.x[near], self._system.averages.y[near]
         member = np.hypot(dot(direction, x), dot(direction, y))
         if brush.effect == "comb":
             is_reached &= member > MIN_PROJECTION
@@ -272,8 +272,8 @@ class BrushStroke:
         self._least_distance[face] = distance[is_closest]
         target = to_representation(
             normalize(direction[is_reached][is_closest]),
-            self._system.x[face],
-            self._system.y[face],
+            self._system.averages.x[face],
+            self._system.averages.y[face],
             self._system.degree,
         )
         target *= (1.0 if brush.is_exact else SOFT_FIRMNESS) / np.abs(target)

@@ -9,7 +9,6 @@ from ..memory import raise_mmap_threshold
 from ..progress import progress, report
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .guided_system import guided_system
-from .representation import from_representation, to_representation
 from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .surface import Surface
@@ -54,7 +53,7 @@ def guided_field(
     raise_mmap_threshold()
     with progress(0.0, 0.1):
         system = guided_system(surface, degree)
-    target = to_representation(np.asarray(guides, dtype=np.float64), system.x, system.y, degree)
+    target = system.to_representation(np.asarray(guides, dtype=np.float64))
     if not target.any():
         raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
@@ -63,9 +62,9 @@ def guided_field(
     with progress(0.12, 0.95):
         z = system.solve(node_guides, tolerance=tolerance)
     report(0.95, "averaging the field on the faces")
-    face_z = unit_representations(system.face_representations(z))
+    face_z = unit_representations(system.averages.face_sums(z, degree))
     face_z[is_hard] = target[is_hard] / np.abs(target[is_hard])
-    return RosyField(degree, from_representation(face_z, system.x, system.y, degree))
+    return RosyField(degree, system.to_vectors(face_z))
 
 
 def unit_representations(z: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from ..progress import progress
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import FaceGraph
-from .representation import complex_bincount
+from .representation import complex_bincount, unit_complex
 from .sparse_multigrid import CSRMatrix, Level, from_coo, hierarchy, w_cycle
 from .turning_angles import added_resistance
 
@@ -126,8 +126,7 @@ def _initial_angle(
     penalty: np.ndarray,
 ) -> np.ndarray:
     """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
-    modulus = np.abs(offset)
-    unit = np.divide(offset, modulus, out=np.zeros_like(offset), where=modulus > 0)
+    unit = unit_complex(offset)
     with progress(0.0, 0.3):
         mean = _solve(matrix, penalty * unit, levels)
     difference = np.angle(mean[graph.target] * mean[graph.source].conj())

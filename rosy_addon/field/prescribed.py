@@ -15,7 +15,13 @@ from ..progress import progress, report
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .guided_rotation import guided_rotation
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import (
+    complex_bincount,
+    face_frames,
+    from_representation,
+    to_representation,
+    unit_complex,
+)
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, face_area_vectors, next_corners
 from .turning_angles import turning_angles
@@ -255,6 +261,4 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
     """(F,) factors that turn the representation z to a target as a whole, on each connected component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
-    modulus = np.abs(total)
-    rotation = np.divide(total, modulus, out=np.ones_like(total), where=modulus > 0)
-    return rotation[component]
+    return unit_complex(total, otherwise=1)[component]

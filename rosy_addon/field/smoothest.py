@@ -12,12 +12,12 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import progress, report
-from .connection import BLOCK_TRIANGLES, Connection, build_connection, laplacian
-from .frames import dot
-from .representation import complex_bincount, face_frames, from_representation
+from .connection import Connection, build_connection, laplacian
+from .representation import complex_bincount, face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
+from .surface_averages import SurfaceAverages
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
 #: an angle). At `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
@@ -65,8 +65,9 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     report(0.95, "aligning the field")
     z = _align_to_edges(connection, z, degree)
     report(0.95, "averaging the field on the faces")
-    vectors = face_vectors(surface, connection, z, degree)
-    return RosyField(degree, vectors)
+    x, y = face_frames(surface)
+    mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
+    return RosyField(degree, from_representation(unit_complex(mean), x, y, degree))
 
 
 def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:
@@ -293,79 +294,4 @@ def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.nd
     node = connection.corner_node
     edge_z = np.exp(1j * degree * connection.edge_direction) * np.repeat(connection.area, 3)
     total = _component_sums(component[node], edge_z * z[node].conj(), count)
-    modulus = np.abs(total)
-    rotation = np.divide(total, modulus, out=np.ones_like(total), where=modulus > 0)
-    return z * rotation[component]
-
-
-def face_vectors(
-    surface: Surface, connection: Connection, z: np.ndarray, degree: int
-) -> np.ndarray:
-    """(F, 3) unit members on the faces, from (n,) representations at the nodes.
-
-    Zero on faces where the mean is zero.
-    """
-    x, y = face_frames(surface)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
-    mean = node_sum_per_face(surface, connection, z, frame_angle, degree)
-    modulus = np.abs(mean)
-    mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    return from_representation(mean, x, y, degree)
-
-
-def corner_frame_angles(
-    surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
-) -> np.ndarray:
-    """The angles that convert directions at the nodes to the frames of the faces.
-
-    The bisector of a corner is the same direction in the polar map of the node and on the face.
-
-    Returns
-    -------
-    (3 T,) float64 ndarray
-        For each corner, the angle in radians to add to a direction in the map of its node to get
-        its direction in the frame x, y of its face.
-    """
-    angle = np.empty(surface.triangle_vertex.shape)
-    for start in range(0, len(angle), BLOCK_TRIANGLES):
-        block = slice(start, start + BLOCK_TRIANGLES)
-        face = surface.triangle_face[block]
-        block_x, block_y = x.take(face, axis=0), y.take(face, axis=0)
-        points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[block].T]
-        for corner in range(3):
-            edge = points[(corner + 1) % 3] - points[corner]
-            angle[block, corner] = np.arctan2(dot(edge, block_y), dot(edge, block_x))
-    angle = angle.ravel()
-    angle += 0.5 * connection.corner_angle
-    angle -= connection.bisector_direction
-    return angle
-
-
-def node_sum_per_face(
-    surface: Surface, connection: Connection, z: np.ndarray, frame_angle: np.ndarray, degree: int
-) -> np.ndarray:
-    """Sum node values over the triangle corners of each face, weighted by triangle area.
-
-    Parameters
-    ----------
-    surface : Surface
-    connection : Connection
-    z : (n,) complex ndarray
-        Representations at the nodes.
-    frame_angle : (3 T,) float64 ndarray
-        From `corner_frame_angles`.
-    degree : int
-
-    Returns
-    -------
-    (F,) complex128 ndarray
-        In the frames of the faces; not divided by the weights.
-    """
-    weighted = np.empty((len(connection.area), 3), dtype=np.complex128)
-    node, frame_angle = connection.corner_node.reshape(-1, 3), frame_angle.reshape(-1, 3)
-    for start in range(0, len(weighted), BLOCK_TRIANGLES):
-        block = slice(start, start + BLOCK_TRIANGLES)
-        angle = degree * frame_angle[block]
-        np.multiply(z.take(node[block]), np.cos(angle) + 1j * np.sin(angle), out=weighted[block])
-        weighted[block] *= connection.area[block, None]
-    return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
+    return z * unit_complex(total, otherwise=1)[component]

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..progress import progress, report
 from .blocks import row_blocks
+from .representation import unit_complex
 from .surface import build_edges, next_corners, sorted_with_order
 
 #: Label of the progress.
@@ -531,9 +532,7 @@ def _clustering(graph: _Graph) -> _Clustering:
     follower = np.flatnonzero(~is_root)
     a, b = graph.a[link[follower]], graph.b[link[follower]]
     keeps = np.abs(a) >= np.abs(b)
-    value = np.where(keeps, a, b)
-    modulus = np.abs(value)
-    value = np.divide(value, modulus, out=np.ones_like(value), where=modulus > 0)
+    value = unit_complex(np.where(keeps, a, b), otherwise=1)
     p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
     number = np.cumsum(is_root) - 1
     return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))

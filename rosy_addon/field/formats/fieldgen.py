@@ -28,6 +28,7 @@ from ..representation import (
     from_representation,
     power,
     to_representation,
+    unit_complex,
 )
 from ..rosy_field import RosyField, check_degree
 from ..surface import Surface
@@ -116,10 +117,7 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
         )
     report(0.8, label)
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
-    modulus = np.abs(mean)
-    mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    report(0.9, label)
-    member = from_representation(mean, *tangent_frame(normal), field.degree)
+    member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
     return chain(
         format_blocks(surface.vertices, "v "),
         format_blocks(normal, "vn "),

@@ -20,7 +20,7 @@ from rosy_addon.field.guides import feature_edges, guides_from_edges
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
-from rosy_addon.field.smoothest import corner_frame_angles
+from rosy_addon.field.surface_averages import SurfaceAverages
 
 BUNNY = MESHES / "stanford-bunny.obj"
 
@@ -53,7 +53,7 @@ def test_soft_guides_match_a_direct_solver(degree):
     guides, weight = random_guides(surface, 30), 40.0
     x, y = face_frames(surface)
     connection = build_connection(surface)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
+    frame_angle = SurfaceAverages(surface, connection, x, y).frame_angle
     # One row for each corner of a face with a guide, one column for each node.
     corner = np.flatnonzero(np.repeat(guides.any(axis=1), 3))
     shape = len(corner), connection.node_count

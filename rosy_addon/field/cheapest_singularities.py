@@ -8,22 +8,19 @@ potential of the others and of the curvature. Those with opposite indices vanish
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from ..errors import RosyError
 from ..progress import progress, report
-from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .prescribed import index_at_nodes
 from .representation import face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
-from .sparse_multigrid import CSRMatrix, from_coo, hierarchy, w_cycle
+from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface, face_area_vectors
-from .turning_angles import least_angles, potential_matrix
+from .turning_angles import least_angles, potential_solver
 
 #: Largest number of steps to neighboring vertices.
 MAX_STEPS = 60
@@ -109,31 +106,24 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
     """(n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
     if not added.any():
         return added
-    with progress(0.0, 0.05):
-        matrix = potential_matrix(graph)
-    with progress(0.05, 0.2):
-        levels = hierarchy(matrix)
+    with progress(0.0, 0.2):
+        potential_of = potential_solver(graph, TOLERANCE)
     unit = 2 * np.pi / degree
     neighbors = _Neighbors(graph)
-    best, least, share = added, np.inf, 1.0
-    potential = np.zeros(graph.node_count)
+    best, best_potential, least, share = added, None, np.inf, 1.0
     for step in range(MAX_STEPS):
         report(1 - 0.8 * 0.95**step, LABEL)
         charge = unit * (given + added) - graph.defect
-        solution = conjugate_gradient(
-            matrix, charge[graph.is_interior], TOLERANCE, partial(w_cycle, levels), LABEL
-        )
-        energy = float(charge[graph.is_interior] @ solution)
+        potential = potential_of(charge)
+        energy = float(charge[graph.is_interior] @ potential[graph.is_interior])
         # Those that are still at given singularities have to leave them, whatever it costs.
         if energy < least or (best[given != 0] != 0).any():
-            best, least = added, energy
-            potential = np.zeros(graph.node_count)
-            potential[graph.is_interior] = solution
+            best, best_potential, least = added, potential, energy
         else:
             share *= 0.5
             if share < MIN_SHARE:
                 break
-        added = neighbors.step(best, given, unit, potential, share)
+        added = neighbors.step(best, given, unit, best_potential, share)
         if np.array_equal(added, best):
             break
     return best
@@ -184,12 +174,8 @@ class _Neighbors:
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
     """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
-    count, weight = len(diagonal), 1 / graph.conductance
-    source, target = graph.source, graph.target
+    source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))
-    diagonal = diagonal + np.bincount(np.concatenate([source, target]), np.tile(weight, 2), count)
-    faces = np.arange(count)
-    row = np.concatenate([target, source, faces]).astype(np.intp)
-    column = np.concatenate([source, target, faces]).astype(np.intp)
-    value = np.concatenate([-weight * transport, -weight * transport.conj(), diagonal])
-    return from_coo(row, column, value, count, count)
+    ends = np.concatenate([source, target])
+    diagonal = diagonal + np.bincount(ends, np.tile(weight, 2), len(diagonal))
+    return from_edges(target, source, -weight * transport, diagonal)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..progress import progress, report
 from .frames import dot
-from .sparse_multigrid import CSRMatrix, from_coo
+from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface, build_edges, connected_components, next_corners
 
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
@@ -177,11 +177,7 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
     diagonal = np.bincount(ends, np.tile(weight, 2), c.node_count) + shift * c.mass
     diagonal[diagonal <= 0] = max(float(diagonal.mean()), 1.0)
     off_diagonal = -weight * np.exp(1j * degree * c.transport_angle)
-    nodes = np.arange(c.node_count)
-    row = np.concatenate([c.tail, c.head, nodes]).astype(np.intp)
-    column = np.concatenate([c.head, c.tail, nodes]).astype(np.intp)
-    value = np.concatenate([off_diagonal, off_diagonal.conj(), diagonal])
-    return from_coo(row, column, value, c.node_count, c.node_count)
+    return from_edges(c.tail, c.head, off_diagonal, diagonal)
 
 
 def _corner_geometry(

@@ -12,6 +12,7 @@ from .conjugate_gradient import conjugate_gradient
 from .connection import build_connection, laplacian
 from .curvature import face_magnitude
 from .directional_field import field_matching
+from .face_graph import spanning_forest
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
 from .prescribed import TurningError, change_singularities
@@ -20,7 +21,7 @@ from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .singularity_pairs import opposite_pairs
 from .sparse_multigrid import from_coo
-from .surface import Surface, connected_components
+from .surface import Surface
 from .surface_averages import SurfaceAverages
 
 
@@ -130,28 +131,9 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
     """
     faces, matching = field_matching(surface, field)
     defined = field.vectors.any(axis=1)[faces].all(axis=1)
-    face_a, face_b = faces[defined].T
-    matching = matching[defined]
-    source = np.concatenate([face_a, face_b])
-    target = np.concatenate([face_b, face_a])
-    # Member k of `source` matches member k + shift of `target`.
-    shift = np.concatenate([matching, -matching])
-    order = np.argsort(source, kind="stable")
-    source, target, shift = source[order], target[order], shift[order]
-    start = np.searchsorted(source, np.arange(surface.face_count + 1))
-    # Breadth-first search from one face of each connected component.
-    member_index = np.full(surface.face_count, -1)
-    component = connected_components(surface.face_count, np.stack([face_a, face_b], axis=1))
-    front = np.unique(component, return_index=True)[1]
-    member_index[front] = 0
-    while len(front):
-        count = start[front + 1] - start[front]
-        link = np.repeat(start[front] - np.cumsum(count) + count, count)
-        link += np.arange(count.sum())
-        link = link[member_index[target[link]] < 0]
-        front, first = np.unique(target[link], return_index=True)
-        link = link[first]
-        member_index[front] = (member_index[source[link]] + shift[link]) % period
+    # Member k of the first face of an edge matches member k + matching of the second.
+    tree = spanning_forest(surface.face_count, *faces[defined].T)
+    member_index = tree.sums_from_root(matching[defined]) % period
     angle = 2 * np.pi * member_index / field.degree
     return rotate_field(surface, field, angle).vectors
 

@@ -74,6 +74,10 @@ class FaceGraph:
         count = self.node_count
         return np.bincount(self.head, angle, count) - np.bincount(self.tail, angle, count)
 
+    def drop(self, potential: np.ndarray) -> np.ndarray:
+        """Return (I,) float64: by how much an (n,) potential grows along the edges."""
+        return potential[self.head] - potential[self.tail]
+
 
 def face_graph(
     surface: Surface, x: np.ndarray, y: np.ndarray, is_defined: np.ndarray | None = None

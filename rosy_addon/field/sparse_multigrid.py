@@ -154,6 +154,25 @@ def from_coo(
     return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
 
 
+def from_edges(
+    tail: np.ndarray, head: np.ndarray, value: np.ndarray, diagonal: np.ndarray
+) -> CSRMatrix:
+    """Make a Hermitian matrix from its entries at edges and on the diagonal.
+
+    Parameters
+    ----------
+    tail, head : (E,) int ndarray
+        Row and column of the entry of each edge. The conjugate is at (head, tail).
+    value : (E,) complex or float ndarray
+    diagonal : (n,) float64 ndarray
+    """
+    count = len(diagonal)
+    nodes = np.arange(count)
+    row = np.concatenate([tail, head, nodes]).astype(np.intp)
+    column = np.concatenate([head, tail, nodes]).astype(np.intp)
+    return from_coo(row, column, np.concatenate([value, value.conj(), diagonal]), count, count)
+
+
 def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
     """The matrix product a b."""
     return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))

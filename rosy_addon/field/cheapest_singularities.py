@@ -65,8 +65,7 @@ def cheapest_singularities(
     x, y = face_frames(surface)
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    with progress(0.0, 0.1, LABEL):
-        graph = face_graph(surface, x, y)
+    graph = face_graph(surface, x, y)
     area = np.linalg.norm(
         face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
     )

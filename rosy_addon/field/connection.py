@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import report
 from .frames import dot
 from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface, build_edges, connected_components, next_corners
@@ -86,13 +86,10 @@ class Connection:
 
 def build_connection(surface: Surface) -> Connection:
     """Build the connection of the triangles of a surface, at `Surface.vertices`."""
-    label = "building the connection Laplacian"
-    report(0.0, label)
+    report(0.0, "building the connection Laplacian")
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
-    with progress(0.0, 0.2, label):
-        edges = build_edges(vertex, start)
-    report(0.2, label)
+    edges = build_edges(vertex, start)
     corner = np.arange(len(vertex), dtype=np.int32)
     next_corner = next_corners(start)
     previous_corner = next_corner[next_corner]
@@ -103,11 +100,9 @@ def build_connection(surface: Surface) -> Connection:
     corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
     # In counter-clockwise order around a vertex, the previous corner lies across the edge that
     # leaves from this corner.
-    report(0.5, label)
     previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
     is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
     first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
-    report(0.7, label)
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
     node_count = int(node_of_corner[-1]) + 1
@@ -118,7 +113,6 @@ def build_connection(surface: Surface) -> Connection:
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
-    report(0.8, label)
     # Each edge once: from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
@@ -131,12 +125,10 @@ def build_connection(surface: Surface) -> Connection:
         edge_direction[head_corner]
         + corner_angle[head_corner] * angle_scale[corner_node[head_corner]],
     )
-    report(0.9, label)
     weight = 0.5 * (
         cotangent[previous_corner[tail_corner]]
         + np.where(twin_of_tail >= 0, cotangent[previous_corner[twin_of_tail]], 0)
     )
-    report(0.95, label)
     return Connection(
         corner_node=corner_node,
         node_count=node_count,

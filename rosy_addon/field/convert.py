@@ -188,13 +188,11 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     x, y = face_frames(surface)
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
-    with progress(0.0, 0.1):
-        connection = build_connection(surface)
+    connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, x, y)
     report(0.1, "smoothing the field")
     rhs = averages.node_sums(z, degree)
     matrix = laplacian(connection, degree)
-    report(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)
     matrix = from_coo(

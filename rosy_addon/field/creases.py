@@ -84,9 +84,8 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
         Borders and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
-    with progress(0.0, 0.3, LABEL):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, LABEL)
+    report(0.0, LABEL)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     sides = surface.corner_face[edges.halfedges].T
     # Smaller angles have no effect.
     crease_angle = max(crease_angle, MIN_ANGLE)
@@ -115,8 +114,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
         return none
     report(0.9, LABEL)
     ends, length, is_strong = ends[bent], length[bent], angle[bent] >= crease_angle
-    with progress(0.9, 1.0, LABEL):
-        chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
+    chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     total = np.bincount(chain, length)[chain]
     is_kept = np.bincount(chain, length * is_strong)[chain] >= MIN_STRONG_SHARE * total
     is_kept &= total >= MIN_EDGES_PER_NOISE * noise_angle * mean_length

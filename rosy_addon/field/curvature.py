@@ -102,7 +102,6 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     label = "computing principal directions"
     report(0.0, label)
     smooth_surface = with_smooth_normals(surface)
-    report(0.3, label)
     x, y = face_frames(smooth_surface)
     mean, deviator = face_curvature(smooth_surface, x, y)
     report(0.6, label)

@@ -289,10 +289,7 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
     label = "matching directions"
     report(0.0, label)
     x, y = face_frames(surface)
-    report(0.1, label)
-    with progress(0.2, 0.3, label):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, label)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
-from .surface import Surface, build_edges, connected_components, next_corners
+from .surface import Surface, build_edges, connected_components, connected_corners, next_corners
 
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4
@@ -92,9 +92,8 @@ def face_graph(
     is_defined : (F,) bool ndarray, optional
         Where there is a field. By default on all faces with an area.
     """
-    with progress(0.0, 0.3):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, LABEL)
+    report(0.0, LABEL)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     if is_defined is None:
         is_defined = x.any(axis=1)
     halfedges = edges.halfedges
@@ -103,26 +102,19 @@ def face_graph(
     following = next_corners(surface.face_start)
     source, target = surface.corner_face[a], surface.corner_face[b]
     unfolding = edge_unfolding(surface, x, y, a, b)
-    report(0.5, LABEL)
     length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
     np.clip(
         conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
     )
-    report(0.6, LABEL)
-    corner_count = len(surface.corner_vertex)
-    pairs = np.concatenate(
-        [np.stack([a, following[b]], axis=1), np.stack([following[a], b], axis=1)]
-    )
-    corner_node = connected_components(corner_count, pairs)
-    continues = np.zeros(corner_count, dtype=bool)
+    corner_node = connected_corners(a, b, following)
+    continues = np.zeros(len(following), dtype=bool)
     continues[halfedges.ravel()] = True
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
     corner_angle = signed_corner_angles(surface, x, y)
-    report(0.9, LABEL)
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
     node_component = np.zeros(len(is_interior), dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]

@@ -313,9 +313,7 @@ def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes
     else:
         rows = field.source_directions
         if rows is None:
-            report(0.0, "computing directions")
             rows = field_directions(surface, field)
-            report(1.0, "computing directions")
         if suffix == ".npy":
             return npy_blocks(rows)
         text = rawfield_text(rows) if suffix == ".rawfield" else directions_text(rows)

@@ -200,8 +200,7 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
-        with progress(0.0, 0.1):
-            ends = feature_edges(surface, settings.sharp_angle)
+        ends = feature_edges(surface, settings.sharp_angle)
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"

@@ -51,8 +51,7 @@ def guided_field(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    with progress(0.0, 0.1):
-        system = guided_system(surface, degree)
+    system = guided_system(surface, degree)
     target = system.to_representation(np.asarray(guides, dtype=np.float64))
     if not target.any():
         raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")

@@ -287,11 +287,7 @@ def firmness_weights(
 
 def guided_system(surface: Surface, degree: int) -> GuidedSystem:
     """Build the system of a surface."""
-    label = "building the connection Laplacian"
-    report(0.0, label)
-    with progress(0.0, 0.5):
-        connection = build_connection(surface)
-    report(0.5, label)
+    connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, *face_frames(surface))
     matrix = laplacian(connection, degree)
     matrix = matrix.plus_diagonal(REGULAR_SHIFT * matrix.diagonal)

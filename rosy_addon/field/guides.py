@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import progress
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
@@ -74,8 +73,7 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     (E, 2) int32 ndarray
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    with progress(0.0, 0.5):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     is_feature = np.ones(len(edges.ends), dtype=bool)
     is_feature[edges.interior] = False
     normal = surface.face_normal

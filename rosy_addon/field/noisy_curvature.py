@@ -61,16 +61,14 @@ def of_unit_extent(surface: Surface) -> Surface:
 
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
     """Measure the curvature of a surface, without and with a sample of its noise."""
-    with progress(0.0, 0.1, "finding edges"):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     with progress(0.1, 0.4):
         normals, noise_angle = filtered_normals(surface, edges)
     ends = salient_edges(surface, edges, normals, noise_angle)
     noise = noise_sample(surface, edges, noise_angle)
-    with progress(0.45, 0.6):
-        fans = smooth_fans(
-            surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
-        )
+    fans = smooth_fans(
+        surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
+    )
     x, y = face_frames(surface)
     with progress(0.6, 0.7, LABEL):
         mean, deviator = _bounded_curvature(surface, fans, x, y)

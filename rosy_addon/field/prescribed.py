@@ -82,9 +82,7 @@ def prescribed_field(
     raise_mmap_threshold()
     vertex, index = np.asarray(vertex, dtype=np.int64), np.asarray(index, dtype=np.int64)
     x, y = face_frames(surface)
-    with progress(0.0, 0.2, LABEL):
-        graph = face_graph(surface, x, y)
-    report(0.2, LABEL)
+    graph = face_graph(surface, x, y)
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, graph.defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - graph.defect
@@ -142,9 +140,7 @@ def change_singularities(
     z = to_representation(field.vectors, x, y, degree)
     is_defined = z != 0
     z[is_defined] /= np.abs(z[is_defined])
-    with progress(0.0, 0.2, LABEL):
-        graph = face_graph(surface, x, y, is_defined)
-    report(0.2, LABEL)
+    graph = face_graph(surface, x, y, is_defined)
     node_change = index_at_nodes(
         surface, graph, np.asarray(vertex, dtype=np.int64), np.asarray(change, dtype=np.int64)
     )

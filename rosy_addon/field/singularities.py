@@ -53,8 +53,7 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     x, y = face_frames(surface)
     report(0.1, label)
     z = to_representation(field.vectors, x, y, field.degree)
-    with progress(0.2, 0.3, label):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     report(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.4, 0.7):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import report
 from .blocks import concatenated_ranges
 from .surface import Surface, build_edges
 
@@ -54,8 +54,7 @@ def _near(
     distance : (n,) float64 ndarray
         Length of the shortest path along edges.
     """
-    with progress(0.0, 0.3, LABEL):
-        ends = build_edges(surface.corner_vertex, surface.face_start).ends
+    ends = build_edges(surface.corner_vertex, surface.face_start).ends
     count = len(surface.vertices)
     length = np.linalg.norm(surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]], axis=1)
     near = length <= max_distance

@@ -56,13 +56,11 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    with progress(0.0, 0.1):
-        connection = build_connection(surface)
+    connection = build_connection(surface)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
     with progress(0.1, 0.95):
         z, _ = smallest_eigenvectors(connection, degree)
-    report(0.95, "aligning the field")
     z = _align_to_edges(connection, z, degree)
     report(0.95, "averaging the field on the faces")
     x, y = face_frames(surface)
@@ -80,12 +78,10 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
-    report(0.0, "building the connection Laplacian")
     mass = connection.positive_mass
     shift = spectral_shift(mass)
     matrix = laplacian(connection, degree, shift)
-    with progress(0.1, 1.0):
-        z, energy = eigenproblem(matrix, mass, connection.component)
+    z, energy = eigenproblem(matrix, mass, connection.component)
     return z, energy - shift
 
 

@@ -183,10 +183,8 @@ def stripe_pattern(
     """
     report(0.0, LABEL)
     change = directions.phase_changes(spacing)
-    with progress(0.0, 0.1):
-        gluing = _gluing(triangle_vertex, directions)
-    with progress(0.1, 0.2):
-        change = _shared_changes(change, gluing, directions)
+    gluing = _gluing(triangle_vertex, directions)
+    change = _shared_changes(change, gluing, directions)
     report(0.2, LABEL)
     covering = _covering(triangle_vertex, gluing, directions)
     graph = _graph(covering, gluing, change, directions)
@@ -233,15 +231,12 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     """Match the directions of neighboring triangles, unfolded into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    with progress(0.0, 0.6, LABEL):
-        edges = build_edges(corner_vertex, start)
-    report(0.6, LABEL)
+    edges = build_edges(corner_vertex, start)
     a, b = edges.halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
     angle = (0.5 * (directions.angle + np.roll(directions.angle, -1, axis=1))).reshape(-1)
-    report(0.8, LABEL)
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
@@ -261,7 +256,6 @@ def _shared_changes(
     glued = np.flatnonzero(gluing.twin >= 0)
     twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
-        report(family / families, LABEL)
         direction = (family + shift) % directions.degree
         neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
         np.negative(neighbor, out=neighbor, where=direction < families)

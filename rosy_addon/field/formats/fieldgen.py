@@ -81,7 +81,6 @@ def read_fieldgen(path: Path) -> RawField:
     )
     with progress(0.8, 1.0):
         numbers = vertex_rows.floats("part of a vector")
-    report(1.0, LABEL)
     numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)
@@ -101,21 +100,17 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
     It is zero where the mean is zero.
     """
-    label = "averaging the field at the vertices"
+    report(0.0, "averaging the field at the vertices")
     count = len(surface.vertices)
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
     normal = vertex_normals(surface)
-    report(0.5, label)
     face_x, face_y = face_frames(surface)
-    report(0.6, label)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
-    with progress(0.6, 0.8):
-        rotation = power(
-            corner_rotations(surface.face_normal, face_x, face, normal[vertex], label),
-            field.degree,
-        )
-    report(0.8, label)
+    rotation = power(
+        corner_rotations(surface.face_normal, face_x, face, normal[vertex]),
+        field.degree,
+    )
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
     return chain(

@@ -30,12 +30,10 @@ def read_obj(path: Path) -> Polygons:
     """
     with progress(0.0, 0.4):
         rows = read_rows(path)
-    with progress(0.4, 0.5):
-        is_vertex, is_face = _rows_of_kinds(rows, b"v", b"f")
+    is_vertex, is_face = _is_kind(rows, b"v"), _is_kind(rows, b"f")
     vertex_rows = _select_rows(rows, is_vertex, 3)
     with progress(0.5, 0.6):
         vertices = vertex_rows.points("vertex")
-    report(0.6, LABEL)
     corners = _select_rows(rows, is_face)
     for row, words in enumerate(corners.words):
         if len(words) < 3:
@@ -47,7 +45,6 @@ def read_obj(path: Path) -> Polygons:
         positions = _position_indices(corners)
     with progress(0.9, 1.0):
         index = positions.ints("vertex of a face")
-    report(1.0, LABEL)
     # A negative index is relative to the number of vertices above its line.
     vertices_so_far = np.cumsum(is_vertex)[is_face]
     corner_vertex = np.where(index < 0, index + np.repeat(vertices_so_far, sizes), index - 1)
@@ -61,19 +58,9 @@ def read_obj(path: Path) -> Polygons:
     return Polygons(vertices, corner_vertex, offsets_from_sizes(sizes))
 
 
-def _rows_of_kinds(
-    rows: TextRows,
-    *kinds: bytes,
-) -> list[np.ndarray]:
-    """Whether the first word of each row is that of a kind: a (rows,) bool ndarray for each kind."""
-    masks = [np.zeros(len(rows), dtype=bool) for _ in kinds]
-    for start in range(0, len(rows), ROWS_PER_BLOCK):
-        report(start / len(rows), LABEL)
-        block = slice(start, start + ROWS_PER_BLOCK)
-        first_words = [words[0] for words in rows.words[block]]
-        for mask, kind in zip(masks, kinds, strict=True):
-            mask[block] = [word == kind for word in first_words]
-    return masks
+def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
+    """(rows,) bool: whether the first word of each row is that of a kind."""
+    return np.array([words[0] == kind for words in rows.words], dtype=bool)
 
 
 def _select_rows(rows: TextRows, is_selected: np.ndarray, max_words: int | None = None) -> TextRows:
@@ -115,8 +102,7 @@ def read_uv(path: Path) -> np.ndarray | None:
         If only some of the corners have texture coordinates, or an index is out of range.
     """
     rows = read_rows(path)
-    is_uv = np.array([words[0] == b"vt" for words in rows.words], dtype=bool)
-    is_face = np.array([words[0] == b"f" for words in rows.words], dtype=bool)
+    is_uv, is_face = _is_kind(rows, b"vt"), _is_kind(rows, b"f")
     if not is_uv.any():
         return None
     table = _select_rows(rows, is_uv, 2)

@@ -66,7 +66,6 @@ def read_ply(path: Path) -> Polygons:
         is out of range.
     """
     columns, _ = _read_columns(path)
-    report(1.0, LABEL)
     try:
         vertices = np.stack([columns["vertex"][axis] for axis in "xyz"], axis=1)
     except KeyError as missing:
@@ -202,7 +201,6 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
     """The values of one element, given its rows."""
     starts = offsets_from_sizes([len(words) for words in rows.words])
     values = rows.floats(f"value of a {element.name}")
-    report(1.0, LABEL)
     position = starts[:-1]
     columns: _Columns = {}
     for prop in element.properties:

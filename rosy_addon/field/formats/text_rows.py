@@ -136,7 +136,6 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     # Also accept a lone CR, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        report(0.0, LABEL)
     lines = data.split(b"\n")
     has_comments = comment is not None and comment in data
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.

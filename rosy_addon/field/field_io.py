@@ -60,17 +60,6 @@ class LoadedField(NamedTuple):
     note: str
 
 
-def read_field(
-    path: str | os.PathLike[str],
-    surface: Surface,
-    degree: int | None = None,
-    nonfinite: str = "error",
-    mesh: str | os.PathLike[str] | None = None,
-) -> RosyField:
-    """Read a field from a file; `load_field` without the note."""
-    return load_field(path, surface, degree, nonfinite, mesh).field
-
-
 def load_field(
     path: str | os.PathLike[str],
     surface: Surface,

@@ -35,7 +35,7 @@ from ..surface import Surface
 from ..validate import vertex_normals
 from .obj import read_obj
 from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, format_blocks, format_rows, read_rows
+from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, format_rows, read_rows
 
 
 def read_fieldgen(path: Path) -> RawField:
@@ -57,7 +57,7 @@ def read_fieldgen(path: Path) -> RawField:
         polygons = read_obj(path)
     with progress(0.5, 0.7):
         rows = read_rows(path, comment=None, data=data)
-    degree, vertex_lines = None, []
+    degree, is_vertex_row = None, np.zeros(len(rows), dtype=bool)
     for row, words in enumerate(rows.words):
         if row % ROWS_PER_BLOCK == 0:
             report(0.7 + 0.1 * row / len(rows), LABEL)
@@ -71,16 +71,11 @@ def read_fieldgen(path: Path) -> RawField:
             except (ValueError, RosyError):
                 continue  # a comment at the top of the file explains the format with such a line
         elif kind == b"field" and len(words) == 5 and words[1].isdigit():
-            vertex_lines.append((row, words[1:]))
-    if degree is None or not vertex_lines:
+            is_vertex_row[row] = True
+    if degree is None or not is_vertex_row.any():
         raise RosyError(f"{path}: has no field: there are no lines '# field i x y z'")
-    vertex_rows = TextRows(
-        path,
-        [words for _, words in vertex_lines],
-        [rows.line_numbers[row] for row, _ in vertex_lines],
-    )
     with progress(0.8, 1.0):
-        numbers = vertex_rows.floats("part of a vector")
+        numbers = rows.select(is_vertex_row, slice(-4, None)).floats("part of a vector")
     numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)

@@ -44,6 +44,15 @@ class TextRows:
     def __getitem__(self, rows: slice) -> TextRows:
         return TextRows(self.path, self.words[rows], self.line_numbers[rows])
 
+    def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
+        """Some of the rows, given as (rows,) bool, cut to some of their words."""
+        rows = np.flatnonzero(is_selected).tolist()
+        return TextRows(
+            self.path,
+            [self.words[row][words] for row in rows],
+            [self.line_numbers[row] for row in rows],
+        )
+
     def error(self, row: int, message: str) -> RosyError:
         """The error to raise for a row: names the file and, if the row exists, its line."""
         if row < len(self.line_numbers):

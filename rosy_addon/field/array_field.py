@@ -17,9 +17,8 @@ from .representation import face_frames, from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface, mean_per_face
 from .validate import (
-    FACE_TOLERANCE_DEG,
     MAX_OUTLIER_FRACTION,
-    VERTEX_TOLERANCE_DEG,
+    TOLERANCE_DEG,
     apply_nonfinite_policy,
     as_float64,
     tangent_normals,
@@ -274,9 +273,8 @@ def _tangential_on_faces(
 ) -> np.ndarray | None:
     """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
     normal = tangent_normals(surface, domain)
-    tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
     length = np.sqrt(dot(vectors, vectors))
-    is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(tolerance_deg)) * length
+    is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length
     if is_off.sum() <= MAX_OUTLIER_FRACTION * np.count_nonzero(length):
         return None
     report(0.5, _LABEL)

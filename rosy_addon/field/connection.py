@@ -98,17 +98,15 @@ def build_connection(surface: Surface) -> Connection:
     twin[a], twin[b] = b, a
 
     corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
-    # In counter-clockwise order around a vertex, the previous corner lies across the edge that
-    # leaves from this corner.
-    previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
-    is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
-    first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
+    previous, is_closed = umbrella_order(vertex, twin, next_corner)
+    is_first = previous == corner
+    first_corner, offset = sums_in_umbrellas(previous, corner_angle[previous])
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
     node_count = int(node_of_corner[-1]) + 1
     angle_sum = np.bincount(corner_node, corner_angle, node_count)
     angle_scale = np.ones(node_count)
-    is_interior = closed & (angle_sum > 0)
+    is_interior = is_closed[is_first] & (angle_sum > 0)
     angle_scale[is_interior] = 2 * np.pi / angle_sum[is_interior]
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
@@ -196,53 +194,57 @@ def _corner_geometry(
     return corner_angle.ravel(), cotangent.ravel(), area
 
 
-def _umbrella_starts(
-    previous_in_umbrella: np.ndarray, max_corners: int
+def umbrella_order(
+    corner_vertex: np.ndarray, twin: np.ndarray, next_corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the first corner of each umbrella, and which umbrellas are closed.
+    """Find the corners in order around each umbrella.
 
     A closed umbrella begins with its corner of smallest index.
 
     Parameters
     ----------
-    previous_in_umbrella : (C,) int ndarray
-        The previous corner in counter-clockwise order; -1 at the start of an open umbrella.
-    max_corners : int
-        Upper bound of the number of corners in an umbrella.
+    corner_vertex : (C,) int ndarray
+    twin : (C,) int ndarray
+        For the edge from each corner to the next, the corner at which it starts in the neighboring triangle.
+        -1 if there is none.
+    next_corner : (C,) int ndarray
 
     Returns
     -------
-    first : (C,) bool ndarray
-        Whether an umbrella begins with the corner.
-    closed : (n,) bool ndarray
-        Whether the umbrella is closed, in the order of their first corners.
+    previous : (C,) int ndarray
+        The previous corner in counter-clockwise order; the corner itself if an umbrella begins with it.
+    is_closed : (C,) bool ndarray
+        Whether the umbrella of a corner is closed.
     """
-    corner = np.arange(len(previous_in_umbrella))
-    smallest, pointer = corner, np.where(previous_in_umbrella >= 0, previous_in_umbrella, corner)
-    rounds = max_corners.bit_length()
-    for _ in range(rounds):
+    corner = np.arange(len(twin), dtype=twin.dtype)
+    # The previous corner lies across the edge that leaves from this corner.
+    previous = np.where(twin >= 0, next_corner[twin], corner)
+    smallest, pointer = corner, previous
+    for _ in range(int(np.bincount(corner_vertex).max()).bit_length()):
         smallest, pointer = np.minimum(smallest, smallest[pointer]), pointer[pointer]
-    closed = previous_in_umbrella[pointer] >= 0
-    first = (previous_in_umbrella < 0) | (closed & (smallest == corner))
-    return first, closed[first]
+    is_closed = twin[pointer] >= 0
+    return np.where(is_closed & (smallest == corner), corner, previous), is_closed
 
 
-def _accumulate_angles(
-    previous_in_umbrella: np.ndarray, is_first: np.ndarray, angle: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Sum the angles from the first corner of each umbrella up to each corner.
+def sums_in_umbrellas(previous: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum values from the first corner of each umbrella up to each corner.
+
+    Parameters
+    ----------
+    previous : (C,) int ndarray
+        From `umbrella_order`.
+    value : (C,) ndarray
+        What each corner adds to the sum of the previous one. Those of first corners do not count.
 
     Returns
     -------
     first_corner : (C,) int ndarray
         The first corner of the umbrella that the corner belongs to.
-    angle_sum : (C,) float64 ndarray
-        Sum of the angles of all corners before this one, radians.
+    total : (C,) ndarray
     """
-    pointer = np.where(is_first, np.arange(len(previous_in_umbrella)), previous_in_umbrella)
-    angle_sum = np.where(is_first, 0.0, angle[pointer])
+    total = np.where(previous == np.arange(len(previous)), 0, value)
     while True:
-        next_pointer = pointer[pointer]
-        if np.array_equal(next_pointer, pointer):
-            return pointer, angle_sum
-        angle_sum, pointer = angle_sum + angle_sum[pointer], next_pointer
+        following = previous[previous]
+        if np.array_equal(following, previous):
+            return previous, total
+        total, previous = total + total[previous], following

@@ -71,19 +71,13 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     label = "reading directions"
     report(0.0, label)
     x, y = face_frames(surface)
-    report(0.1, label)
 
     def coordinates(rows: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return dot(rows, x[:, None]) + 1j * dot(rows, y[:, None])
 
     with progress(0.1, 0.2):
         w = by_rows(coordinates, directions, x, y, label=label)
-    within_tolerance = True
-    for rows in row_blocks(len(w)):
-        within_tolerance &= is_rosy(w[rows])
-        report(0.3, label)
-        if not within_tolerance:
-            break
+    within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
     with progress(0.3, 0.6):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=label)
     if within_tolerance:

@@ -27,6 +27,7 @@ import numpy as np
 
 from ..progress import progress, report
 from .blocks import row_blocks
+from .connection import sums_in_umbrellas, umbrella_order
 from .representation import unit_complex
 from .surface import build_edges, next_corners, sorted_with_order
 
@@ -291,26 +292,13 @@ def _covering(
     """Count the directions of all corners around a vertex from the same one."""
     degree, families = directions.degree, directions.family_count
     corner = np.arange(len(gluing.twin), dtype=np.int32)
-    # Around a vertex, the previous corner lies across the edge that leaves from a corner.
-    has_previous = gluing.twin >= 0
-    previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
-    first, pointer = corner, previous
-    for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
-        first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
-    # A closed fan begins at its first corner, an open one at the corner without a previous one.
-    is_closed = has_previous[pointer]
-    start = np.where(is_closed & (first == corner), corner, previous)
-    shift = np.where(start != corner, gluing.shift, 0)
-    while True:
-        following = start[start]
-        if np.array_equal(following, start):
-            break
-        shift, start = (shift + shift[start]) % degree, following
-    closes = has_previous & (start == corner)
-    turn = (gluing.shift + shift[previous]) % degree
-    is_singular = (closes & (turn != 0))[start]
+    previous, _ = umbrella_order(triangle_vertex.reshape(-1), gluing.twin, gluing.next_corner)
+    start, shift = sums_in_umbrellas(previous, gluing.shift)
+    last = gluing.next_corner[gluing.twin]
+    closes = (gluing.twin >= 0) & (start == corner)
+    is_singular = (closes & ((gluing.shift + shift[last]) % degree != 0))[start]
     fan = np.where(is_singular, corner, start)
-    shift = np.where(is_singular, 0, shift)
+    shift = np.where(is_singular, 0, shift % degree)
     is_used = np.zeros(len(corner), dtype=bool)
     is_used[fan] = True
     number = (np.cumsum(is_used) - 1)[fan]

@@ -131,12 +131,10 @@ def bisect(
             mid, mid_bc, mid_ca = np.take_along_axis(midpoint[parent], order, 1).T
             none = np.full_like(mid, -1)
             weights = np.take_along_axis(leaf_weights[parent], order[:, :, None], 1)
-            children = np.arange(len(first_child), len(first_child) + 2 * len(parent))
+            children = len(first_child) + np.arange(2 * len(parent), dtype=np.int32)
             first_child[leaf_node[parent]] = children[::2]
+            first_child = np.concatenate([first_child, np.full_like(children, -1)])
             split_edge[leaf_node[parent]] = edge
-            first_child = np.concatenate(
-                [first_child, np.full_like(first_child, -1, shape=len(children))]
-            )
             split_edge = np.concatenate([split_edge, np.zeros(len(children), dtype=np.int8)])
             leaf_node = _split(leaf_node, parent, children[::2], children[1::2])
             leaf_root = _split(leaf_root, parent, leaf_root[parent], leaf_root[parent])
@@ -165,7 +163,7 @@ def _split(
 ) -> np.ndarray:
     """Replace parents in a list of leaves by their first children, and append the second ones."""
     leaves[parent] = first
-    return np.concatenate([leaves, second.astype(leaves.dtype)])
+    return np.concatenate([leaves, second])
 
 
 def _edge_lengths(vertices: np.ndarray, triangle_vertex: np.ndarray) -> np.ndarray:

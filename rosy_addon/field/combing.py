@@ -12,8 +12,13 @@ from ..errors import RosyError
 from ..progress import progress, report
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .convert import check_rosy
-from .guided import unit_representations
-from .guided_system import EXACT_FIRMNESS, GuidedSystem, NodeGuides, firmness_weights
+from .guided_system import (
+    EXACT_FIRMNESS,
+    GuidedSystem,
+    NodeGuides,
+    firmness_weights,
+    unit_representations,
+)
 from .representation import unit_complex
 from .rosy_field import RosyField
 

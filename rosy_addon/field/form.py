@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import progress, report
-from .guided import guided_or_smoothest
+from .creases import weighted_median
+from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
+from .guided_system import guided_or_smoothest
 from .guides import guides_from_edges
-from .noisy_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
-from .salient_edges import weighted_median
 from .smoothest import smoothest_field
 from .surface import Surface
 

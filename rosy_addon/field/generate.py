@@ -18,8 +18,7 @@ from .cheapest_singularities import cheapest_singularities
 from .curvature import TINY, curvature_field
 from .form import form
 from .frames import normalize, unit_direction
-from .guided import guided_or_smoothest
-from .guided_system import firmness_weights
+from .guided_system import firmness_weights, guided_or_smoothest
 from .guides import (
     average_guides,
     feature_edges,

@@ -6,7 +6,7 @@ solves linear equations for the angles, one for each interior vertex; and on sur
 several borders, one for each loop that no vertex can contract.
 
 The angles of least squares are those of a potential at the vertices, which solves a Poisson equation on the
-triangles (`triangle_graph`); and those of one harmonic solution for each loop. Around a loop, the field may
+triangles (`face_graph.TriangleGraph`); and those of one harmonic solution for each loop. Around a loop, the field may
 turn by any multiple of 2 pi / N; the multiples of least energy are chosen.
 """
 
@@ -20,10 +20,9 @@ import numpy as np
 
 from ..progress import progress, report
 from .conjugate_gradient import conjugate_gradient
-from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest
+from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
 from .surface import Surface, connected_components
-from .triangle_graph import triangle_graph
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-10

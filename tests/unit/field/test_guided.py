@@ -15,7 +15,7 @@ from rosy_addon.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.field.guided import guided_field
+from rosy_addon.field.guided_system import guided_field
 from rosy_addon.field.guides import feature_edges, guides_from_edges
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames, to_representation

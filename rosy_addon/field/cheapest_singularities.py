@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..progress import progress, report
+from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
 from .prescribed import index_at_nodes
 from .representation import face_frames, from_representation, unit_complex
@@ -129,16 +130,14 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
 
 
 class _Neighbors:
-    """The vertex nodes, and the interior ones next to each of them."""
+    """The vertex nodes, and those next to each of them."""
 
     def __init__(self, graph: FaceGraph) -> None:
-        ends = np.concatenate([graph.tail, graph.head])
-        others = np.concatenate([graph.head, graph.tail])
-        order = np.argsort(ends, kind="stable")
-        order = order[graph.is_interior[others[order]]]
-        self._neighbor = others[order]
-        self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[order]
-        self._start = np.searchsorted(ends[order], np.arange(graph.node_count + 1))
+        self._start, self._neighbor, edge = neighbors_of_nodes(
+            graph.node_count, graph.tail, graph.head
+        )
+        self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[edge]
+        self._is_interior = graph.is_interior
 
     def step(
         self,
@@ -157,7 +156,7 @@ class _Neighbors:
             change = 2 * charge * (potential[others] - potential[node])
             change += charge**2 * self._resistance[around]
             is_free = (given[others] == 0) & (added[others] * added[node] <= 0)
-            change[~is_free] = np.inf
+            change[~is_free | ~self._is_interior[others]] = np.inf
             least = float(change.min(initial=np.inf))
             must_leave = given[node] != 0
             if least < 0 or (must_leave and least < np.inf):

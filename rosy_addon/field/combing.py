@@ -11,7 +11,6 @@ import numpy as np
 from ..errors import RosyError
 from ..progress import progress, report
 from .conjugate_gradient import RELATIVE_TOLERANCE
-from .convert import check_rosy
 from .guided_system import (
     EXACT_FIRMNESS,
     GuidedSystem,
@@ -146,7 +145,7 @@ def start_combing(
         If the directions are not a RoSy, or the field is undefined everywhere.
     """
     surface = system.surface
-    check_rosy(surface, field)
+    field.check_rosy(surface.name)
     z = system.to_representation(field.vectors)
     magnitude = np.abs(z)
     if not magnitude.any():

@@ -15,11 +15,9 @@ from .directional_field import field_matching
 from .face_graph import spanning_forest
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
-from .prescribed import TurningError, change_singularities
 from .representation import face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .singularities import find_singularities
-from .singularity_pairs import opposite_pairs
+from .singularity_changes import cancel_pairs
 from .sparse_multigrid import from_coo
 from .surface import Surface
 from .surface_averages import SurfaceAverages
@@ -104,7 +102,7 @@ def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
         If the degree is neither a multiple nor a divisor, or the directions are not a RoSy.
     """
     degree = check_degree(degree)
-    check_rosy(surface, field)
+    field.check_rosy(surface.name)
     if degree % field.degree == 0:
         return RosyField(degree, field.vectors)
     if field.degree % degree:
@@ -182,7 +180,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     RosyError
         If the directions are not a RoSy, or the time is not positive and finite.
     """
-    check_rosy(surface, field)
+    field.check_rosy(surface.name)
     if not time > 0 or not np.isfinite(time):
         raise RosyError(f"{surface.name}: the diffusion time must be above 0, not {time}")
     x, y = face_frames(surface)
@@ -221,69 +219,3 @@ def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField
     """
     magnitude = np.broadcast_to(magnitude, (len(field.vectors),))[:, None]
     return replace(field, vectors=normalize(field.vectors) * magnitude, source_directions=None)
-
-
-def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> RosyField:
-    """Remove pairs of singularities with opposite indices.
-
-    Far from them, the field turns by an angle that falls with the distance. All other singularities stay, and
-    so do pairs without which the field would turn too fast for the size of the faces.
-
-    Parameters
-    ----------
-    surface : Surface
-    field : RosyField
-        A RoSy.
-    max_distance : float
-        Largest length of a path along edges between the two of a pair, in object space.
-
-    Returns
-    -------
-    RosyField
-        The field itself if it has no such pairs.
-
-    Raises
-    ------
-    RosyError
-        If the directions are not a RoSy.
-    """
-    check_rosy(surface, field)
-    with progress(0.0, 0.2):
-        vertex, index = find_singularities(surface, field)
-    with progress(0.2, 0.4):
-        pairs = opposite_pairs(surface, vertex, index, max_distance)
-    start = 0.4
-    while len(pairs):
-        chosen = pairs.ravel()
-        try:
-            with progress(start, 1.0):
-                return change_singularities(
-                    surface, field, vertex[chosen], -index[chosen], max_distance
-                )
-        except TurningError as error:
-            pairs = pairs[~_are_near(surface, vertex[pairs], error.vertices)]
-        start = 0.5 * (start + 1.0)
-    return field
-
-
-def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(P,) bool: which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
-    is_near = np.zeros(len(surface.vertices), dtype=bool)
-    is_near[vertices] = True
-    corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
-    while not is_near[pairs].any():
-        touches = np.zeros(surface.face_count, dtype=bool)
-        touches[corner_face[is_near[corner_vertex]]] = True
-        before = int(is_near.sum())
-        is_near[corner_vertex[touches[corner_face]]] = True
-        if int(is_near.sum()) == before:
-            return np.ones(len(pairs), dtype=bool)
-    return is_near[pairs].any(axis=1)
-
-
-def check_rosy(surface: Surface, field: RosyField) -> None:
-    """Raise an error if the directions of a field are not a RoSy."""
-    if field.direction_ratios is not None:
-        raise RosyError(
-            f"{surface.name}: only RoSy fields can be changed, but the directions of this field are not a RoSy"
-        )

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..progress import report
 from .analysis import edge_lengths
-from .blocks import concatenated_ranges
+from .blocks import concatenated_ranges, neighbors_of_nodes
 from .frames import dot
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
@@ -197,10 +197,8 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     first, second : (m,) int ndarray
         The nodes that each edge connects.
     """
-    ends, others = np.concatenate([first, second]), np.concatenate([second, first])
-    order = np.argsort(ends, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=node_count))])
-    neighbor, edge = others[order], order % max(len(first), 1)
+    start, neighbor, order = neighbors_of_nodes(node_count, first, second)
+    edge = order % max(len(first), 1)
     sign = np.where(order < len(first), 1.0, -1.0)
     component = connected_components(node_count, np.stack([first, second], axis=1))
     roots = np.unique(component, return_index=True)[1]

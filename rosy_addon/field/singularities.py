@@ -114,6 +114,27 @@ def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularit
     return ", ".join(parts)
 
 
+def first_pairs(pairs: np.ndarray) -> np.ndarray:
+    """Choose the first of some pairs, each thing in one of them at most.
+
+    Parameters
+    ----------
+    pairs : (n, 2) int ndarray
+
+    Returns
+    -------
+    (m,) intp ndarray
+        Indices of the chosen pairs.
+    """
+    taken: set[int] = set()
+    chosen = []
+    for number, pair in enumerate(pairs.tolist()):
+        if taken.isdisjoint(pair):
+            taken.update(pair)
+            chosen.append(number)
+    return np.array(chosen, dtype=np.intp)
+
+
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))

@@ -10,7 +10,7 @@ from ..errors import RosyError
 from ..progress import progress, report
 from .blocks import row_blocks
 from .directional_field import field_directions
-from .frames import dot, normalize
+from .frames import coordinates, dot, normalize
 from .representation import (
     face_frames,
     face_representation,
@@ -182,11 +182,8 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
 
 def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
     """(F,) mean angles between the directions of two fields, for the best of their N matchings."""
-    x, y = face_frames(surface)
-    z, other_z = (
-        dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-        for directions in (field_directions(surface, field), field_directions(surface, other))
-    )
+    frames = face_frames(surface)
+    z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
     for shift in range(field.degree):
         angles = np.abs(np.angle(z * np.roll(other_z, shift, axis=1).conj()))

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import RosyError
 from ..progress import progress, report
 from .field_io import field_from_raw
-from .formats.raw_field import RawField
+from .formats.polygons import RawField
 from .frames import dot
 from .representation import face_frames, from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree

@@ -81,16 +81,17 @@ class Combing:
         changed = np.unique(self.system.surface.triangle_face[corner // 3])
         self._set_face_z(self.system.face_representations_at(self._z, changed), changed)
 
-    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> None:
-        """Solve the whole system. Without any guide, the field stays."""
+    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
+        """Solve the whole system, and return `representations`. Without any guide, the field stays."""
         if not self.guides.any():
-            return
+            return self.representations
         self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
             self._z = self.system.solve(self._node_guides, self._z, tolerance)
         report(0.95, "averaging the field on the faces")
         face_z = self.system.averages.face_sums(self._z, self.system.degree)
         self._set_face_z(face_z, np.arange(len(self.guides)))
+        return self.representations
 
     def _update_node_guides(self, node: np.ndarray) -> None:
         """Bring the guides at nodes up to date."""
@@ -114,12 +115,6 @@ class Combing:
         is_exact = np.abs(guides) >= EXACT_FIRMNESS
         z[is_exact] = guides[is_exact] / np.abs(guides[is_exact])
         self._face_z[face] = z
-
-
-def settle(combing: Combing) -> tuple[np.ndarray, np.ndarray]:
-    """Solve the whole system, and return `Combing.representations`."""
-    combing.settle()
-    return combing.representations
 
 
 def start_combing(

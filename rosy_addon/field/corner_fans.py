@@ -15,7 +15,6 @@ def corner_rotations(
     face_x: np.ndarray,
     corner_face: np.ndarray,
     corner_normal: np.ndarray,
-    label: str | None = None,
 ) -> np.ndarray:
     """The rotation from the frame of each face to the frame of each of its corners.
 
@@ -31,8 +30,6 @@ def corner_rotations(
         Face of each corner.
     corner_normal : (C, 3) ndarray
         Unit normals of the corners.
-    label : str, optional
-        Of the progress.
 
     Returns
     -------
@@ -46,7 +43,7 @@ def corner_rotations(
         rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
         return unit_complex(rotation)
 
-    return by_rows(rotations, corner_face, corner_normal, label=label)
+    return by_rows(rotations, corner_face, corner_normal)
 
 
 def average_over_fans(

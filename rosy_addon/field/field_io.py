@@ -13,7 +13,7 @@ from ..progress import progress, report
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import directions_text, npy_blocks, read_npy, read_text
-from .formats.raw_field import RawField
+from .formats.polygons import RawField
 from .formats.rosy_rawfield import (
     rawfield_text,
     read_rawfield,

@@ -256,7 +256,8 @@ class BrushStroke:
             effect *= brush.strength * pressure
         arc_length = dabs[-1].arc_length
         if brush.effect == "smooth":
-            self._smooth(face, effect)
+            mean = self._system.neighbor_means(self.guides, face)
+            self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
             return
         is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * brush.radius]
         self._last_arc_length[face] = arc_length
@@ -279,11 +280,6 @@ class BrushStroke:
         target *= (1.0 if brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
         coverage = self._coverage[face]
         self._store(face, (1 - coverage) * self._base[face] + coverage * target)
-
-    def _smooth(self, face: np.ndarray, effect: np.ndarray) -> None:
-        """Move guides toward the mean of those around them."""
-        mean = self._system.neighbor_means(self.guides, face)
-        self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
 
     def _store(self, face: np.ndarray, guides: np.ndarray) -> None:
         guides[np.abs(guides) < LEAST_FIRMNESS] = 0

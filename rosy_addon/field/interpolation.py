@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import RosyError
 from .directional_field import closest_rosy, field_directions
-from .frames import dot
+from .frames import coordinates
 from .representation import face_frames, face_representation, from_representation
 from .rosy_field import RosyField
 from .surface import Surface
@@ -85,9 +85,7 @@ def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
 
 def _directions(surface: Surface, field: RosyField) -> np.ndarray:
     """(F, N) complex128 directions of a field in `face_frames`."""
-    x, y = face_frames(surface)
-    directions = field_directions(surface, field)
-    return dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+    return coordinates(field_directions(surface, field), *face_frames(surface))
 
 
 def _matched(first: np.ndarray, second: np.ndarray, family_count: int) -> np.ndarray:

@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from ..progress import progress, report
+from .blocks import concatenated_ranges
 
 #: Relative increase of the diagonal of a matrix that is singular, and smallest value on a diagonal,
 #: relative to the largest one.
@@ -102,11 +103,7 @@ class CSRMatrix:
 
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
         """(k,) intp: the entries of (m,) rows, row by row."""
-        count = np.diff(self.indptr)[rows]
-        stop = np.cumsum(count)
-        return np.arange(stop[-1] if len(stop) else 0) + np.repeat(
-            self.indptr[:-1][rows] - stop + count, count
-        )
+        return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
         """Return the (m, n) matrix of (m,) rows."""
@@ -186,9 +183,7 @@ def _product_terms(
     first = b.indptr.take(inner)
     count = b.indptr.take(inner + 1) - first
     entry = np.repeat(np.arange(len(inner)), count)
-    first -= np.cumsum(count) - count
-    source = first.take(entry)
-    source += np.arange(len(entry))
+    source = concatenated_ranges(first, count)
     value = a.data[block].take(entry)
     value *= b.data.take(source)
     return a.row_indices[block].take(entry), b.indices.take(source), value

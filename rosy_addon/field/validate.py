@@ -19,7 +19,7 @@ from .directional_field import (
     ratio_harmonics,
     ratios_from_harmonics,
 )
-from .frames import dot, normalize, tangent_frame
+from .frames import coordinates, dot, normalize, tangent_frame
 from .representation import (
     face_frames,
     from_representation,
@@ -163,8 +163,7 @@ def validated_directions(
 
     def are_rosys(rows: slice) -> bool:
         x, y = tangent_frame(normal[rows])
-        usable = usable_directions[rows]
-        return is_rosy(dot(usable, x[:, None]) + 1j * dot(usable, y[:, None]))
+        return is_rosy(coordinates(usable_directions[rows], x, y))
 
     report(0.1, LABEL)
     if all(map(are_rosys, row_blocks(count))):
@@ -197,7 +196,7 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
     """
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
-    w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+    w = coordinates(directions, x, y)
     with progress(0.0, 0.2):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
     face_x, face_y = face_frames(surface)
@@ -222,9 +221,7 @@ def _vertex_averages(
     the x axes of the frames of the faces.
     """
     corner_normal = normal[surface.corner_vertex]
-    rotation = corner_rotations(
-        surface.face_normal, face_x, surface.corner_face, corner_normal, LABEL
-    )
+    rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
 
     def average(values: np.ndarray, order: int) -> np.ndarray:
         corner_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))

@@ -34,7 +34,7 @@ from ..rosy_field import RosyField, check_degree
 from ..surface import Surface
 from ..validate import vertex_normals
 from .obj import read_obj
-from .raw_field import RawField
+from .polygons import RawField
 from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, format_rows, read_rows
 
 

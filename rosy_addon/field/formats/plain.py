@@ -19,7 +19,7 @@ from ...progress import progress
 from ..blocks import row_blocks
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
-from .raw_field import RawField
+from .polygons import RawField
 from .text_rows import ROWS_PER_BLOCK, format_blocks, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.

@@ -236,8 +236,7 @@ def array_field(
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]
         apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
-        with progress(0.0, 0.5, _LABEL):
-            tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
+        tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
@@ -277,7 +276,6 @@ def _tangential_on_faces(
     is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length
     if is_off.sum() <= MAX_OUTLIER_FRACTION * np.count_nonzero(length):
         return None
-    report(0.5, _LABEL)
     if domain == "face":
         return _tangential(vectors, surface.face_normal)
     vectors = vectors[surface.corner_vertex]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import progress, report
+from ..progress import progress
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .guided_system import (
     EXACT_FIRMNESS,
@@ -88,7 +88,6 @@ class Combing:
         self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
             self._z = self.system.solve(self._node_guides, self._z, tolerance)
-        report(0.95, "averaging the field on the faces")
         face_z = self.system.averages.face_sums(self._z, self.system.degree)
         self._set_face_z(face_z, np.arange(len(self.guides)))
         return self.representations

@@ -73,25 +73,12 @@ def average_over_fans(
     return mean[corner_fan]
 
 
-def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndarray:
-    """The angle between the two edges at each corner of the faces.
-
-    Parameters
-    ----------
-    surface : Surface
-    points : (V, 3) ndarray, optional
-        Vertex positions; those of the surface if not given.
-
-    Returns
-    -------
-    (C,) float64 ndarray
-        Radians, 0 to pi.
-    """
-    points = surface.vertices if points is None else points
+def corner_angles(surface: Surface) -> np.ndarray:
+    """(C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
-        positions, following = points[surface.corner_vertex[corners]], next_corners(starts)
-        to_next = positions[following] - positions
+        points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
+        to_next = points[following] - points
         to_previous = np.empty_like(to_next)
         to_previous[following] = -to_next
         angles[corners] = angle_between(to_next, to_previous)

@@ -229,7 +229,6 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     mean_length = max(float(length.mean()), 1e-300)
     density = min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
     noise_angle *= density
-    report(0.8, LABEL)
     bent = np.flatnonzero(angle >= WEAK_SHARE * crease_angle)
     least = np.maximum(density * MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
     bent = bent[angle_between(*normals[sides[:, bent]]) >= least]
@@ -240,7 +239,6 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     bent = bent[is_candidate]
     if not len(bent):
         return none
-    report(0.9, LABEL)
     ends, length, is_strong = ends[bent], length[bent], angle[bent] >= crease_angle
     chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     total = np.bincount(chain, length)[chain]

@@ -71,7 +71,7 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     label = "reading directions"
     report(0.0, label)
     x, y = face_frames(surface)
-    w = by_rows(coordinates, directions, x, y, label=label)
+    w = by_rows(coordinates, directions, x, y)
     within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
     with progress(0.3, 0.6):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=label)
@@ -153,7 +153,6 @@ def detect_families(surface: Surface, field: RosyField) -> RosyField:
     It becomes the number of lines if the stored members are on matching lines across at least
     `MIN_FAMILY_AGREEMENT` of the edges. Otherwise the field is returned unchanged.
     """
-    report(0.0, "matching directions")
     line_count = field_symmetry(field).line_count
     if line_count == 1:
         return field

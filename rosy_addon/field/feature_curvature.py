@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import progress
 from .connection import build_connection
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
@@ -80,7 +80,6 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
     with progress(0.6, 0.7, LABEL):
         mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = replace(surface, vertices=surface.vertices + noise)
-    report(0.7, LABEL)
     normal = noisy.face_normal
     x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
     with progress(0.7, 0.8, LABEL):

@@ -167,7 +167,6 @@ def field_from_raw(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
         apply_nonfinite_policy(values, source, "face", nonfinite)
-        report(0.2, "reading directions")
         return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE

@@ -12,7 +12,7 @@ import numpy as np
 from ..progress import progress, report
 from .creases import weighted_median
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
-from .guided_system import guided_or_smoothest
+from .guided_system import guided_field
 from .guides import guides_from_edges
 from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
@@ -93,7 +93,7 @@ def form(surface: Surface, degree: int) -> RosyField:
         with progress(0.5, 1.0):
             return smoothest_field(original, degree)
     with progress(0.5, 1.0):
-        return guided_or_smoothest(
+        return guided_field(
             surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
         )
 

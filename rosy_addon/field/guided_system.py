@@ -302,11 +302,11 @@ def guided_field(
     surface: Surface,
     degree: int,
     guides: np.ndarray,
-    weight: np.ndarray | float,
+    weight: np.ndarray | float | None = None,
     hard: np.ndarray | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
 ) -> RosyField:
-    """Compute the smooth field that follows guides.
+    """Compute the smooth field that follows guides, on components without a guide the smoothest field.
 
     Parameters
     ----------
@@ -315,9 +315,9 @@ def guided_field(
     guides : (F, 3) ndarray
         One member vector for each face, in object space; zero where there is no guide. Lengths
         matter: a guide of length 1/2 requests a field of magnitude 1/2.
-    weight : (F,) ndarray or float
+    weight : (F,) ndarray or float, optional
         Weight of the guide of each face, in units of 1 / area. The influence of a guide of weight w
-        falls off over a distance of about 1 / sqrt(w).
+        falls off over a distance of about 1 / sqrt(w). If not given, all guides are followed exactly.
     hard : (F,) bool ndarray, optional
         Faces on which the guide is followed exactly.
     tolerance : float
@@ -326,7 +326,7 @@ def guided_field(
     Returns
     -------
     RosyField
-        Of magnitude 1; zero on connected components without a guide and on faces without area.
+        Of magnitude 1; zero on faces without area.
 
     Raises
     ------
@@ -335,6 +335,8 @@ def guided_field(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
+    if weight is None:
+        weight, hard = 0.0, guides.any(axis=1)
     system = guided_system(surface, degree)
     target = system.to_representation(np.asarray(guides, dtype=np.float64))
     if not target.any():
@@ -342,12 +344,18 @@ def guided_field(
     weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
     is_hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
     node_guides = system.node_guides(target, weight, is_hard)
-    with progress(0.12, 0.95):
+    with progress(0.1, 0.75):
         z = system.solve(node_guides, tolerance=tolerance)
-    report(0.95, "averaging the field on the faces")
+    report(0.75, "averaging the field on the faces")
     face_z = unit_representations(system.averages.face_sums(z, degree))
     face_z[is_hard] = target[is_hard] / np.abs(target[is_hard])
-    return RosyField(degree, system.to_vectors(face_z))
+    vectors = system.to_vectors(face_z)
+    del system  # it is large
+    unguided = (face_z == 0) & surface.face_normal.any(axis=1)
+    if unguided.any():
+        with progress(0.8, 1.0):
+            vectors[unguided] = smoothest_field(surface, degree).vectors[unguided]
+    return RosyField(degree, vectors)
 
 
 def unit_representations(z: np.ndarray) -> np.ndarray:
@@ -355,27 +363,3 @@ def unit_representations(z: np.ndarray) -> np.ndarray:
     modulus = np.abs(z)
     is_defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
     return np.divide(z, modulus, out=np.zeros_like(z), where=is_defined)
-
-
-def guided_or_smoothest(
-    surface: Surface,
-    degree: int,
-    guides: np.ndarray,
-    weight: np.ndarray | float | None = None,
-    hard: np.ndarray | None = None,
-    tolerance: float = RELATIVE_TOLERANCE,
-) -> RosyField:
-    """A guided field, with the smoothest field on connected components without a guide.
-
-    Without `weight`, all guides are followed exactly. The parameters are those of `guided_field`.
-    """
-    if weight is None:
-        weight, hard = 0.0, guides.any(axis=1)
-    with progress(0.0, 0.8):
-        field = guided_field(surface, degree, guides, weight, hard, tolerance)
-    unguided = ~field.vectors.any(axis=1) & surface.face_normal.any(axis=1)
-    if not unguided.any():
-        return field
-    with progress(0.8, 1.0):
-        smoothest = smoothest_field(surface, degree)
-    return RosyField(degree, np.where(unguided[:, None], smoothest.vectors, field.vectors))

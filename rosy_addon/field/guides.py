@@ -152,17 +152,14 @@ def guides_from_axes(
     (F, 3) float64 ndarray
         Unit, or zero.
     """
-    face, directions = [], []
+    face = []
     closest_face = surface.triangle_face[closest_triangles(surface, position)[0]]
-    for point, direction, max_distance, closest in zip(
-        position, axis, radius, closest_face, strict=True
-    ):
+    for point, max_distance, closest in zip(position, radius, closest_face, strict=True):
         offset = surface.face_center - point
         chosen = np.flatnonzero(dot(offset, offset) <= max_distance**2)
-        chosen = chosen if len(chosen) else np.array([closest])
-        face.append(chosen)
-        directions.append(np.tile(direction, (len(chosen), 1)))
-    return average_guides(surface, np.concatenate(face), np.concatenate(directions), degree)
+        face.append(chosen if len(chosen) else np.array([closest]))
+    directions = np.repeat(axis, list(map(len, face)), axis=0)
+    return average_guides(surface, np.concatenate(face), directions, degree)
 
 
 def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:

@@ -103,10 +103,7 @@ def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularit
     """
     parts = []
     if count_singularities:
-        count = 0
-        for surface, field in fields:
-            vertices, _ = find_singularities(surface, field)
-            count += len(vertices)
+        count = sum(len(find_singularities(*pair)[0]) for pair in fields)
         parts.append(counted(count, "singularity", "singularities"))
     undefined = sum(int((~field.vectors.any(axis=1)).sum()) for _, field in fields)
     if undefined:

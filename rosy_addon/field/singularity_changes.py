@@ -74,7 +74,6 @@ def move_index(
     ends = np.array([source, target])
     is_vertex = ends != OUTSIDE
     change = np.array([-index, index])[is_vertex]
-    report(0.2, "moving a singularity")
     reach = max(reach, _distance(surface, ends), MIN_REACH * surface.extent)
     with progress(0.2, 1.0):
         return change_singularities(surface, field, ends[is_vertex], change, reach)

@@ -87,7 +87,7 @@ class CornerDirections:
         return self.degree // 2 if self.has_opposites else self.degree
 
     def phase_changes(self, spacing: float) -> np.ndarray:
-        """(T, 3, M) changes of the phase from each corner to the next, for lines along the field."""
+        """(3 T, M) changes of the phase from each corner to the next, for lines along the field."""
         edge = np.roll(self.offset, -1, axis=1) - self.offset
         middle = 0.5 * (self.angle + np.roll(self.angle, -1, axis=1))
         result = np.empty((*edge.shape, self.family_count))
@@ -99,7 +99,7 @@ class CornerDirections:
                 direction = direction * ends / np.maximum(np.abs(ends), 1e-12)
             result[:, :, family] = (edge * direction.conj()).imag / spacing
         result[~self.defined] = 0
-        return result
+        return result.reshape(-1, self.family_count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,12 +191,16 @@ def stripe_pattern(
     graph = _graph(covering, gluing, change, directions)
     with progress(0.4, 0.9):
         z = _smoothest(graph)
+    change, node, conjugated = (
+        values.reshape(-1, 3, directions.family_count)
+        for values in (change, covering.node, covering.conjugated)
+    )
     phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
     index = np.empty(phase.shape[:2], dtype=np.float32)
     for block in row_blocks(len(phase)):
         report(0.95, LABEL)
-        corner = z[covering.node[block]]
-        np.conjugate(corner, out=corner, where=covering.conjugated[block])
+        corner = z[node[block]]
+        np.conjugate(corner, out=corner, where=conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
         # From corner to corner, the phase changes by nearly as much as it should.
         step = np.roll(corner_phase, -1, axis=1) - corner_phase
@@ -250,18 +254,17 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
 def _shared_changes(
     change: np.ndarray, gluing: _Gluing, directions: CornerDirections
 ) -> np.ndarray:
-    """(T, 3, M) changes of phases that are exactly opposite in the two triangles of an edge."""
+    """(3 T, M) changes of phases that are exactly opposite in the two triangles of an edge."""
     families = directions.family_count
-    flat = change.reshape(-1, families)
-    result = flat.copy()
+    result = change.copy()
     glued = np.flatnonzero(gluing.twin >= 0)
     twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
         direction = (family + shift) % directions.degree
-        neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
+        neighbor = change.reshape(-1).take(twin * np.intp(families) + direction % families)
         np.negative(neighbor, out=neighbor, where=direction < families)
-        result[glued, family] = 0.5 * (flat[glued, family] + neighbor)
-    return result.reshape(change.shape)
+        result[glued, family] = 0.5 * (change[glued, family] + neighbor)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,12 +273,12 @@ class _Covering:
 
     Attributes
     ----------
-    node : (T, 3, M) int32 ndarray
+    node : (3 T, M) int32 ndarray
         Node of each corner and family.
-    conjugated : (T, 3, M) bool ndarray
+    conjugated : (3 T, M) bool ndarray
         Whether the family has the conjugate of the value of the node.
     node_count : int
-    is_singular : (T, 3) bool ndarray
+    is_singular : (3 T,) bool ndarray
         Whether the vertex is singular. Its corners are separate nodes, because around it, a family
         comes back as another one.
     """
@@ -308,13 +311,7 @@ def _covering(
         direction = (family + shift) % degree
         node[:, family] = number * families + direction % families
         conjugated[:, family] = direction >= families
-    shape = (-1, 3, families)
-    return _Covering(
-        node.reshape(shape),
-        conjugated.reshape(shape),
-        int(np.count_nonzero(is_used)) * families,
-        is_singular.reshape(-1, 3),
-    )
+    return _Covering(node, conjugated, int(np.count_nonzero(is_used)) * families, is_singular)
 
 
 def _edge_weights(directions: CornerDirections) -> np.ndarray:
@@ -375,23 +372,17 @@ def _graph(
     has_twin = gluing.twin >= 0
     weight = weight + np.where(has_twin, weight[gluing.twin], 0)
     # Each edge once. At singular vertices, both triangles have nodes of their own.
-    singular = covering.is_singular.reshape(-1)
-    cut = singular | singular[gluing.next_corner]
+    cut = covering.is_singular | covering.is_singular[gluing.next_corner]
     tail = np.flatnonzero(~has_twin | (corner < gluing.twin) | cut)
     head = gluing.next_corner[tail]
-    families = directions.family_count
-    node, conjugated = (
-        covering.node.reshape(-1, families),
-        covering.conjugated.reshape(-1, families),
-    )
-    tail_flipped, head_flipped = conjugated[tail], conjugated[head]
-    turn = change.reshape(-1, families)[tail]
+    tail_flipped, head_flipped = covering.conjugated[tail], covering.conjugated[head]
+    turn = change[tail]
     np.negative(turn, out=turn, where=head_flipped)
     value = np.exp((2j * np.pi) * turn)
     value *= weight[tail, None]
     flips = tail_flipped != head_flipped
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
-    tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
+    tail_node, head_node = covering.node[tail].reshape(-1), covering.node[head].reshape(-1)
     return _graph_of_entries(
         covering.node_count,
         np.concatenate([head_node, tail_node]),

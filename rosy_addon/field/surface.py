@@ -11,6 +11,7 @@ import numpy as np
 from ..cache import content_hash
 from ..errors import RosyError, counted
 from ..progress import progress, report
+from .blocks import row_blocks
 from .frames import dot, normalize
 from .triangulate import triangulate
 
@@ -134,14 +135,12 @@ class Surface:
     @cached_property
     def fans_share_normals(self) -> bool:
         """Whether all corner normals equal that of their fan; custom normals may differ."""
-        for start in range(0, len(self.corner_fan), BLOCK_ELEMENTS):
-            block = slice(start, start + BLOCK_ELEMENTS)
-            difference = self.corner_normal[block] - self.fan_normal.take(
-                self.corner_fan[block], axis=0
-            )
-            if np.abs(difference).max() > NORMAL_TOLERANCE:
-                return False
-        return True
+        normals = self.fan_normal
+        return all(
+            np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()
+            <= NORMAL_TOLERANCE
+            for block in row_blocks(len(self.corner_fan), BLOCK_ELEMENTS)
+        )
 
     @cached_property
     def face_normal(self) -> np.ndarray:

@@ -97,8 +97,7 @@ def turning_angles(
             changed = _least_angles_near(
                 triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
             )
-        if changed is None:
-            with progress(start, stop):
+            if changed is None:
                 changed = triangles.graph.conductance * least_angles(
                     triangles.graph, degree, required, loops, present_between
                 )

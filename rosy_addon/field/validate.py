@@ -155,7 +155,8 @@ def validated_directions(
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
     domain = _checked_domain(surface, count, domain, source)
-    unusable = ~has_finite_square(directions).all(axis=(1, 2))
+    with np.errstate(invalid="ignore"):
+        unusable = ~(np.abs(directions) < MAX_COMPONENT).all(axis=(1, 2))
     usable_directions = np.where(unusable[:, None, None], 0.0, directions)
     source_directions = usable_directions if domain == "face" else None
     directions[unusable] = np.nan
@@ -366,9 +367,3 @@ def as_float64(values: np.ndarray) -> np.ndarray:
     """Return a copy of numbers as float64, without a warning for signalling NaN."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)
-
-
-def has_finite_square(values: np.ndarray) -> np.ndarray:
-    """Whether numbers and their squares are finite, element by element."""
-    with np.errstate(invalid="ignore"):
-        return np.abs(values) < MAX_COMPONENT

@@ -254,11 +254,13 @@ def _binary_elements(
                 layout.append((prop.name, byte_order + prop.type, first_row[prop.name][0].shape))
         dtype = np.dtype(layout)
         end, count = offset + dtype.itemsize * element.count, element.count
-        has_lists = any(prop.count_type is not None for prop in element.properties)
-        if end > len(data) and not has_lists:
+        lists = [prop.name for prop in element.properties if prop.count_type is not None]
+        if end > len(data) and not lists:
             raise _truncated(path, element, (len(data) - offset) // dtype.itemsize)
         table = np.frombuffer(data, dtype, count, offset) if end <= len(data) else None
-        if table is not None and _have_equal_lists(table, element):
+        if table is not None and all(
+            (table[f"{name} count"] == table[name].shape[1]).all() for name in lists
+        ):
             columns[element.name] = {
                 prop.name: table[prop.name]
                 if prop.count_type is None
@@ -271,15 +273,6 @@ def _binary_elements(
                 path, data, offset, byte_order, element, count
             )
     return columns
-
-
-def _have_equal_lists(table: np.ndarray, element: _Element) -> bool:
-    """Whether the lists of all rows are as long as the layout of the table says."""
-    return all(
-        (table[f"{prop.name} count"] == table[prop.name].shape[1]).all()
-        for prop in element.properties
-        if prop.count_type is not None
-    )
 
 
 def _read_rows(

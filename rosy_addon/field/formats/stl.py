@@ -76,9 +76,9 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     """(3 T, 3) float32 corners of the triangles of a binary file."""
     available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
-    if len(data) < _HEADER_BYTES or available < count:
-        if len(data) < _HEADER_BYTES:
-            raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
+    if len(data) < _HEADER_BYTES:
+        raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
+    if available < count:
         raise RosyError(
             f"{path}: declares {counted(count, 'triangle')}, but ends after {available}"
         )

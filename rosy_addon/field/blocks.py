@@ -59,6 +59,13 @@ def by_rows(
     return np.concatenate(parts)
 
 
+def mask(count: int, index: np.ndarray) -> np.ndarray:
+    """(count,) bool: True at the indices."""
+    result = np.zeros(count, dtype=bool)
+    result[index] = True
+    return result
+
+
 def neighbors_of_nodes(
     node_count: int, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -62,7 +62,6 @@ def cheapest_singularities(
         If a vertex has no index (at a border, or not in the mesh), or no face has an area.
     """
     degree = check_degree(degree)
-    vertex, index = np.asarray(vertex, dtype=np.int64), np.asarray(index, dtype=np.int64)
     x, y = face_frames(surface)
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")

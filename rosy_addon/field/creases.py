@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..progress import progress, report
+from .blocks import mask
 from .frames import angle_between, dot, normalize
 from .surface import Edges, Surface, build_edges, connected_components, face_area_vectors
 
@@ -259,8 +260,7 @@ def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.nd
 
 def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
     """(F,) bool: the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
-    is_near = np.zeros(len(surface.vertices), dtype=bool)
-    is_near[ends] = True
+    is_near = mask(len(surface.vertices), ends)
     for _ in range(FILTER_RINGS):
         faces = np.logical_or.reduceat(is_near[surface.corner_vertex], surface.face_start[:-1])
         is_near[surface.corner_vertex[faces[surface.corner_face]]] = True

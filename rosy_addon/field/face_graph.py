@@ -17,7 +17,7 @@ import numpy as np
 
 from ..progress import report
 from .analysis import edge_lengths
-from .blocks import concatenated_ranges, neighbors_of_nodes
+from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .frames import dot
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
@@ -122,8 +122,7 @@ def face_graph(
         conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
     )
     corner_node = connected_corners(a, b, following)
-    continues = np.zeros(len(following), dtype=bool)
-    continues[halfedges.ravel()] = True
+    continues = mask(len(following), halfedges)
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
@@ -204,8 +203,7 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     roots = np.unique(component, return_index=True)[1]
     parent, parent_edge = np.arange(node_count), np.full(node_count, -1)
     parent_sign = np.zeros(node_count)
-    is_reached = np.zeros(node_count, dtype=bool)
-    is_reached[roots] = True
+    is_reached = mask(node_count, roots)
     front, done = roots, 0
     while len(front):
         done += len(front)
@@ -218,8 +216,7 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
         is_reached[front] = True
         parent_edge[front], parent_sign[front] = source, sign[entry]
         parent[front] = np.where(sign[entry] > 0, first[source], second[source])
-    has_edge = np.zeros(len(first), dtype=bool)
-    has_edge[parent_edge[parent_edge >= 0]] = True
+    has_edge = mask(len(first), parent_edge[parent_edge >= 0])
     return SpanningForest(parent, parent_edge, parent_sign, has_edge)
 
 

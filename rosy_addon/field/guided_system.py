@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import progress, report
+from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
 from .connection import build_connection, laplacian
 from .representation import (
@@ -217,21 +218,18 @@ class GuidedSystem:
 
     def _corners_of_faces(self, face: np.ndarray) -> np.ndarray:
         """(k,) intp: the corners of the triangles of (m,) faces, in ascending order."""
-        is_chosen = np.zeros(self.surface.face_count, dtype=bool)
-        is_chosen[face] = True
+        is_chosen = mask(self.surface.face_count, face)
         return np.flatnonzero(is_chosen[self.averages.corner_face])
 
     def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
         """(k,) intp: the nodes of (m,) faces, in ascending order."""
         connection = self.averages.connection
-        is_node = np.zeros(connection.node_count, dtype=bool)
-        is_node[connection.corner_node[self._corners_of_faces(face)]] = True
-        return np.flatnonzero(is_node)
+        node = connection.corner_node[self._corners_of_faces(face)]
+        return np.flatnonzero(mask(connection.node_count, node))
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
         """(k,) intp: the corners of triangles at (m,) nodes, in ascending order."""
-        is_chosen = np.zeros(len(self.laplacian), dtype=bool)
-        is_chosen[node] = True
+        is_chosen = mask(len(self.laplacian), node)
         return np.flatnonzero(is_chosen[self.averages.connection.corner_node])
 
     def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
@@ -247,8 +245,7 @@ class GuidedSystem:
         (k,) intp ndarray
             In ascending order.
         """
-        is_near = np.zeros(len(self.laplacian), dtype=bool)
-        is_near[node] = True
+        is_near = mask(len(self.laplacian), node)
         total, ring = len(node), node
         while len(ring) and total < count:
             neighbor = self.laplacian.indices[self.laplacian.entries_of_rows(ring)]

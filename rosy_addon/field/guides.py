@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import RosyError
+from .blocks import mask
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
@@ -73,8 +74,7 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    is_feature = np.ones(len(edges.ends), dtype=bool)
-    is_feature[edges.interior] = False
+    is_feature = ~mask(len(edges.ends), edges.interior)
     normal = surface.face_normal
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
     # Faces without area have no normal, so their edges have no angle.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import counted
 from ..progress import progress, report
+from .blocks import mask
 from .frames import dot
 from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
@@ -71,10 +72,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     angle_sum = angle_sum + angle_defect
     index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
 
-    has_index = np.zeros(count, dtype=bool)
-    has_index[corner_vertex] = True
-    not_interior = np.ones(len(edges.face_count), dtype=bool)
-    not_interior[edges.interior] = False
+    has_index = mask(count, corner_vertex)
+    not_interior = ~mask(len(edges.face_count), edges.interior)
     has_index[edges.ends[not_interior].ravel()] = False
     has_index[corner_vertex[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(has_index & (index != 0)).astype(np.int32)

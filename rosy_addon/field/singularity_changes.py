@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..progress import progress, report
-from .blocks import concatenated_ranges, neighbors_of_nodes
+from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
@@ -131,12 +131,10 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """(P,) bool: which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
-    is_near = np.zeros(len(surface.vertices), dtype=bool)
-    is_near[vertices] = True
+    is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
     while not is_near[pairs].any():
-        touches = np.zeros(surface.face_count, dtype=bool)
-        touches[corner_face[is_near[corner_vertex]]] = True
+        touches = mask(surface.face_count, corner_face[is_near[corner_vertex]])
         before = int(is_near.sum())
         is_near[corner_vertex[touches[corner_face]]] = True
         if int(is_near.sum()) == before:

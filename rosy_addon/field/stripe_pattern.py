@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..progress import progress, report
-from .blocks import row_blocks
+from .blocks import mask, row_blocks
 from .connection import sums_in_umbrellas, umbrella_order
 from .representation import unit_complex
 from .surface import build_edges, next_corners, sorted_with_order
@@ -302,8 +302,7 @@ def _covering(
     is_singular = (closes & ((gluing.shift + shift[last]) % degree != 0))[start]
     fan = np.where(is_singular, corner, start)
     shift = np.where(is_singular, 0, shift % degree)
-    is_used = np.zeros(len(corner), dtype=bool)
-    is_used[fan] = True
+    is_used = mask(len(corner), fan)
     number = (np.cumsum(is_used) - 1)[fan]
     node = np.empty((len(corner), families), dtype=np.int32)
     conjugated = np.empty(node.shape, dtype=bool)

@@ -11,7 +11,7 @@ import numpy as np
 from ..cache import content_hash
 from ..errors import RosyError, counted
 from ..progress import progress, report
-from .blocks import row_blocks
+from .blocks import mask, row_blocks
 from .frames import dot, normalize
 from .triangulate import triangulate
 
@@ -292,9 +292,7 @@ def box_corners(points: np.ndarray) -> np.ndarray:
 
 def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
     """(n,) intp: the vertices that a corner refers to, in ascending order."""
-    used = np.zeros(vertex_count, dtype=bool)
-    used[corner_vertex] = True
-    return np.flatnonzero(used)
+    return np.flatnonzero(mask(vertex_count, corner_vertex))
 
 
 def sum_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
@@ -427,8 +425,8 @@ def count_inconsistent_edges(surface: Surface) -> int:
     """
     edges = build_edges(surface.corner_vertex, surface.face_start)
     degenerate = ~surface.face_normal.any(axis=1)
-    borders_degenerate = np.zeros(len(edges.face_count), dtype=bool)
-    borders_degenerate[edges.corner_edge[degenerate[surface.corner_face]]] = True
+    degenerate_edge = edges.corner_edge[degenerate[surface.corner_face]]
+    borders_degenerate = mask(len(edges.face_count), degenerate_edge)
     inconsistent = (edges.face_count == 2) & ~borders_degenerate
     inconsistent[edges.interior] = False
     return int(np.count_nonzero(inconsistent))

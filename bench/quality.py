@@ -26,7 +26,7 @@ from rosy_addon.compositor.pixel_field import (
     planar_pixel_field,
     surface_pixel_field,
 )
-from rosy_addon.field.field_io import read_field
+from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
@@ -209,7 +209,7 @@ def _on_bunny(data: Path) -> list[PixelField]:
 def _on_vase(data: Path, degree: int) -> list[PixelField]:
     surface = read_mesh(data / "meshes" / "vase.off")
     return _pixel_fields_of(
-        surface, read_field(data / "fields" / f"vase-{degree}.rawfield", surface)
+        surface, load_field(data / "fields" / f"vase-{degree}.rawfield", surface).field
     )
 
 

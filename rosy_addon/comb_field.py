@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from .cache import BAKE_CACHE
-from .field.combing import Combing, settle, start_combing
+from .field.combing import Combing, start_combing
 from .field.guide_brush import BrushStroke, GuideBrush
 from .field.guided_system import guided_system
 from .field.rosy_field import RosyField
@@ -73,7 +73,7 @@ class CombStroke:
 
     def settle(self) -> Steps[None]:
         """Solve for the whole field."""
-        self._combing.representations = yield Call(settle, (self._combing,))
+        self._combing.representations = yield Call(Combing.settle, (self._combing,))
 
     def store(self) -> RosyField:
         """Store the field and its guides. Return the field."""

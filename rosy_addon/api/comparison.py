@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import RosyError
-from ..field.analysis import format_degrees
-from ..field.singularity_matching import (
+from ..field.analysis import (
     DEFAULT_REACH,
     SingularityMatching,
+    format_degrees,
     match_on_surface,
 )
 from .field import Difference, Field

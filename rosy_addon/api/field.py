@@ -19,7 +19,7 @@ from ..field.directional_field import field_directions, tensor_field
 from ..field.field_io import load_field, write_field
 from ..field.rosy_field import RosyField, check_degree
 from ..field.singularities import find_singularities
-from ..field.singularity_moves import move_index
+from ..field.singularity_changes import move_index
 from ..field.validate import apply_nonfinite_policy, validated_directions, validated_field
 from .surface import Surface
 

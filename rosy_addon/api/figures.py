@@ -21,8 +21,7 @@ from ..compositor.color_values import value_ends, value_ranges
 from ..compositor.look import Look, colors_magnitude, colors_values
 from ..compositor.look_units import scaled_look
 from ..errors import RosyError, counted
-from ..field.analysis import format_degrees
-from ..field.singularity_matching import DEFAULT_REACH
+from ..field.analysis import DEFAULT_REACH, format_degrees
 from ..file_io import write_bytes
 from ..image_io.png import to_srgb_uint8
 from ..projection.camera import Camera, orbit_basis, orbit_camera

@@ -10,10 +10,10 @@ from .. import api
 from ..api.figures import LINES, check_figure_path, load_drawing
 from ..api.pictures import picture_look
 from ..errors import RosyError
+from ..field.analysis import DEFAULT_REACH
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from ..field.singularity_matching import DEFAULT_REACH
 from .extras import Extras
 from .look import add_look_options, requested_preset, requested_settings
 from .mesh_field import printed_warnings, read_field

@@ -1,4 +1,4 @@
-"""Measure a field: its Dirichlet energy, and its angular difference from another field."""
+"""Measure a field: its Dirichlet energy, and its difference from another field."""
 
 from __future__ import annotations
 
@@ -7,16 +7,26 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import RosyError
+from ..progress import progress, report
+from .blocks import row_blocks
 from .directional_field import field_directions
-from .frames import dot, normalize
+from .frames import coordinates, dot, normalize
 from .representation import (
     face_frames,
     face_representation,
     matching_angles,
     to_representation,
+    unit_complex,
 )
 from .rosy_field import RosyField
+from .singularities import find_singularities, first_pairs
 from .surface import Surface, build_edges
+
+#: Singularities match if they are nearer than this fraction of the longest side of the mesh.
+DEFAULT_REACH = 0.05
+
+#: Distances that are computed at once.
+DISTANCES_PER_BLOCK = 2_000_000
 
 #: Part of the area of which `ErrorStatistics.p95` is the largest error.
 PERCENTILE = 0.95
@@ -46,6 +56,44 @@ class ErrorStatistics(NamedTuple):
     compared: float
 
 
+class SingularityMatching(NamedTuple):
+    """M pairs of singularities of two fields that correspond to each other.
+
+    Attributes
+    ----------
+    first, second : (M,) intp ndarray
+        Which singularities of each field, as indices into its list.
+    distance : (M,) float64 ndarray
+        Between the two, in Blender units.
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    distance: np.ndarray
+
+
+class FieldComparison(NamedTuple):
+    """How two fields differ.
+
+    Attributes
+    ----------
+    angles : (F,) float64 ndarray
+        Of `angle_errors`, in radians.
+    statistics : ErrorStatistics
+        Of the angles.
+    singularity_count, other_count : int
+        Singularities of each field.
+    matched_count : int
+        Those that have the same index in both, at nearly the same place.
+    """
+
+    angles: np.ndarray
+    statistics: ErrorStatistics
+    singularity_count: int
+    other_count: int
+    matched_count: int
+
+
 def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     """Compute the Dirichlet energy of the representation of a field, normalized to modulus 1.
 
@@ -59,15 +107,13 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     the mesh. Faces where the field is undefined are ignored.
     """
     x, y = face_frames(surface)
-    z = to_representation(field.vectors, x, y, field.degree)
-    modulus = np.abs(z)
-    z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
+    z = unit_complex(to_representation(field.vectors, x, y, field.degree))
     edges = build_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     face_a, face_b = surface.corner_face[a], surface.corner_face[b]
     angle = field.degree * matching_angles(surface, x, y, z, field.degree, a, b)
     length, center_distance = edge_lengths(surface, a, b)
-    defined = (modulus[face_a] > 0) & (modulus[face_b] > 0) & (center_distance > 0)
+    defined = (z[face_a] != 0) & (z[face_b] != 0) & (center_distance > 0)
     weight = np.divide(length, center_distance, out=np.zeros_like(length), where=defined)
     return float((weight * 2 * (1 - np.cos(angle)))[defined].sum())
 
@@ -136,11 +182,8 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
 
 def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
     """(F,) mean angles between the directions of two fields, for the best of their N matchings."""
-    x, y = face_frames(surface)
-    z, other_z = (
-        dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
-        for directions in (field_directions(surface, field), field_directions(surface, other))
-    )
+    frames = face_frames(surface)
+    z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
     for shift in range(field.degree):
         angles = np.abs(np.angle(z * np.roll(other_z, shift, axis=1).conj()))
@@ -184,3 +227,59 @@ def _triangle_areas(surface: Surface) -> np.ndarray:
     corner = surface.vertices[surface.triangle_vertex]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return np.sqrt(dot(cross, cross)) / 2
+
+
+def match_on_surface(
+    surface: Surface,
+    singularities: tuple[np.ndarray, np.ndarray],
+    other: tuple[np.ndarray, np.ndarray],
+    reach: float = DEFAULT_REACH,
+) -> SingularityMatching:
+    """Match singularities of the same index, the nearest pairs first, each at most once.
+
+    Parameters
+    ----------
+    surface : Surface
+    singularities, other : (vertex, index)
+        Of two fields of the same degree, as `singularities.find_singularities` returns them.
+    reach : float
+        Largest distance of a pair, a straight line, as a fraction of the longest side of the mesh.
+
+    Returns
+    -------
+    SingularityMatching
+        In the order of `first`.
+    """
+    (vertex, index), (other_vertex, other_index) = singularities, other
+    points, other_points = surface.vertices[vertex], surface.vertices[other_vertex]
+    reach *= surface.extent
+    found = []
+    rows = max(DISTANCES_PER_BLOCK // max(len(other_index), 1), 1)
+    for block in row_blocks(len(index), rows):
+        report(block.start / max(len(index), 1), "matching singularities")
+        squared = np.zeros((len(index[block]), len(other_index)))
+        for coordinate in range(3):
+            squared += (points[block, None, coordinate] - other_points[None, :, coordinate]) ** 2
+        near = (squared <= reach**2) & (index[block, None] == other_index)
+        first, second = np.nonzero(near)
+        found.append((first + block.start, second, np.sqrt(squared[first, second])))
+    first, second, distance = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.lexsort((second, first, distance))
+    # Numbers of the singularities of both fields.
+    chosen = order[first_pairs(np.stack([first, len(index) + second], axis=1)[order])]
+    chosen = chosen[np.argsort(first[chosen])]
+    return SingularityMatching(first[chosen], second[chosen], distance[chosen])
+
+
+def compare_fields(surface: Surface, field: RosyField, other: RosyField) -> FieldComparison:
+    """Compare two fields of the same degree on a surface."""
+    report(0.0, "comparing the fields")
+    angles = angle_errors(surface, field, other)
+    with progress(0.2, 0.5):
+        own = find_singularities(surface, field)
+    with progress(0.5, 0.8):
+        others = find_singularities(surface, other)
+    with progress(0.8, 1.0):
+        matching = match_on_surface(surface, own, others)
+    statistics = error_statistics(surface, angles)
+    return FieldComparison(angles, statistics, len(own[0]), len(others[0]), len(matching.distance))

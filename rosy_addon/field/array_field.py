@@ -11,15 +11,14 @@ import numpy as np
 from ..errors import RosyError
 from ..progress import progress, report
 from .field_io import field_from_raw
-from .formats.raw_field import RawField
+from .formats.polygons import RawField
 from .frames import dot
 from .representation import face_frames, from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
 from .surface import Surface, mean_per_face
 from .validate import (
-    FACE_TOLERANCE_DEG,
     MAX_OUTLIER_FRACTION,
-    VERTEX_TOLERANCE_DEG,
+    TOLERANCE_DEG,
     apply_nonfinite_policy,
     as_float64,
     tangent_normals,
@@ -237,8 +236,7 @@ def array_field(
     elif not raw.tensors and raw.values.shape[1] == 1:
         vectors = raw.values[:, 0]
         apply_nonfinite_policy(vectors, source, raw.domain, nonfinite)
-        with progress(0.0, 0.5, _LABEL):
-            tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
+        tangential = _tangential_on_faces(surface, vectors, raw.domain, degree)
         if tangential is not None:
             raw = replace(raw, values=tangential[:, None], domain="face")
     with progress(0.5, 1.0):
@@ -274,12 +272,10 @@ def _tangential_on_faces(
 ) -> np.ndarray | None:
     """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
     normal = tangent_normals(surface, domain)
-    tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
     length = np.sqrt(dot(vectors, vectors))
-    is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(tolerance_deg)) * length
+    is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length
     if is_off.sum() <= MAX_OUTLIER_FRACTION * np.count_nonzero(length):
         return None
-    report(0.5, _LABEL)
     if domain == "face":
         return _tangential(vectors, surface.face_normal)
     vectors = vectors[surface.corner_vertex]

@@ -103,9 +103,8 @@ def bisect(
     leaf_weights = np.broadcast_to(np.eye(3, dtype=np.float32), (root_count, 3, 3)).copy()
     leaf_root = np.arange(root_count, dtype=np.int32)
     leaf_node = leaf_root.copy()
-    first_children = [np.full(root_count, -1, dtype=np.int32)]
-    split_edges = [np.zeros(root_count, dtype=np.int8)]
-    node_count = root_count
+    first_child = np.full(root_count, -1, dtype=np.int32)
+    split_edge = np.zeros(root_count, dtype=np.int8)
     while True:
         lengths = _edge_lengths(vertices, leaf_vertex)
         long = lengths > max_length
@@ -123,56 +122,48 @@ def bisect(
         midpoint[long] = len(vertices) + inverse.reshape(-1)
         low, high = np.divmod(unique_key, len(vertices))
         vertices = np.concatenate([vertices, 0.5 * (vertices[low] + vertices[high])])
-        while True:
-            parent = np.flatnonzero((midpoint >= 0).any(axis=1))
-            if not len(parent):
-                break
+        while len(parent := np.flatnonzero((midpoint >= 0).any(axis=1))):
             # The longest of the marked edges; halved edges are not marked.
             lengths = _edge_lengths(vertices, leaf_vertex[parent])
             edge = np.where(midpoint[parent] >= 0, lengths, -1.0).argmax(axis=1)
             order = (edge[:, None] + np.arange(3)) % 3
-            a, b, c = np.take_along_axis(leaf_vertex[parent], order, 1).T
+            corner = np.take_along_axis(leaf_vertex[parent], order, 1)
             mid, mid_bc, mid_ca = np.take_along_axis(midpoint[parent], order, 1).T
             none = np.full_like(mid, -1)
             weights = np.take_along_axis(leaf_weights[parent], order[:, :, None], 1)
-            mid_weights = 0.5 * (weights[:, 0] + weights[:, 1])
-            node = leaf_node[parent]
-            child = node_count + 2 * np.arange(len(parent), dtype=np.int32)
-            first_child, split_edge = first_children, split_edges
-            _set_nodes(first_child, node, child)
-            _set_nodes(split_edge, node, edge.astype(np.int8))
-            first_children.append(np.full(2 * len(parent), -1, dtype=np.int32))
-            split_edges.append(np.zeros(2 * len(parent), dtype=np.int8))
-            node_count += 2 * len(parent)
-            # The first child replaces its parent in the list of leaves, the second is appended.
-            leaf_vertex[parent] = np.stack([a, mid, c], axis=1)
-            midpoint[parent] = np.stack([none, none, mid_ca], axis=1)
-            leaf_weights[parent] = np.stack([weights[:, 0], mid_weights, weights[:, 2]], axis=1)
-            leaf_node[parent] = child
-            leaf_vertex = np.concatenate([leaf_vertex, np.stack([mid, b, c], axis=1)])
-            midpoint = np.concatenate([midpoint, np.stack([none, mid_bc, none], axis=1)])
-            second_weights = np.stack([mid_weights, weights[:, 1], weights[:, 2]], axis=1)
-            leaf_weights = np.concatenate([leaf_weights, second_weights])
-            leaf_root = np.concatenate([leaf_root, leaf_root[parent]])
-            leaf_node = np.concatenate([leaf_node, child + 1])
-    leaf = np.full(node_count, -1, dtype=np.int32)
+            children = len(first_child) + np.arange(2 * len(parent), dtype=np.int32)
+            first_child[leaf_node[parent]] = children[::2]
+            first_child = np.concatenate([first_child, np.full_like(children, -1)])
+            split_edge[leaf_node[parent]] = edge
+            split_edge = np.concatenate([split_edge, np.zeros(len(children), dtype=np.int8)])
+            leaf_node = _split(leaf_node, parent, children[::2], children[1::2])
+            leaf_root = _split(leaf_root, parent, leaf_root[parent], leaf_root[parent])
+            leaf_vertex = _split(leaf_vertex, parent, *_halves(corner, mid))
+            leaf_weights = _split(
+                leaf_weights, parent, *_halves(weights, 0.5 * (weights[:, 0] + weights[:, 1]))
+            )
+            first_midpoint = np.stack([none, none, mid_ca], axis=1)
+            second_midpoint = np.stack([none, mid_bc, none], axis=1)
+            midpoint = _split(midpoint, parent, first_midpoint, second_midpoint)
+    leaf = np.full(len(first_child), -1, dtype=np.int32)
     leaf[leaf_node] = np.arange(len(leaf_node), dtype=np.int32)
     return BisectionTree(
-        np.concatenate(first_children),
-        np.concatenate(split_edges),
-        leaf,
-        leaf_root,
-        leaf_vertex,
-        leaf_weights,
-        vertices,
+        first_child, split_edge, leaf, leaf_root, leaf_vertex, leaf_weights, vertices
     )
 
 
-def _set_nodes(parts: list[np.ndarray], node: np.ndarray, values: np.ndarray) -> None:
-    """Set values of nodes that are stored in consecutive parts, and join the parts."""
-    joined = np.concatenate(parts)
-    joined[node] = values
-    parts[:] = [joined]
+def _halves(corner: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values of (n, 3, ...) corners of both triangles, from those of the middle of the first edge."""
+    a, b, c = np.moveaxis(corner, 1, 0)
+    return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+
+
+def _split(
+    leaves: np.ndarray, parent: np.ndarray, first: np.ndarray, second: np.ndarray
+) -> np.ndarray:
+    """Replace parents in a list of leaves by their first children, and append the second ones."""
+    leaves[parent] = first
+    return np.concatenate([leaves, second])
 
 
 def _edge_lengths(vertices: np.ndarray, triangle_vertex: np.ndarray) -> np.ndarray:

@@ -59,6 +59,38 @@ def by_rows(
     return np.concatenate(parts)
 
 
+def mask(count: int, index: np.ndarray) -> np.ndarray:
+    """(count,) bool: True at the indices."""
+    result = np.zeros(count, dtype=bool)
+    result[index] = True
+    return result
+
+
+def neighbors_of_nodes(
+    node_count: int, first: np.ndarray, second: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sort the edges of a graph by their nodes.
+
+    Parameters
+    ----------
+    node_count : int
+    first, second : (m,) int ndarray
+        The nodes that each edge connects.
+
+    Returns
+    -------
+    start : (n + 1,) intp ndarray
+        The neighbors of node i are ``start[i] .. start[i + 1] - 1``.
+    neighbor : (2 m,) int ndarray
+    edge : (2 m,) intp ndarray
+        The edge to each neighbor, plus m if the neighbor is its first node.
+    """
+    ends, others = np.concatenate([first, second]), np.concatenate([second, first])
+    order = np.argsort(ends, kind="stable")
+    start = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=node_count))])
+    return start, others[order], order
+
+
 def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
     """Return the concatenation of the ranges ``first[i]`` to ``first[i] + count[i] - 1``, intp.
 

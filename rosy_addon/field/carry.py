@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from .frames import dot, normalize, tangent_frame
-from .representation import complex_bincount
+from .representation import complex_bincount, unit_complex
 from .surface import Surface, mean_per_face
 
 #: Largest sine of the angle between a vector and the plane of its face before the motion. Steeper
@@ -43,7 +41,7 @@ def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.nda
     rest_vertices = np.asarray(rest_vertices, dtype=np.float64)
     moved_corner = (rest_vertices != surface.vertices).any(axis=1)[surface.corner_vertex]
     moved = np.logical_or.reduceat(moved_corner, surface.face_start[:-1])
-    rest = replace(surface, vertices=rest_vertices, rest_vertices=None)
+    rest = surface.with_vertices(rest_vertices)
     old_frame, old_offset = _planar_corners(rest)
     new_frame, new_offset = _planar_corners(surface)
     covariance = complex_bincount(
@@ -93,7 +91,7 @@ def vectors_on_rest_shape(
     --------
     rosy_addon.projection.face_values : The transport.
     """
-    rest = replace(surface, vertices=rest_vertices, rest_vertices=None)
+    rest = surface.with_vertices(rest_vertices)
     (rest_x, rest_y), w = _planar_corners(rest)
     (x, y), u = _planar_corners(surface)
     face, count = surface.corner_face, surface.face_count
@@ -102,9 +100,7 @@ def vectors_on_rest_shape(
     squared_norm = np.bincount(face, np.abs(w) ** 2, count)
     ww, uw = (complex_bincount(face, product, count) for product in (w * w, u * w))
     rotation = squared_norm * complex_bincount(face, u * w.conj(), count) - ww.conj() * uw
-    modulus = np.abs(rotation)
-    rotation = np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
-    z = (dot(vectors, x) + 1j * dot(vectors, y)) * rotation.conj()
+    z = (dot(vectors, x) + 1j * dot(vectors, y)) * unit_complex(rotation).conj()
     return z.real[:, None] * rest_x + z.imag[:, None] * rest_y
 
 

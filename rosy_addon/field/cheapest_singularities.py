@@ -8,22 +8,20 @@ potential of the others and of the curvature. Those with opposite indices vanish
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from ..errors import RosyError
 from ..progress import progress, report
-from .conjugate_gradient import conjugate_gradient
+from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
 from .prescribed import index_at_nodes
-from .representation import face_frames, from_representation
+from .representation import face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
-from .sparse_multigrid import CSRMatrix, from_coo, hierarchy, w_cycle
+from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface, face_area_vectors
-from .turning_angles import least_angles, potential_matrix
+from .turning_angles import least_angles, potential_solver
 
 #: Largest number of steps to neighboring vertices.
 MAX_STEPS = 60
@@ -64,12 +62,10 @@ def cheapest_singularities(
         If a vertex has no index (at a border, or not in the mesh), or no face has an area.
     """
     degree = check_degree(degree)
-    vertex, index = np.asarray(vertex, dtype=np.int64), np.asarray(index, dtype=np.int64)
     x, y = face_frames(surface)
     if not x.any():
         raise RosyError(f"{surface.name}: no face has an area")
-    with progress(0.0, 0.1, LABEL):
-        graph = face_graph(surface, x, y)
+    graph = face_graph(surface, x, y)
     area = np.linalg.norm(
         face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start), axis=1
     )
@@ -81,9 +77,7 @@ def cheapest_singularities(
     matrix = _energy(graph, degree, angle, spectral_shift(mass) * mass)
     with progress(0.35, 0.6):
         z, _ = eigenproblem(matrix, mass, graph.component)
-    modulus = np.abs(z)
-    z = np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
-    field = RosyField(degree, from_representation(z, x, y, degree))
+    field = RosyField(degree, from_representation(unit_complex(z), x, y, degree))
     with progress(0.6, 0.65):
         found, found_index = find_singularities(surface, field)
     total = index_at_nodes(surface, graph, found, found_index)
@@ -111,47 +105,38 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
     """(n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
     if not added.any():
         return added
-    with progress(0.0, 0.05):
-        matrix = potential_matrix(graph)
-    with progress(0.05, 0.2):
-        levels = hierarchy(matrix)
+    with progress(0.0, 0.2):
+        potential_of = potential_solver(graph, TOLERANCE)
     unit = 2 * np.pi / degree
     neighbors = _Neighbors(graph)
-    best, least, share = added, np.inf, 1.0
-    potential = np.zeros(graph.node_count)
+    best, best_potential, least, share = added, None, np.inf, 1.0
     for step in range(MAX_STEPS):
         report(1 - 0.8 * 0.95**step, LABEL)
         charge = unit * (given + added) - graph.defect
-        solution = conjugate_gradient(
-            matrix, charge[graph.is_interior], TOLERANCE, partial(w_cycle, levels), LABEL
-        )
-        energy = float(charge[graph.is_interior] @ solution)
+        potential = potential_of(charge)
+        energy = float(charge[graph.is_interior] @ potential[graph.is_interior])
         # Those that are still at given singularities have to leave them, whatever it costs.
         if energy < least or (best[given != 0] != 0).any():
-            best, least = added, energy
-            potential = np.zeros(graph.node_count)
-            potential[graph.is_interior] = solution
+            best, best_potential, least = added, potential, energy
         else:
             share *= 0.5
             if share < MIN_SHARE:
                 break
-        added = neighbors.step(best, given, unit, potential, share)
+        added = neighbors.step(best, given, unit, best_potential, share)
         if np.array_equal(added, best):
             break
     return best
 
 
 class _Neighbors:
-    """The vertex nodes, and the interior ones next to each of them."""
+    """The vertex nodes, and those next to each of them."""
 
     def __init__(self, graph: FaceGraph) -> None:
-        ends = np.concatenate([graph.tail, graph.head])
-        others = np.concatenate([graph.head, graph.tail])
-        order = np.argsort(ends, kind="stable")
-        order = order[graph.is_interior[others[order]]]
-        self._neighbor = others[order]
-        self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[order]
-        self._start = np.searchsorted(ends[order], np.arange(graph.node_count + 1))
+        self._start, self._neighbor, edge = neighbors_of_nodes(
+            graph.node_count, graph.tail, graph.head
+        )
+        self._resistance = EDGE_RESISTANCE / np.tile(graph.conductance, 2)[edge]
+        self._is_interior = graph.is_interior
 
     def step(
         self,
@@ -170,7 +155,7 @@ class _Neighbors:
             change = 2 * charge * (potential[others] - potential[node])
             change += charge**2 * self._resistance[around]
             is_free = (given[others] == 0) & (added[others] * added[node] <= 0)
-            change[~is_free] = np.inf
+            change[~is_free | ~self._is_interior[others]] = np.inf
             least = float(change.min(initial=np.inf))
             must_leave = given[node] != 0
             if least < 0 or (must_leave and least < np.inf):
@@ -186,12 +171,8 @@ class _Neighbors:
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
     """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
-    count, weight = len(diagonal), 1 / graph.conductance
-    source, target = graph.source, graph.target
+    source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))
-    diagonal = diagonal + np.bincount(np.concatenate([source, target]), np.tile(weight, 2), count)
-    faces = np.arange(count)
-    row = np.concatenate([target, source, faces]).astype(np.intp)
-    column = np.concatenate([source, target, faces]).astype(np.intp)
-    value = np.concatenate([-weight * transport, -weight * transport.conj(), diagonal])
-    return from_coo(row, column, value, count, count)
+    ends = np.concatenate([source, target])
+    diagonal = diagonal + np.bincount(ends, np.tile(weight, 2), len(diagonal))
+    return from_edges(target, source, -weight * transport, diagonal)

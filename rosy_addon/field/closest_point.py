@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import report
+from .blocks import concatenated_ranges
 from .frames import dot
 from .surface import Surface
 
@@ -17,6 +18,9 @@ MAX_CELLS_PER_AXIS = 8
 
 #: Pairs of points and triangles processed at once, to bound memory.
 MAX_PAIRS = 1 << 18
+
+#: Label of the progress.
+LABEL = "finding the closest faces"
 
 
 def closest_triangles(
@@ -39,70 +43,64 @@ def closest_triangles(
     distance : (n,) float64 ndarray
         Distance of the point from the triangle, Blender units; infinite if no triangle was found.
     """
-    label = "finding the closest faces"
-    report(0.0, label)
-    grid = _TriangleGrid(surface)
-    grid.fill()
-    points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)
-    triangle = np.zeros(len(points), dtype=np.int32)
-    distance = np.full(len(points), np.inf)
-    is_near = (points >= grid.origin - max_distance) & (points <= grid.top + max_distance)
+    report(0.0, LABEL)
+    search = _ClosestSearch(surface, np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3))
+    points, distance = search.points, search.distance
+    is_near = (points >= search.origin - max_distance) & (points <= search.top + max_distance)
     unfinished = np.flatnonzero(is_near.all(axis=1))
-    if len(grid.large_triangles):
-        grid.update_closest(
-            points,
-            np.repeat(unfinished, len(grid.large_triangles)),
-            np.tile(grid.large_triangles, len(unfinished)),
-            triangle,
-            distance,
-        )
+    large_count = len(search.large_triangles)
+    search.update(
+        np.repeat(unfinished, large_count), np.tile(search.large_triangles, len(unfinished))
+    )
     # Search rings of cells around the cell of each point, until the next ring cannot hold a closer
     # triangle, or only ones beyond the maximum distance.
     ring = 0
     while len(unfinished):
-        report(1 - len(unfinished) / len(points), label)
-        grid.search_ring(points, unfinished, ring, triangle, distance)
+        report(1 - len(unfinished) / len(points), LABEL)
+        search.search_ring(unfinished, ring)
         ring += 1
-        searched_distance = (ring - 1) * grid.cell_size + grid.distance_to_cell_border(
-            points[unfinished]
-        )
-        unfinished = unfinished[
-            (np.minimum(distance[unfinished], max_distance) > searched_distance)
-            & (ring <= grid.max_ring)
-        ]
-    return triangle, distance
+        searched = (ring - 1) * search.cell_size + search.distance_to_cell_border(unfinished)
+        is_open = np.minimum(distance[unfinished], max_distance) > searched
+        unfinished = unfinished[is_open & (ring <= search.max_ring)]
+    return search.triangle, distance
 
 
-class _TriangleGrid:
-    """A uniform grid of cubic cells, each with the triangles whose bounding boxes touch it."""
+class _ClosestSearch:
+    """The closest triangles of points so far, and a uniform grid of cubic cells to find others.
 
-    def __init__(self, surface: Surface) -> None:
-        corners = surface.vertices[surface.triangle_vertex]
-        self.corners = corners
-        low, high = corners.min(axis=1), corners.max(axis=1)
+    A cell has the triangles whose bounding boxes touch it.
+
+    Attributes
+    ----------
+    points : (n, 3) float64 ndarray
+    triangle : (n,) int32 ndarray
+        Closest triangle of each point so far.
+    distance : (n,) float64 ndarray
+        Its distance.
+    """
+
+    def __init__(self, surface: Surface, points: np.ndarray) -> None:
+        self.points = points
+        self.triangle = np.zeros(len(points), dtype=np.int32)
+        self.distance = np.full(len(points), np.inf)
+        self.corners = surface.vertices[surface.triangle_vertex]
+        low, high = self.corners.min(axis=1), self.corners.max(axis=1)
         self.origin, self.top = low.min(axis=0), high.max(axis=0)
         extent = self.top - self.origin
         longest = max(float(extent.max()), 1e-300)
         # The surface passes through about T cells if T cell faces have the area of its bounding box,
         # which has six sides.
-        self.cell_size = longest / max(np.sqrt(CELLS_PER_TRIANGLE * len(corners) / 6), 1)
+        self.cell_size = longest / max(np.sqrt(CELLS_PER_TRIANGLE * len(self.corners) / 6), 1)
         self.shape = np.maximum((extent / self.cell_size).astype(np.int64) + 1, 1)
         self.max_ring = int(self.shape.max()) + 1
-        self._low, self._high = low, high
-
-    def fill(self) -> None:
-        """Find the cells of the triangles. Call this first."""
-        low, high = self._low, self._high
-        first = self._cells_of(low)
-        last = self._cells_of(high)
+        first, last = self._cells_of(low), self._cells_of(high)
         is_large = (last - first).max(axis=1) >= MAX_CELLS_PER_AXIS
         self.large_triangles = np.flatnonzero(is_large).astype(np.int32)
         small = np.flatnonzero(~is_large)
         span = last[small] - first[small] + 1
         count = span.prod(axis=1)
-        entry = np.repeat(np.arange(len(small)), count)
-        cell_number = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        spans = span[entry]
+        spans = np.repeat(span, count, axis=0)
+        cell_number = concatenated_ranges(np.zeros_like(count), count)
         offset = np.stack(
             [
                 cell_number // (spans[:, 1] * spans[:, 2]),
@@ -111,9 +109,10 @@ class _TriangleGrid:
             ],
             axis=1,
         )
-        cell_key = self._keys_of(first[small][entry] + offset)
+        owner = np.repeat(small, count)
+        cell_key = self._keys_of(first[owner] + offset)
         order = np.argsort(cell_key, kind="stable")
-        self.key, self.cell_triangle = cell_key[order], small[entry][order].astype(np.int32)
+        self.key, self.cell_triangle = cell_key[order], owner[order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
         """(n, 3) int64 cells of points; the nearest cell for points outside of the grid."""
@@ -129,104 +128,60 @@ class _TriangleGrid:
         """(n,) int64: (n, 3) cells as single numbers, to sort by."""
         return (cell[:, 0] * self.shape[1] + cell[:, 1]) * self.shape[2] + cell[:, 2]
 
-    def distance_to_cell_border(self, points: np.ndarray) -> np.ndarray:
-        """(n,) distances of points from the border of their cell; 0 outside of the grid."""
+    def distance_to_cell_border(self, selection: np.ndarray) -> np.ndarray:
+        """(k,) distances of (k,) points from the border of their cell; 0 outside of the grid."""
+        points = self.points[selection]
         fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
 
-    def search_ring(
-        self,
-        points: np.ndarray,
-        selection: np.ndarray,
-        ring: int,
-        triangle: np.ndarray,
-        distance: np.ndarray,
-    ) -> None:
-        """Test the selected points against the triangles in one ring of cells around their own.
+    def search_ring(self, selection: np.ndarray, ring: int) -> None:
+        """Test (k,) points against the triangles in one ring of cells around their own.
 
-        Parameters
-        ----------
-        points : (n, 3) float64 ndarray
-        selection : (k,) int ndarray
-            Points to test.
-        ring : int
-            Distance of the ring in cells, 0 for the cell of the point.
-        triangle, distance : (n,) ndarray
-            Closest triangles so far and their distances; updated in place.
+        `ring` is the distance of the ring in cells, 0 for the cell of the point.
         """
         side = np.arange(-ring, ring + 1)
         offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
         offset = offset[np.abs(offset).max(axis=1) == ring]
         block = max(MAX_PAIRS // (8 * len(offset)), 1)
         for start in range(0, len(selection), block):
-            report(1 - (len(selection) - start) / len(points), "finding the closest faces")
+            report(1 - (len(selection) - start) / len(self.points), LABEL)
             chunk = selection[start : start + block]
-            cell = (self._cells_of(points[chunk])[:, None] + offset).reshape(-1, 3)
+            own_cell = self._cells_of(self.points[chunk])
+            cell = (own_cell[:, None] + offset).reshape(-1, 3)
             exists = ((cell >= 0) & (cell < self.shape)).all(axis=1)
-            exists &= self._cell_distances(points[chunk], offset) < np.repeat(
-                distance[chunk], len(offset)
+            exists &= self._cell_distances(chunk, own_cell, offset) < np.repeat(
+                self.distance[chunk], len(offset)
             )
             key = self._keys_of(cell[exists])
             first = np.searchsorted(self.key, key, side="left")
             count = np.searchsorted(self.key, key, side="right") - first
             point = np.repeat(chunk, len(offset))[exists]
-            entry = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count - first, count)
-            self.update_closest(
-                points, np.repeat(point, count), self.cell_triangle[entry], triangle, distance
-            )
+            entry = concatenated_ranges(first, count)
+            self.update(np.repeat(point, count), self.cell_triangle[entry])
 
-    def _cell_distances(self, points: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        """(n k,) distances of n points from the k cells at the given offsets from their own."""
+    def _cell_distances(
+        self, selection: np.ndarray, own_cell: np.ndarray, offset: np.ndarray
+    ) -> np.ndarray:
+        """(k c,) distances of (k,) points from the c cells at the given offsets from their own."""
         size = self.cell_size
-        position = (points - self.origin - self._cells_of(points) * size)[:, None]
+        position = (self.points[selection] - self.origin - own_cell * size)[:, None]
         gap = np.maximum(np.maximum(offset * size - position, position - (offset + 1) * size), 0)
         return np.sqrt(dot(gap, gap)).ravel()
 
-    def update_closest(
-        self,
-        points: np.ndarray,
-        owner: np.ndarray,
-        candidate: np.ndarray,
-        triangle: np.ndarray,
-        distance: np.ndarray,
-    ) -> None:
-        """Update the closest triangles with pairs of points and candidate triangles.
-
-        Parameters
-        ----------
-        points : (n, 3) float64 ndarray
-        owner, candidate : (p,) int ndarray
-            Point and triangle of each pair.
-        triangle, distance : (n,) ndarray
-            Closest triangles so far and their distances; updated in place.
-        """
+    def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
+        """Update the closest triangles with (p,) pairs of points and candidate triangles."""
         for start in range(0, len(owner), MAX_PAIRS):
-            point, triangle_index = (
-                owner[start : start + MAX_PAIRS],
-                candidate[start : start + MAX_PAIRS],
+            block = slice(start, start + MAX_PAIRS)
+            point, triangle = owner[block], candidate[block]
+            distance = point_triangle_distances(self.points[point], self.corners[triangle])
+            is_closer = (distance < self.distance[point]) | (
+                (distance == self.distance[point]) & (triangle < self.triangle[point])
             )
-            candidate_distance = point_triangle_distances(
-                points[point], self.corners[triangle_index]
-            )
-            order = np.lexsort((triangle_index, candidate_distance, point))
-            point, triangle_index, candidate_distance = (
-                point[order],
-                triangle_index[order],
-                candidate_distance[order],
-            )
-            first = np.flatnonzero(np.concatenate([[True], point[1:] != point[:-1]]))
-            point, triangle_index, candidate_distance = (
-                point[first],
-                triangle_index[first],
-                candidate_distance[first],
-            )
-            is_closer = (candidate_distance < distance[point]) | (
-                (candidate_distance == distance[point]) & (triangle_index < triangle[point])
-            )
-            distance[point[is_closer]], triangle[point[is_closer]] = (
-                candidate_distance[is_closer],
-                triangle_index[is_closer],
-            )
+            point, triangle, distance = point[is_closer], triangle[is_closer], distance[is_closer]
+            # The best candidate of a point is the last that is stored.
+            order = np.lexsort((triangle, distance))[::-1]
+            self.distance[point[order]] = distance[order]
+            self.triangle[point[order]] = triangle[order]
 
 
 def point_triangle_distances(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

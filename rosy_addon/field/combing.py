@@ -9,12 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import progress, report
+from ..progress import progress
 from .conjugate_gradient import RELATIVE_TOLERANCE
-from .convert import check_rosy
-from .guided import unit_representations
-from .guided_system import EXACT_FIRMNESS, GuidedSystem, NodeGuides, firmness_weights
-from .representation import from_representation, to_representation
+from .guided_system import (
+    EXACT_FIRMNESS,
+    GuidedSystem,
+    NodeGuides,
+    firmness_weights,
+    unit_representations,
+)
+from .representation import unit_complex
 from .rosy_field import RosyField
 
 #: Nodes around changed guides that are solved at once, and the iterations of the solver.
@@ -44,19 +48,17 @@ class Combing:
         self.magnitude = magnitude
         self._node_guides: NodeGuides | None = None
         self._z = start
-        self._face_z = unit_representations(system.face_representations(start))
+        self._face_z = unit_representations(system.averages.face_sums(start, system.degree))
 
     @property
     def vectors(self) -> np.ndarray:
         """(F, 3) float64: the field."""
-        return from_representation(
-            self.magnitude * self._face_z, self.system.x, self.system.y, self.system.degree
-        )
+        return self.system.to_vectors(self.magnitude * self._face_z)
 
     @property
     def guide_vectors(self) -> np.ndarray:
         """(F, 3) float64: member vectors of the guides, whose lengths are their firmness."""
-        return from_representation(self.guides, self.system.x, self.system.y, self.system.degree)
+        return self.system.to_vectors(self.guides)
 
     @property
     def representations(self) -> tuple[np.ndarray, np.ndarray]:
@@ -79,15 +81,16 @@ class Combing:
         changed = np.unique(self.system.surface.triangle_face[corner // 3])
         self._set_face_z(self.system.face_representations_at(self._z, changed), changed)
 
-    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> None:
-        """Solve the whole system. Without any guide, the field stays."""
+    def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
+        """Solve the whole system, and return `representations`. Without any guide, the field stays."""
         if not self.guides.any():
-            return
+            return self.representations
         self._node_guides = self._guides_at_nodes()
         with progress(0.1, 0.95):
             self._z = self.system.solve(self._node_guides, self._z, tolerance)
-        report(0.95, "averaging the field on the faces")
-        self._set_face_z(self.system.face_representations(self._z), np.arange(len(self.guides)))
+        face_z = self.system.averages.face_sums(self._z, self.system.degree)
+        self._set_face_z(face_z, np.arange(len(self.guides)))
+        return self.representations
 
     def _update_node_guides(self, node: np.ndarray) -> None:
         """Bring the guides at nodes up to date."""
@@ -101,12 +104,8 @@ class Combing:
 
     def _guides_at_nodes(self, corner: np.ndarray | slice = slice(None)) -> NodeGuides:
         firmness = np.abs(self.guides)
-        target = np.divide(
-            self.guides, firmness, out=np.zeros_like(self.guides), where=firmness > 0
-        )
-        edge_length = self.system.surface.mean_edge_length
-        weight, is_exact = firmness_weights(firmness, edge_length)
-        return self.system.node_guides(target, weight, is_exact, corner)
+        weight, is_exact = firmness_weights(firmness, self.system.surface.mean_edge_length)
+        return self.system.node_guides(unit_complex(self.guides), weight, is_exact, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
         """Set the field from its representations on (m,) faces."""
@@ -115,12 +114,6 @@ class Combing:
         is_exact = np.abs(guides) >= EXACT_FIRMNESS
         z[is_exact] = guides[is_exact] / np.abs(guides[is_exact])
         self._face_z[face] = z
-
-
-def settle(combing: Combing) -> tuple[np.ndarray, np.ndarray]:
-    """Solve the whole system, and return `Combing.representations`."""
-    combing.settle()
-    return combing.representations
 
 
 def start_combing(
@@ -145,18 +138,17 @@ def start_combing(
     RosyError
         If the directions are not a RoSy, or the field is undefined everywhere.
     """
-    surface, degree = system.surface, system.degree
-    check_rosy(surface, field)
-    z = to_representation(field.vectors, system.x, system.y, degree)
+    surface = system.surface
+    field.check_rosy(surface.name)
+    z = system.to_representation(field.vectors)
     magnitude = np.abs(z)
     if not magnitude.any():
         raise RosyError(f"{surface.name}: its field is undefined everywhere: make a field first")
-    unit_z = np.divide(z, magnitude, out=np.zeros_like(z), where=magnitude > 0)
-    guides = to_representation(guide_vectors, system.x, system.y, degree)
+    unit_z = unit_complex(z)
+    guides = system.to_representation(guide_vectors)
     guides /= np.maximum(np.abs(guides), 1)
     edges = max(reach / surface.mean_edge_length, MIN_REACH_EDGES)
     weak_guides = unit_z / (1 + edges**2)
     guides = np.where(guides == 0, weak_guides, guides)
-    return Combing(
-        system, guides, system.node_means(unit_z), np.where(magnitude > 0, magnitude, 1.0)
-    )
+    start = system.averages.node_sums(unit_z, system.degree) / system.averages.mass
+    return Combing(system, guides, start, np.where(magnitude > 0, magnitude, 1.0))

@@ -73,7 +73,7 @@ def conjugate_gradient(
     else:
         is_fixed = None
     smallest_residual = max(tolerance * norm, ROUNDING_ERROR * _norm(residual))
-    direction, previous = None, 1.0
+    direction, previous = np.zeros_like(residual), 1.0
     for iteration in range(max_iterations):
         report(1 - 0.5 * 0.8**iteration, label)
         if _norm(residual) <= smallest_residual:
@@ -82,9 +82,7 @@ def conjugate_gradient(
         if is_fixed is not None:
             preconditioned[is_fixed] = 0
         current = _real_inner_product(residual, preconditioned)
-        direction = (
-            preconditioned if direction is None else preconditioned + current / previous * direction
-        )
+        direction = preconditioned + current / previous * direction
         image = matrix @ direction
         if is_fixed is not None:
             image[is_fixed] = 0

@@ -19,9 +19,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import report
 from .frames import dot
-from .sparse_multigrid import CSRMatrix, from_coo
+from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface, build_edges, connected_components, next_corners
 
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
@@ -86,13 +86,10 @@ class Connection:
 
 def build_connection(surface: Surface) -> Connection:
     """Build the connection of the triangles of a surface, at `Surface.vertices`."""
-    label = "building the connection Laplacian"
-    report(0.0, label)
+    report(0.0, "building the connection Laplacian")
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
-    with progress(0.0, 0.2, label):
-        edges = build_edges(vertex, start)
-    report(0.2, label)
+    edges = build_edges(vertex, start)
     corner = np.arange(len(vertex), dtype=np.int32)
     next_corner = next_corners(start)
     previous_corner = next_corner[next_corner]
@@ -101,24 +98,19 @@ def build_connection(surface: Surface) -> Connection:
     twin[a], twin[b] = b, a
 
     corner_angle, cotangent, area = _corner_geometry(surface.vertices, surface.triangle_vertex)
-    # In counter-clockwise order around a vertex, the previous corner lies across the edge that
-    # leaves from this corner.
-    report(0.5, label)
-    previous_in_umbrella = np.where(twin >= 0, next_corner[np.maximum(twin, 0)], -1)
-    is_first, closed = _umbrella_starts(previous_in_umbrella, int(np.bincount(vertex).max()))
-    first_corner, offset = _accumulate_angles(previous_in_umbrella, is_first, corner_angle)
-    report(0.7, label)
+    previous, is_closed = umbrella_order(vertex, twin, next_corner)
+    is_first = previous == corner
+    first_corner, offset = sums_in_umbrellas(previous, corner_angle[previous])
     node_of_corner = np.cumsum(is_first) - 1
     corner_node = node_of_corner[first_corner].astype(np.int32)
     node_count = int(node_of_corner[-1]) + 1
     angle_sum = np.bincount(corner_node, corner_angle, node_count)
     angle_scale = np.ones(node_count)
-    is_interior = closed & (angle_sum > 0)
+    is_interior = is_closed[is_first] & (angle_sum > 0)
     angle_scale[is_interior] = 2 * np.pi / angle_sum[is_interior]
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
-    report(0.8, label)
     # Each edge once: from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
@@ -131,12 +123,10 @@ def build_connection(surface: Surface) -> Connection:
         edge_direction[head_corner]
         + corner_angle[head_corner] * angle_scale[corner_node[head_corner]],
     )
-    report(0.9, label)
     weight = 0.5 * (
         cotangent[previous_corner[tail_corner]]
         + np.where(twin_of_tail >= 0, cotangent[previous_corner[twin_of_tail]], 0)
     )
-    report(0.95, label)
     return Connection(
         corner_node=corner_node,
         node_count=node_count,
@@ -177,11 +167,7 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
     diagonal = np.bincount(ends, np.tile(weight, 2), c.node_count) + shift * c.mass
     diagonal[diagonal <= 0] = max(float(diagonal.mean()), 1.0)
     off_diagonal = -weight * np.exp(1j * degree * c.transport_angle)
-    nodes = np.arange(c.node_count)
-    row = np.concatenate([c.tail, c.head, nodes]).astype(np.intp)
-    column = np.concatenate([c.head, c.tail, nodes]).astype(np.intp)
-    value = np.concatenate([off_diagonal, off_diagonal.conj(), diagonal])
-    return from_coo(row, column, value, c.node_count, c.node_count)
+    return from_edges(c.tail, c.head, off_diagonal, diagonal)
 
 
 def _corner_geometry(
@@ -208,53 +194,57 @@ def _corner_geometry(
     return corner_angle.ravel(), cotangent.ravel(), area
 
 
-def _umbrella_starts(
-    previous_in_umbrella: np.ndarray, max_corners: int
+def umbrella_order(
+    corner_vertex: np.ndarray, twin: np.ndarray, next_corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the first corner of each umbrella, and which umbrellas are closed.
+    """Find the corners in order around each umbrella.
 
     A closed umbrella begins with its corner of smallest index.
 
     Parameters
     ----------
-    previous_in_umbrella : (C,) int ndarray
-        The previous corner in counter-clockwise order; -1 at the start of an open umbrella.
-    max_corners : int
-        Upper bound of the number of corners in an umbrella.
+    corner_vertex : (C,) int ndarray
+    twin : (C,) int ndarray
+        For the edge from each corner to the next, the corner at which it starts in the neighboring triangle.
+        -1 if there is none.
+    next_corner : (C,) int ndarray
 
     Returns
     -------
-    first : (C,) bool ndarray
-        Whether an umbrella begins with the corner.
-    closed : (n,) bool ndarray
-        Whether the umbrella is closed, in the order of their first corners.
+    previous : (C,) int ndarray
+        The previous corner in counter-clockwise order; the corner itself if an umbrella begins with it.
+    is_closed : (C,) bool ndarray
+        Whether the umbrella of a corner is closed.
     """
-    corner = np.arange(len(previous_in_umbrella))
-    smallest, pointer = corner, np.where(previous_in_umbrella >= 0, previous_in_umbrella, corner)
-    rounds = max_corners.bit_length()
-    for _ in range(rounds):
+    corner = np.arange(len(twin), dtype=twin.dtype)
+    # The previous corner lies across the edge that leaves from this corner.
+    previous = np.where(twin >= 0, next_corner[twin], corner)
+    smallest, pointer = corner, previous
+    for _ in range(int(np.bincount(corner_vertex).max()).bit_length()):
         smallest, pointer = np.minimum(smallest, smallest[pointer]), pointer[pointer]
-    closed = previous_in_umbrella[pointer] >= 0
-    first = (previous_in_umbrella < 0) | (closed & (smallest == corner))
-    return first, closed[first]
+    is_closed = twin[pointer] >= 0
+    return np.where(is_closed & (smallest == corner), corner, previous), is_closed
 
 
-def _accumulate_angles(
-    previous_in_umbrella: np.ndarray, is_first: np.ndarray, angle: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Sum the angles from the first corner of each umbrella up to each corner.
+def sums_in_umbrellas(previous: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sum values from the first corner of each umbrella up to each corner.
+
+    Parameters
+    ----------
+    previous : (C,) int ndarray
+        From `umbrella_order`.
+    value : (C,) ndarray
+        What each corner adds to the sum of the previous one. Those of first corners do not count.
 
     Returns
     -------
     first_corner : (C,) int ndarray
         The first corner of the umbrella that the corner belongs to.
-    angle_sum : (C,) float64 ndarray
-        Sum of the angles of all corners before this one, radians.
+    total : (C,) ndarray
     """
-    pointer = np.where(is_first, np.arange(len(previous_in_umbrella)), previous_in_umbrella)
-    angle_sum = np.where(is_first, 0.0, angle[pointer])
+    total = np.where(previous == np.arange(len(previous)), 0, value)
     while True:
-        next_pointer = pointer[pointer]
-        if np.array_equal(next_pointer, pointer):
-            return pointer, angle_sum
-        angle_sum, pointer = angle_sum + angle_sum[pointer], next_pointer
+        following = previous[previous]
+        if np.array_equal(following, previous):
+            return previous, total
+        total, previous = total + total[previous], following

@@ -12,16 +12,15 @@ from .conjugate_gradient import conjugate_gradient
 from .connection import build_connection, laplacian
 from .curvature import face_magnitude
 from .directional_field import field_matching
+from .face_graph import spanning_forest
 from .frames import normalize
 from .generate import MIN_SMOOTHING_LENGTH
-from .prescribed import TurningError, change_singularities
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import face_frames, from_representation, to_representation
 from .rosy_field import RosyField, check_degree
-from .singularities import find_singularities
-from .singularity_pairs import opposite_pairs
-from .smoothest import corner_frame_angles, node_sum_per_face
+from .singularity_changes import cancel_pairs
 from .sparse_multigrid import from_coo
-from .surface import Surface, connected_components
+from .surface import Surface
+from .surface_averages import SurfaceAverages
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +102,7 @@ def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
         If the degree is neither a multiple nor a divisor, or the directions are not a RoSy.
     """
     degree = check_degree(degree)
-    check_rosy(surface, field)
+    field.check_rosy(surface.name)
     if degree % field.degree == 0:
         return RosyField(degree, field.vectors)
     if field.degree % degree:
@@ -130,28 +129,9 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
     """
     faces, matching = field_matching(surface, field)
     defined = field.vectors.any(axis=1)[faces].all(axis=1)
-    face_a, face_b = faces[defined].T
-    matching = matching[defined]
-    source = np.concatenate([face_a, face_b])
-    target = np.concatenate([face_b, face_a])
-    # Member k of `source` matches member k + shift of `target`.
-    shift = np.concatenate([matching, -matching])
-    order = np.argsort(source, kind="stable")
-    source, target, shift = source[order], target[order], shift[order]
-    start = np.searchsorted(source, np.arange(surface.face_count + 1))
-    # Breadth-first search from one face of each connected component.
-    member_index = np.full(surface.face_count, -1)
-    component = connected_components(surface.face_count, np.stack([face_a, face_b], axis=1))
-    front = np.unique(component, return_index=True)[1]
-    member_index[front] = 0
-    while len(front):
-        count = start[front + 1] - start[front]
-        link = np.repeat(start[front] - np.cumsum(count) + count, count)
-        link += np.arange(count.sum())
-        link = link[member_index[target[link]] < 0]
-        front, first = np.unique(target[link], return_index=True)
-        link = link[first]
-        member_index[front] = (member_index[source[link]] + shift[link]) % period
+    # Member k of the first face of an edge matches member k + matching of the second.
+    tree = spanning_forest(surface.face_count, *faces[defined].T)
+    member_index = tree.sums_from_root(matching[defined]) % period
     angle = 2 * np.pi * member_index / field.degree
     return rotate_field(surface, field, angle).vectors
 
@@ -200,24 +180,17 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
     RosyError
         If the directions are not a RoSy, or the time is not positive and finite.
     """
-    check_rosy(surface, field)
+    field.check_rosy(surface.name)
     if not time > 0 or not np.isfinite(time):
         raise RosyError(f"{surface.name}: the diffusion time must be above 0, not {time}")
     x, y = face_frames(surface)
     degree = field.degree
     z = to_representation(field.vectors, x, y, degree)
-    with progress(0.0, 0.1):
-        connection = build_connection(surface)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
+    connection = build_connection(surface)
+    averages = SurfaceAverages(surface, connection, x, y)
     report(0.1, "smoothing the field")
-    corner_area = np.repeat(connection.area / 3, 3)
-    corner_face = np.repeat(surface.triangle_face, 3)
-    to_node = np.exp(-1j * degree * frame_angle)
-    rhs = complex_bincount(
-        connection.corner_node, corner_area * z[corner_face] * to_node, connection.node_count
-    )
+    rhs = averages.node_sums(z, degree)
     matrix = laplacian(connection, degree)
-    report(0.2, "smoothing the field")
     mass = connection.positive_mass
     nodes = np.arange(connection.node_count)
     matrix = from_coo(
@@ -231,11 +204,7 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
         solution = conjugate_gradient(matrix, rhs)
     report(0.95, "smoothing the field")
     area = np.bincount(surface.triangle_face, connection.area, surface.face_count)
-    mean = (
-        node_sum_per_face(surface, connection, solution, frame_angle, degree)
-        / np.where(area > 0, area, 1)
-        / 3
-    )
+    mean = averages.face_sums(solution, degree) / np.where(area > 0, area, 1) / 3
     return RosyField(degree, from_representation(mean, x, y, degree))
 
 
@@ -250,69 +219,3 @@ def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField
     """
     magnitude = np.broadcast_to(magnitude, (len(field.vectors),))[:, None]
     return replace(field, vectors=normalize(field.vectors) * magnitude, source_directions=None)
-
-
-def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> RosyField:
-    """Remove pairs of singularities with opposite indices.
-
-    Far from them, the field turns by an angle that falls with the distance. All other singularities stay, and
-    so do pairs without which the field would turn too fast for the size of the faces.
-
-    Parameters
-    ----------
-    surface : Surface
-    field : RosyField
-        A RoSy.
-    max_distance : float
-        Largest length of a path along edges between the two of a pair, in object space.
-
-    Returns
-    -------
-    RosyField
-        The field itself if it has no such pairs.
-
-    Raises
-    ------
-    RosyError
-        If the directions are not a RoSy.
-    """
-    check_rosy(surface, field)
-    with progress(0.0, 0.2):
-        vertex, index = find_singularities(surface, field)
-    with progress(0.2, 0.4):
-        pairs = opposite_pairs(surface, vertex, index, max_distance)
-    start = 0.4
-    while len(pairs):
-        chosen = pairs.ravel()
-        try:
-            with progress(start, 1.0):
-                return change_singularities(
-                    surface, field, vertex[chosen], -index[chosen], max_distance
-                )
-        except TurningError as error:
-            pairs = pairs[~_are_near(surface, vertex[pairs], error.vertices)]
-        start = 0.5 * (start + 1.0)
-    return field
-
-
-def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(P,) bool: which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
-    is_near = np.zeros(len(surface.vertices), dtype=bool)
-    is_near[vertices] = True
-    corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
-    while not is_near[pairs].any():
-        touches = np.zeros(surface.face_count, dtype=bool)
-        touches[corner_face[is_near[corner_vertex]]] = True
-        before = int(is_near.sum())
-        is_near[corner_vertex[touches[corner_face]]] = True
-        if int(is_near.sum()) == before:
-            return np.ones(len(pairs), dtype=bool)
-    return is_near[pairs].any(axis=1)
-
-
-def check_rosy(surface: Surface, field: RosyField) -> None:
-    """Raise an error if the directions of a field are not a RoSy."""
-    if field.direction_ratios is not None:
-        raise RosyError(
-            f"{surface.name}: only RoSy fields can be changed, but the directions of this field are not a RoSy"
-        )

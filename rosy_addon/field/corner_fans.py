@@ -6,7 +6,7 @@ import numpy as np
 
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
-from .representation import complex_bincount, power
+from .representation import complex_bincount, power, unit_complex
 from .surface import Surface, face_blocks, next_corners
 
 
@@ -15,7 +15,6 @@ def corner_rotations(
     face_x: np.ndarray,
     corner_face: np.ndarray,
     corner_normal: np.ndarray,
-    label: str | None = None,
 ) -> np.ndarray:
     """The rotation from the frame of each face to the frame of each of its corners.
 
@@ -31,8 +30,6 @@ def corner_rotations(
         Face of each corner.
     corner_normal : (C, 3) ndarray
         Unit normals of the corners.
-    label : str, optional
-        Of the progress.
 
     Returns
     -------
@@ -44,10 +41,9 @@ def corner_rotations(
         transported_x = transport(face_x[face], face_normal[face], normal)
         x, y = tangent_frame(normal)
         rotation = dot(transported_x, x) + 1j * dot(transported_x, y)
-        modulus = np.abs(rotation)
-        return np.divide(rotation, modulus, out=np.zeros_like(rotation), where=modulus > 0)
+        return unit_complex(rotation)
 
-    return by_rows(rotations, corner_face, corner_normal, label=label)
+    return by_rows(rotations, corner_face, corner_normal)
 
 
 def average_over_fans(
@@ -77,25 +73,12 @@ def average_over_fans(
     return mean[corner_fan]
 
 
-def corner_angles(surface: Surface, points: np.ndarray | None = None) -> np.ndarray:
-    """The angle between the two edges at each corner of the faces.
-
-    Parameters
-    ----------
-    surface : Surface
-    points : (V, 3) ndarray, optional
-        Vertex positions; those of the surface if not given.
-
-    Returns
-    -------
-    (C,) float64 ndarray
-        Radians, 0 to pi.
-    """
-    points = surface.vertices if points is None else points
+def corner_angles(surface: Surface) -> np.ndarray:
+    """(C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
-        positions, following = points[surface.corner_vertex[corners]], next_corners(starts)
-        to_next = positions[following] - positions
+        points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
+        to_next = points[following] - points
         to_previous = np.empty_like(to_next)
         to_previous[following] = -to_next
         angles[corners] = angle_between(to_next, to_previous)

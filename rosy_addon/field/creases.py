@@ -1,8 +1,8 @@
-"""Creases of a mesh: chains of sharp edges, told from the noise of scans.
+"""Edges at which the form of a surface breaks, told from the noise of scans and coarse meshes.
 
-Edges are judged with hysteresis and as chains, like the edges of an image by Canny, "A Computational
-Approach to Edge Detection", PAMI 1986. The result does not depend on the view, so creases do not
-flicker when something moves.
+Creases are chains of sharp edges. They are judged with hysteresis and as chains, like the edges of an image by
+Canny, "A Computational Approach to Edge Detection", PAMI 1986. The result does not depend on the view, so creases
+do not flicker when something moves.
 """
 
 from __future__ import annotations
@@ -12,15 +12,24 @@ from typing import NamedTuple
 import numpy as np
 
 from ..progress import progress, report
-from .frames import angle_between, dot
-from .salient_edges import (
-    MIN_RATIO,
-    NOISE_MULTIPLE,
-    SHARP_ANGLE,
-    filtered_normals,
-    largest_of_others,
-)
-from .surface import Edges, Surface, build_edges, connected_components
+from .blocks import mask
+from .frames import angle_between, dot, normalize
+from .surface import Edges, Surface, build_edges, connected_components, face_area_vectors
+
+#: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
+FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35
+
+#: Edges with a larger angle than the second are salient, in radians. Between the two angles, an edge is
+#: salient if its angle is at least `MIN_RATIO` times those of the other edges of its two faces.
+MIN_ANGLE, SHARP_ANGLE = np.pi / 6, np.pi / 3
+MIN_RATIO = 2.0
+
+#: Both angles are at least this multiple of the angle by which noise turns the normals.
+NOISE_MULTIPLE = 5.0
+
+#: Shortest line of salient edges, relative to `Surface.extent`.
+MIN_LINE_LENGTH = 0.05
+
 
 #: A chain may contain edges with this share of the crease angle.
 WEAK_SHARE = 0.5
@@ -42,10 +51,130 @@ NOISY_EDGE_LENGTH = 0.02
 FILTER_RINGS = 4
 
 #: Smallest crease angle in radians, below which normals differ by rounding only.
-MIN_ANGLE = 1e-3
+MIN_CREASE_ANGLE = 1e-3
 
 #: Label of the progress.
 LABEL = "finding creases"
+
+
+def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    """Return the value at which half of the total weight is reached; 0 without any weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    if not len(total) or not total[-1] > 0:
+        return 0.0
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
+def filtered_normals(
+    surface: Surface, edges: Edges, region: np.ndarray | None = None
+) -> tuple[np.ndarray, float]:
+    """Smooth the face normals over edges, but not across large angles.
+
+    Parameters
+    ----------
+    surface : Surface
+    edges : Edges
+    region : (F,) bool ndarray, optional
+        The faces to smooth, without regard to the others. All by default.
+
+    Returns
+    -------
+    normals : (F, 3) float64 ndarray
+        Unit, or zero.
+    noise_angle : float
+        The median angle, by area, between the normals before and after, in radians; of the region.
+
+    References
+    ----------
+    Zheng, Fu, Au and Tai, "Bilateral Normal Filtering for Mesh Denoising", TVCG 2011.
+    """
+    label = "filtering normals"
+    face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
+    corner_vertex, face_start = surface.corner_vertex, surface.face_start
+    unfiltered = normals = surface.face_normal
+    if region is not None:
+        inside = region[face_a] & region[face_b]
+        rank = np.cumsum(region) - 1
+        face_a, face_b = rank[face_a[inside]], rank[face_b[inside]]
+        unfiltered = normals = normals[region]
+        corner_vertex = corner_vertex[region[surface.corner_face]]
+        face_start = np.concatenate([[0], np.cumsum(np.diff(face_start)[region])])
+    vectors = face_area_vectors(surface.vertices, corner_vertex, face_start)
+    area = np.sqrt(dot(vectors, vectors))
+    area /= max(float(area.max(initial=0.0)), 1e-300)
+    for index in range(FILTER_ROUNDS):
+        report(index / FILTER_ROUNDS, label)
+        normal_a, normal_b = normals[face_a], normals[face_b]
+        difference = normal_a - normal_b
+        weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
+        weight_a, weight_b = weight * area[face_b], weight * area[face_a]
+        report((index + 0.5) / FILTER_ROUNDS, label)
+        total = normals * area[:, None]
+        for axis in range(3):
+            total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
+            total[:, axis] += np.bincount(face_b, weight_b * normal_a[:, axis], len(area))
+        normals = normalize(total)
+    noise_angle = weighted_median(angle_between(unfiltered, normals), area)
+    if region is not None:
+        filtered = normals
+        normals = surface.face_normal.copy()
+        normals[region] = filtered
+    return normals, noise_angle
+
+
+def salient_edges(
+    surface: Surface, edges: Edges, normals: np.ndarray, noise_angle: float
+) -> np.ndarray:
+    """Find the borders and the edges at which the surface bends more sharply than around them.
+
+    On a coarse mesh of a smooth surface, neighboring edges have similar angles, and none of them is
+    salient unless it is very sharp.
+
+    Parameters
+    ----------
+    surface : Surface
+    edges : Edges
+    normals, noise_angle
+        From `filtered_normals`.
+
+    Returns
+    -------
+    (E, 2) int32 ndarray
+        Pairs of vertices.
+    """
+    face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
+    # Faces without area have no normal, so their edges have no angle.
+    interior = angle_between(normals[face_a], normals[face_b])
+    others = _largest_of_others(surface, edges, interior)
+    noise = NOISE_MULTIPLE * noise_angle
+    is_sharp = interior >= max(SHARP_ANGLE, noise)
+    is_sharp |= (interior >= max(MIN_ANGLE, noise)) & (interior >= MIN_RATIO * others)
+    is_salient = np.ones(len(edges.ends), dtype=bool)
+    is_salient[edges.interior] = is_sharp
+    ends = edges.ends[is_salient]
+    if not len(ends):
+        return ends
+    line = connected_components(len(surface.vertices), ends)
+    line = line[ends[:, 0]]
+    edge = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
+    length = np.bincount(line, np.sqrt(dot(edge, edge)))[line]
+    return ends[length >= MIN_LINE_LENGTH * surface.extent]
+
+
+def _largest_of_others(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
+    """(I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
+    all_angles = np.zeros(len(edges.ends))
+    all_angles[edges.interior] = angle
+    corner_angle = all_angles[edges.corner_edge]
+    first = surface.face_start[:-1]
+    largest = np.maximum.reduceat(corner_angle, first)
+    is_largest = corner_angle == largest[surface.corner_face]
+    second = np.maximum.reduceat(np.where(is_largest, 0.0, corner_angle), first)
+    is_tied = np.add.reduceat(is_largest.astype(np.int32), first) > 1
+    second = np.where(is_tied, largest, second)
+    face = surface.corner_face[edges.halfedges]
+    return np.where(is_largest[edges.halfedges], second[face], largest[face]).max(axis=1)
 
 
 class Creases(NamedTuple):
@@ -84,12 +213,11 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
         Borders and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
-    with progress(0.0, 0.3, LABEL):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, LABEL)
+    report(0.0, LABEL)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     sides = surface.corner_face[edges.halfedges].T
     # Smaller angles have no effect.
-    crease_angle = max(crease_angle, MIN_ANGLE)
+    crease_angle = max(crease_angle, MIN_CREASE_ANGLE)
     angle = _large_angles(surface.face_normal, sides, WEAK_SHARE / MIN_RATIO * crease_angle)
     if angle.max(initial=0.0) < crease_angle:
         return none
@@ -102,21 +230,18 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     mean_length = max(float(length.mean()), 1e-300)
     density = min(1.0, NOISY_EDGE_LENGTH * surface.extent / mean_length) ** 2
     noise_angle *= density
-    report(0.8, LABEL)
     bent = np.flatnonzero(angle >= WEAK_SHARE * crease_angle)
     least = np.maximum(density * MIN_FILTERED_SHARE * angle[bent], NOISE_MULTIPLE * noise_angle)
     bent = bent[angle_between(*normals[sides[:, bent]]) >= least]
     is_candidate = angle[bent] >= SHARP_ANGLE
     is_candidate |= _is_between_fans(surface, edges.halfedges[bent])
     if not is_candidate.all():
-        is_candidate |= angle[bent] >= MIN_RATIO * _largest_around(surface, edges, angle)[bent]
+        is_candidate |= angle[bent] >= MIN_RATIO * _largest_of_others(surface, edges, angle)[bent]
     bent = bent[is_candidate]
     if not len(bent):
         return none
-    report(0.9, LABEL)
     ends, length, is_strong = ends[bent], length[bent], angle[bent] >= crease_angle
-    with progress(0.9, 1.0, LABEL):
-        chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
+    chain = connected_components(len(surface.vertices), ends)[ends[:, 0]]
     total = np.bincount(chain, length)[chain]
     is_kept = np.bincount(chain, length * is_strong)[chain] >= MIN_STRONG_SHARE * total
     is_kept &= total >= MIN_EDGES_PER_NOISE * noise_angle * mean_length
@@ -135,8 +260,7 @@ def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.nd
 
 def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
     """(F,) bool: the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
-    is_near = np.zeros(len(surface.vertices), dtype=bool)
-    is_near[ends] = True
+    is_near = mask(len(surface.vertices), ends)
     for _ in range(FILTER_RINGS):
         faces = np.logical_or.reduceat(is_near[surface.corner_vertex], surface.face_start[:-1])
         is_near[surface.corner_vertex[faces[surface.corner_face]]] = True
@@ -148,10 +272,3 @@ def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T
     return (fan[a] != fan[following[b]]) | (fan[following[a]] != fan[b])
-
-
-def _largest_around(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
-    """(I,) largest angle of the other edges of the two faces at each interior edge."""
-    all_angles = np.zeros(len(edges.ends))
-    all_angles[edges.interior] = angle
-    return np.maximum(*largest_of_others(surface, all_angles[edges.corner_edge], edges.halfedges))

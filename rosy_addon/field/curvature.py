@@ -48,20 +48,21 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
         return field.magnitude
     if kind != "curvature":
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
-    smooth_surface = smooth_normals(surface)
+    smooth_surface = with_smooth_normals(surface)
     x, y = face_frames(smooth_surface)
     mean, deviator = face_curvature(smooth_surface, x, y)
     return (np.abs(mean) + np.abs(deviator)) * surface.extent
 
 
-def smooth_normals(surface: Surface) -> Surface:
-    """The surface with smooth normals everywhere, without flat faces and sharp edges."""
+def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) -> Surface:
+    """Return the surface with normals that are smooth within the given fans, or else everywhere."""
     with progress(0.0, 0.3, "averaging normals"):
         return build_surface(
             surface.vertices,
             surface.corner_vertex,
             surface.face_start,
             name=surface.name,
+            corner_fan=corner_fan,
             triangles=surface.triangles,
             triangle_face=surface.triangle_face,
         )
@@ -100,8 +101,7 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
         raise RosyError(f"a curvature field needs an even degree, not {degree}")
     label = "computing principal directions"
     report(0.0, label)
-    smooth_surface = smooth_normals(surface)
-    report(0.3, label)
+    smooth_surface = with_smooth_normals(surface)
     x, y = face_frames(smooth_surface)
     mean, deviator = face_curvature(smooth_surface, x, y)
     report(0.6, label)

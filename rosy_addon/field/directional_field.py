@@ -26,7 +26,7 @@ import numpy as np
 
 from ..progress import progress, report
 from .blocks import by_rows, row_blocks
-from .frames import dot
+from .frames import coordinates
 from .representation import face_frames, matching_angles, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, build_edges
@@ -71,19 +71,8 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     label = "reading directions"
     report(0.0, label)
     x, y = face_frames(surface)
-    report(0.1, label)
-
-    def coordinates(rows: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return dot(rows, x[:, None]) + 1j * dot(rows, y[:, None])
-
-    with progress(0.1, 0.2):
-        w = by_rows(coordinates, directions, x, y, label=label)
-    within_tolerance = True
-    for rows in row_blocks(len(w)):
-        within_tolerance &= is_rosy(w[rows])
-        report(0.3, label)
-        if not within_tolerance:
-            break
+    w = by_rows(coordinates, directions, x, y)
+    within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
     with progress(0.3, 0.6):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=label)
     if within_tolerance:
@@ -164,7 +153,6 @@ def detect_families(surface: Surface, field: RosyField) -> RosyField:
     It becomes the number of lines if the stored members are on matching lines across at least
     `MIN_FAMILY_AGREEMENT` of the edges. Otherwise the field is returned unchanged.
     """
-    report(0.0, "matching directions")
     line_count = field_symmetry(field).line_count
     if line_count == 1:
         return field
@@ -243,12 +231,9 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
         The directions have the absolute eigenvalues as lengths. `family_count` is 2. The field is
         zero where the two eigenvalues are equal.
     """
-    label = "reading directions"
-    report(0.0, label)
-    x, y = face_frames(surface)
-    with progress(0.3, 1.0):
-        vectors, direction_ratios = by_rows(_tensor_directions, tensors, x, y, label=label)
-    return RosyField(4, vectors, direction_ratios, 2)
+    frames = face_frames(surface)
+    vectors, ratios = by_rows(_tensor_directions, tensors, *frames, label="reading directions")
+    return RosyField(4, vectors, ratios, 2)
 
 
 def _tensor_directions(
@@ -289,10 +274,7 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
     label = "matching directions"
     report(0.0, label)
     x, y = face_frames(surface)
-    report(0.1, label)
-    with progress(0.2, 0.3, label):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, label)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)

@@ -1,20 +1,33 @@
-"""The faces of a surface as a graph, and spanning forests of graphs."""
+"""The faces and the triangles of a surface as graphs, and spanning forests of graphs.
+
+The potential of a field (`turning_angles`) is linear on triangles. The angle by which the field turns across an
+edge is the difference of the potential along the edge, times half the sum of the cotangents of the angles
+opposite it (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and Their Conjugates*, 1993). This
+holds on triangles of any shape. The distance of the centers of two faces over the length of their edge is the
+same only where the line between the centers is perpendicular to the edge.
+
+A larger face is a fan of triangles. Its direction is the mean of those of its triangles.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import report
 from .analysis import edge_lengths
-from .blocks import concatenated_ranges
+from .blocks import concatenated_ranges, mask, neighbors_of_nodes
+from .frames import dot
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
-from .surface import Surface, build_edges, connected_components, next_corners
+from .surface import Surface, build_edges, connected_components, connected_corners, next_corners
 
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4
+
+#: Least area of a triangle in its cotangents, relative to the square of its longest edge.
+MIN_AREA = 1e-4
 
 #: Label of the progress.
 LABEL = "placing the singularities"
@@ -74,6 +87,10 @@ class FaceGraph:
         count = self.node_count
         return np.bincount(self.head, angle, count) - np.bincount(self.tail, angle, count)
 
+    def drop(self, potential: np.ndarray) -> np.ndarray:
+        """Return (I,) float64: by how much an (n,) potential grows along the edges."""
+        return potential[self.head] - potential[self.tail]
+
 
 def face_graph(
     surface: Surface, x: np.ndarray, y: np.ndarray, is_defined: np.ndarray | None = None
@@ -88,9 +105,8 @@ def face_graph(
     is_defined : (F,) bool ndarray, optional
         Where there is a field. By default on all faces with an area.
     """
-    with progress(0.0, 0.3):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.3, LABEL)
+    report(0.0, LABEL)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     if is_defined is None:
         is_defined = x.any(axis=1)
     halfedges = edges.halfedges
@@ -99,26 +115,18 @@ def face_graph(
     following = next_corners(surface.face_start)
     source, target = surface.corner_face[a], surface.corner_face[b]
     unfolding = edge_unfolding(surface, x, y, a, b)
-    report(0.5, LABEL)
     length, distance = edge_lengths(surface, a, b)
     conductance = distance / np.maximum(length, 1e-300)
     median = max(float(np.median(conductance)), 1e-300) if len(a) else 1.0
     np.clip(
         conductance, median / MAX_CONDUCTANCE_RATIO, median * MAX_CONDUCTANCE_RATIO, out=conductance
     )
-    report(0.6, LABEL)
-    corner_count = len(surface.corner_vertex)
-    pairs = np.concatenate(
-        [np.stack([a, following[b]], axis=1), np.stack([following[a], b], axis=1)]
-    )
-    corner_node = connected_components(corner_count, pairs)
-    continues = np.zeros(corner_count, dtype=bool)
-    continues[halfedges.ravel()] = True
+    corner_node = connected_corners(a, b, following)
+    continues = mask(len(following), halfedges)
     is_interior = np.ones(int(corner_node.max(initial=-1)) + 1, dtype=bool)
     is_interior[corner_node[~continues]] = False
     is_interior[corner_node[following[~continues]]] = False
     corner_angle = signed_corner_angles(surface, x, y)
-    report(0.9, LABEL)
     component = connected_components(surface.face_count, np.stack([source, target], axis=1))
     node_component = np.zeros(len(is_interior), dtype=component.dtype)
     node_component[corner_node] = component[surface.corner_face]
@@ -188,17 +196,14 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
     first, second : (m,) int ndarray
         The nodes that each edge connects.
     """
-    ends, others = np.concatenate([first, second]), np.concatenate([second, first])
-    order = np.argsort(ends, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(ends, minlength=node_count))])
-    neighbor, edge = others[order], order % max(len(first), 1)
+    start, neighbor, order = neighbors_of_nodes(node_count, first, second)
+    edge = order % max(len(first), 1)
     sign = np.where(order < len(first), 1.0, -1.0)
     component = connected_components(node_count, np.stack([first, second], axis=1))
     roots = np.unique(component, return_index=True)[1]
     parent, parent_edge = np.arange(node_count), np.full(node_count, -1)
     parent_sign = np.zeros(node_count)
-    is_reached = np.zeros(node_count, dtype=bool)
-    is_reached[roots] = True
+    is_reached = mask(node_count, roots)
     front, done = roots, 0
     while len(front):
         done += len(front)
@@ -211,6 +216,139 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
         is_reached[front] = True
         parent_edge[front], parent_sign[front] = source, sign[entry]
         parent[front] = np.where(sign[entry] > 0, first[source], second[source])
-    has_edge = np.zeros(len(first), dtype=bool)
-    has_edge[parent_edge[parent_edge >= 0]] = True
+    has_edge = mask(len(first), parent_edge[parent_edge >= 0])
     return SpanningForest(parent, parent_edge, parent_sign, has_edge)
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleGraph:
+    """The graph of the faces, where each face is a fan of triangles around its first corner.
+
+    Attributes
+    ----------
+    graph : FaceGraph
+        Of the T triangles. Its M edges are the I edges between faces, and then those within faces. Its
+        conductance is half the sum of the cotangents. It may be negative, but the matrix of the potential
+        is positive semidefinite.
+    weight : (M, 2) float64 ndarray
+        Half the cotangent opposite each edge, in the source and in the target.
+    triangle_face : (T,) intp ndarray
+        Face of each triangle, ascending.
+    area : (T,) float64 ndarray
+    face_edge_count : int
+        I.
+    """
+
+    graph: FaceGraph
+    weight: np.ndarray
+    triangle_face: np.ndarray
+    area: np.ndarray
+    face_edge_count: int
+
+    def on_triangles(self, angle: np.ndarray | float) -> np.ndarray:
+        """Return (M,) angles: those at the edges between faces, and 0 within faces."""
+        result = np.zeros(len(self.graph.source))
+        result[: self.face_edge_count] = angle
+        return result
+
+    def turns_to_centers(self, drop: np.ndarray) -> np.ndarray:
+        """Return (T,) angles from the circumcenter of each triangle to its center.
+
+        `drop` is (M,) differences of the potential along the edges. The angles between triangles are those from
+        circumcenter to circumcenter. They lead across the middles of the edges, whose mean is the center.
+        """
+        graph, count = self.graph, len(self.triangle_face)
+        total = np.bincount(graph.source, self.weight[:, 0] * drop, count)
+        return (total - np.bincount(graph.target, self.weight[:, 1] * drop, count)) / 3
+
+    def on_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
+        """Return (I,) angles between faces from (M,) angles between triangles.
+
+        `to_center` is (T,) angles that are added to the directions of triangles; see `turns_to_centers`.
+        """
+        turn, outer = self._turns_in_faces(angle, to_center), slice(self.face_edge_count)
+        return angle[outer] + turn[self.graph.source[outer]] - turn[self.graph.target[outer]]
+
+    def directions_of_faces(
+        self, direction: np.ndarray, angle: np.ndarray, to_center: np.ndarray
+    ) -> np.ndarray:
+        """Return (F,) directions from (T,) directions of triangles; the rest is as in `on_faces`."""
+        first = np.flatnonzero(np.diff(self.triangle_face, prepend=-1))
+        return (direction - self._turns_in_faces(angle, to_center))[first]
+
+    def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
+        """(T,) angles from the direction of a face to that of each of its triangles."""
+        face, inner = self.triangle_face, slice(self.face_edge_count, None)
+        step = np.zeros(len(face))
+        step[self.graph.target[inner]] = angle[inner]
+        turn = np.cumsum(step)
+        mean = np.bincount(face, self.area * (turn + to_center)) / np.bincount(face, self.area)
+        return turn - mean[face]
+
+    def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
+        """Return a graph whose edges between faces resist angles more, by (I,) factors of at least 1.
+
+        Those within faces resist them as much as the edges around. No conductance is negative any more, as the
+        matrix might be indefinite.
+        """
+        graph, face, outer = self.graph, self.triangle_face, slice(self.face_edge_count)
+        face_factor = np.ones(len(np.bincount(face)))
+        for triangle in (graph.source, graph.target):
+            np.maximum.at(face_factor, face[triangle[outer]], factor)
+        edge_factor = face_factor[face[graph.source]]
+        edge_factor[outer] = factor
+        least = np.median(np.abs(graph.conductance)) / MAX_CONDUCTANCE_RATIO
+        conductance = np.maximum(graph.conductance, least) / edge_factor
+        return replace(self, graph=replace(graph, conductance=conductance))
+
+
+def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
+    """Split the graph of the faces of a surface into that of their triangles."""
+    size = np.diff(surface.face_start)
+    face = np.repeat(np.arange(len(size)), size - 2)
+    first_triangle = np.cumsum(size - 2) - (size - 2)
+    rank = np.arange(len(face)) - first_triangle[face]
+    apex = surface.face_start[face]
+    corner = np.stack([apex, apex + rank + 1, apex + rank + 2], axis=1)
+    cotangent, area = _cotangents(surface.vertices[surface.corner_vertex[corner]])
+    # The edges between faces: those at the apex belong to the first and to the last triangle.
+    triangles, weights = [], []
+    for start in faces.halfedges.T:
+        owner = surface.corner_face[start]
+        place = start - surface.face_start[owner]
+        last = size[owner] - 1
+        triangle = first_triangle[owner] + np.clip(place - 1, 0, last - 2)
+        opposite = np.where(place == 0, 2, np.where(place == last, 1, 0))
+        triangles.append(triangle)
+        weights.append(cotangent[triangle, opposite] / 2)
+    # The edges within faces, from each triangle to the next one.
+    inner = np.flatnonzero(rank > 0)
+    triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]
+    inner_weights = cotangent[inner - 1, 1] / 2, cotangent[inner, 2] / 2
+    weights = [np.concatenate(pair) for pair in zip(weights, inner_weights, strict=True)]
+    tail, head = faces.corner_node[corner[inner, 1]], faces.corner_node[apex[inner]]
+    weight = np.stack(weights, axis=1)
+    graph = replace(
+        faces,
+        source=triangles[0],
+        target=triangles[1],
+        unfolding=np.concatenate([faces.unfolding, np.zeros(len(inner))]),
+        tail=np.concatenate([faces.tail, tail]),
+        head=np.concatenate([faces.head, head]),
+        conductance=weight.sum(axis=1),
+        component=faces.component[face],
+    )
+    return TriangleGraph(graph, weight, face, area, len(faces.source))
+
+
+def _cotangents(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(T, 3) cotangents of the angles, and (T,) areas, of triangles with (T, 3, 3) points.
+
+    Areas are enlarged to `MIN_AREA`. That scales the cotangents of a triangle, so that their matrix stays
+    positive semidefinite.
+    """
+    sides = np.roll(points, -1, axis=1) - points
+    squared = dot(sides, sides)
+    area = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    area = np.maximum(area, np.maximum(MIN_AREA * squared.max(axis=1), 1e-300))
+    return -dot(np.roll(sides, 1, axis=1), sides) / (2 * area[:, None]), area

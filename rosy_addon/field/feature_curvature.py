@@ -1,25 +1,166 @@
-"""Curvature of the features of a surface, for lines that are narrower on small features."""
+"""The curvature of the features of a surface, and what the noise of its vertices does to it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..progress import progress, report
-from .connection import build_connection, laplacian
-from .frames import dot, normalize
+from ..progress import progress
+from .connection import build_connection
+from .creases import filtered_normals, salient_edges, weighted_median
+from .curvature import face_curvature, with_smooth_normals
+from .frames import angle_between, dot, normalize
 from .representation import face_frames
-from .salient_edges import filtered_normals, salient_edges
-from .surface import Surface, build_edges, build_surface, smooth_fans
-from .surface_averages import SurfaceAverages, bounded_curvature, of_unit_extent
-from .vertex_noise import noise_sample
+from .surface import Edges, Surface, build_edges, face_area_vectors, smooth_fans
+from .surface_averages import SurfaceAverages
 
 #: Length over which curvature is averaged, relative to `Surface.extent`.
 SCALE = 0.01
 
 #: Ratio of curvature and noise below which there is no feature.
 MIN_NOISE_RATIO = 2.0
+
+
+#: Seed of the sample of noise.
+SEED = 777
+
+#: Displacement at which the effect of noise on the normals is measured, relative to the square root
+#: of the mean face area. It must be small.
+PROBE = 1e-3
+
+#: Label of the progress.
+LABEL = "measuring features"
+
+
+@dataclass(frozen=True, eq=False)
+class NoisyCurvature:
+    """The curvature of a surface between its salient edges, as of `curvature.face_curvature`.
+
+    Attributes
+    ----------
+    salient_ends : (E, 2) int32 ndarray
+        The salient edges: pairs of vertices.
+    averages : SurfaceAverages
+        With the frames of the faces.
+    mean : (F,) float64 ndarray
+    deviator : (F,) complex128 ndarray
+    mean_noise, deviator_noise : (F,) ndarray
+        By how much the mean and the deviator change if there is as much noise again.
+    """
+
+    salient_ends: np.ndarray
+    averages: SurfaceAverages
+    mean: np.ndarray
+    deviator: np.ndarray
+    mean_noise: np.ndarray
+    deviator_noise: np.ndarray
+
+
+def of_unit_extent(surface: Surface) -> Surface:
+    """Return a surface of extent 1 around the origin, so that no number is very large or small."""
+    used = surface.used_vertices
+    vertices = np.zeros_like(surface.vertices)
+    low, high = surface.vertices[used].min(axis=0), surface.vertices[used].max(axis=0)
+    vertices[used] = (surface.vertices[used] - 0.5 * (low + high)) / surface.extent
+    return surface.with_vertices(vertices)
+
+
+def noisy_curvature(surface: Surface) -> NoisyCurvature:
+    """Measure the curvature of a surface, without and with a sample of its noise."""
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    with progress(0.1, 0.4):
+        normals, noise_angle = filtered_normals(surface, edges)
+    ends = salient_edges(surface, edges, normals, noise_angle)
+    noise = noise_sample(surface, edges, noise_angle)
+    fans = smooth_fans(
+        surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
+    )
+    x, y = face_frames(surface)
+    with progress(0.6, 0.7, LABEL):
+        mean, deviator = _bounded_curvature(surface, fans, x, y)
+    noisy = replace(surface, vertices=surface.vertices + noise)
+    normal = noisy.face_normal
+    x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
+    with progress(0.7, 0.8, LABEL):
+        mean_noisy, deviator_noisy = _bounded_curvature(
+            noisy, fans, x_noisy, np.cross(normal, x_noisy)
+        )
+    with progress(0.8, 1.0, LABEL):
+        averages = SurfaceAverages(surface, build_connection(surface), x, y)
+    return NoisyCurvature(
+        ends, averages, mean, deviator, mean_noisy - mean, deviator_noisy - deviator
+    )
+
+
+def _bounded_curvature(
+    surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Curvature of each face, with normals that are smooth within the given fans of corners.
+
+    A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
+    """
+    mean, deviator = face_curvature(with_smooth_normals(surface, corner_fan), x, y)
+    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
+    limit = np.maximum(0.5 * np.sqrt(dot(vectors, vectors)), 1e-300) ** -0.5
+    modulus = np.abs(deviator)
+    deviator = deviator * np.divide(limit, modulus, out=np.ones_like(limit), where=modulus > limit)
+    return np.clip(mean, -limit, limit), deviator
+
+
+def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
+    """Sample noise as strong as that of the vertices along their normals.
+
+    Two properties are compared with those of white noise of unit amplitude: the angle by which it
+    turns the face normals, and its difference from the mean of the neighbors. The form of the surface
+    adds to both, to the first on coarse meshes and to the second at creases, so the smaller result
+    is used.
+
+    Parameters
+    ----------
+    surface : Surface
+    edges : Edges
+    noise_angle : float
+        From `salient_edges.filtered_normals`.
+
+    Returns
+    -------
+    (V, 3) float64 ndarray
+        Displacements of the vertices, in Blender units.
+    """
+    count = len(surface.vertices)
+    normal = np.stack(
+        [np.bincount(surface.corner_vertex, n, count) for n in surface.corner_normal.T], axis=1
+    )
+    normal = normalize(normal)
+    sample = np.random.default_rng(SEED).standard_normal(count)[:, None] * normal
+    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
+    area = np.sqrt(dot(vectors, vectors))
+    probe = PROBE * np.sqrt(area.mean())
+    displaced = face_area_vectors(
+        surface.vertices + probe * sample, surface.corner_vertex, surface.face_start
+    )
+    turn = weighted_median(angle_between(vectors, displaced), area)
+    by_angle = probe * noise_angle / turn if turn > 0 else 0.0
+    used = surface.used_vertices
+    actual = np.median(np.abs(_roughness(surface.vertices, normal, edges.ends)[used]))
+    unit = np.median(np.abs(_roughness(sample, normal, edges.ends)[used]))
+    by_roughness = actual / unit if unit > 0 else 0.0
+    return min(by_angle, by_roughness) * sample
+
+
+def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """(V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
+    tail, head = ends.T
+    degree = np.maximum(np.bincount(ends.ravel(), minlength=len(points)), 1)
+
+    def difference_from_neighbors(values: np.ndarray) -> np.ndarray:
+        total = np.bincount(tail, values[head], len(points))
+        total += np.bincount(head, values[tail], len(points))
+        return values - total / degree
+
+    height = np.stack([difference_from_neighbors(column) for column in points.T], axis=1)
+    return difference_from_neighbors(dot(height, normal))
 
 
 def feature_curvature(surface: Surface) -> np.ndarray:
@@ -40,51 +181,21 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     """
     if surface.rest_vertices is not None:
         with progress(0.0, 0.05):
-            surface = build_surface(
-                surface.rest_vertices,
-                surface.corner_vertex,
-                surface.face_start,
-                triangles=surface.triangles,
-                triangle_face=surface.triangle_face,
-            )
+            surface = with_smooth_normals(surface.in_rest_shape())
     if not surface.face_normal.any():
         return np.zeros((len(surface.triangles), 3), dtype=np.float32)
     extent, surface = surface.extent, of_unit_extent(surface)
-    with progress(0.05, 0.1, "finding edges"):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    with progress(0.1, 0.25):
-        normals, noise_angle = filtered_normals(surface, edges)
-    ends = salient_edges(surface, edges, normals, noise_angle)
-    noise = noise_sample(surface, edges, noise_angle)
-    with progress(0.35, 0.45):
-        fans = smooth_fans(
-            surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
-        )
-    x, y = face_frames(surface)
-    with progress(0.45, 0.55, "measuring features"):
-        mean, deviator = bounded_curvature(surface, fans, x, y)
-    noisy = replace(surface, vertices=surface.vertices + noise)
-    report(0.55, "measuring features")
-    normal = noisy.face_normal
-    x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
-    with progress(0.55, 0.65, "measuring features"):
-        mean_noisy, deviator_noisy = bounded_curvature(
-            noisy, fans, x_noisy, np.cross(normal, x_noisy)
-        )
-    with progress(0.65, 0.75, "measuring features"):
-        connection = build_connection(surface)
-    averages = SurfaceAverages(surface, connection, x, y)
-    scalar = laplacian(connection, 0)
-    scalar = scalar.with_values(scalar.data.real.astype(np.float32))
-    line = laplacian(connection, 2)
-    line = line.with_values(line.data.astype(np.complex64))
+    with progress(0.05, 0.75):
+        measured = noisy_curvature(surface)
+    averages = measured.averages
+    scalar, line = averages.laplacian(0), averages.laplacian(2)
     area = SCALE**2
     results = []
     for matrix, values, order in (
-        (scalar, mean, 0),
-        (line, deviator, 2),
-        (scalar, mean_noisy - mean, 0),
-        (line, deviator_noisy - deviator, 2),
+        (scalar, measured.mean, 0),
+        (line, measured.deviator, 2),
+        (scalar, measured.mean_noise, 0),
+        (line, measured.deviator_noise, 2),
     ):
         sums, start = averages.node_sums(values, order), 0.8 + 0.04 * len(results)
         with progress(start, start + 0.04):
@@ -96,4 +207,4 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         power = averages.smooth(scalar, 16 * area, power)
     signal = curvature**2 - MIN_NOISE_RATIO**2 * np.maximum(power, 0.0)
     curvature = np.sqrt(np.maximum(signal, 0.0)) / extent
-    return curvature.astype(np.float32)[connection.corner_node].reshape(-1, 3)
+    return curvature.astype(np.float32)[averages.connection.corner_node].reshape(-1, 3)

@@ -13,7 +13,7 @@ from ..progress import progress, report
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import directions_text, npy_blocks, read_npy, read_text
-from .formats.raw_field import RawField
+from .formats.polygons import RawField
 from .formats.rosy_rawfield import (
     rawfield_text,
     read_rawfield,
@@ -58,17 +58,6 @@ class LoadedField(NamedTuple):
 
     field: RosyField
     note: str
-
-
-def read_field(
-    path: str | os.PathLike[str],
-    surface: Surface,
-    degree: int | None = None,
-    nonfinite: str = "error",
-    mesh: str | os.PathLike[str] | None = None,
-) -> RosyField:
-    """Read a field from a file; `load_field` without the note."""
-    return load_field(path, surface, degree, nonfinite, mesh).field
 
 
 def load_field(
@@ -178,7 +167,6 @@ def field_from_raw(
                 f"{source}: contains tensors on vertices; only tensors on faces are supported"
             )
         apply_nonfinite_policy(values, source, "face", nonfinite)
-        report(0.2, "reading directions")
         return tensor_field(surface, values)
     if raw.degree is None or values.shape[1] == 1:
         known_degree = raw.degree or degree or DEFAULT_DEGREE
@@ -313,9 +301,7 @@ def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes
     else:
         rows = field.source_directions
         if rows is None:
-            report(0.0, "computing directions")
             rows = field_directions(surface, field)
-            report(1.0, "computing directions")
         if suffix == ".npy":
             return npy_blocks(rows)
         text = rawfield_text(rows) if suffix == ".rawfield" else directions_text(rows)

@@ -7,22 +7,17 @@ between them.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..progress import progress, report
-from .connection import build_connection, laplacian
-from .frames import dot, normalize
-from .guided import guided_or_smoothest
+from .creases import weighted_median
+from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
+from .guided_system import guided_field
 from .guides import guides_from_edges
-from .representation import face_frames, from_representation
+from .representation import from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
-from .salient_edges import filtered_normals, salient_edges, weighted_median
 from .smoothest import smoothest_field
-from .surface import Surface, build_edges, smooth_fans
-from .surface_averages import SurfaceAverages, bounded_curvature, of_unit_extent
-from .vertex_noise import noise_sample
+from .surface import Surface
 
 #: Lengths over which curvature is averaged, relative to `Surface.extent`.
 SCALES = (0.01, 0.02, 0.04, 0.08)
@@ -85,41 +80,26 @@ def form(surface: Surface, degree: int) -> RosyField:
     if not follows_curvature(degree) or not surface.face_normal.any():
         return smoothest_field(surface, degree)
     original, surface = surface, of_unit_extent(surface)
-    with progress(0.0, 0.04, "finding edges"):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    with progress(0.04, 0.1):
-        normals, noise_angle = filtered_normals(surface, edges)
-    ends = salient_edges(surface, edges, normals, noise_angle)
-    noise = noise_sample(surface, edges, noise_angle)
-    with progress(0.15, 0.5):
-        guides, confidence = _curvature_guides(surface, degree, ends, noise)
+    with progress(0.0, 0.2):
+        measured = noisy_curvature(surface)
+    with progress(0.2, 0.5):
+        guides, confidence = _curvature_guides(measured, degree)
     weight = (confidence / REACH) ** 2
     report(0.5, "finding guides")
-    edge_guides = guides_from_edges(surface, ends, degree)
+    edge_guides = guides_from_edges(surface, measured.salient_ends, degree)
     at_edge = edge_guides.any(axis=1)
     guides = np.where(at_edge[:, None], edge_guides, guides)
     if not guides.any():
         with progress(0.5, 1.0):
             return smoothest_field(original, degree)
     with progress(0.5, 1.0):
-        return guided_or_smoothest(
+        return guided_field(
             surface, degree, guides, np.where(at_edge, 0.0, weight), at_edge, FIELD_TOLERANCE
         )
 
 
-def _curvature_guides(
-    surface: Surface, degree: int, ends: np.ndarray, noise: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray, np.ndarray]:
     """Find principal directions, and how clear they are.
-
-    Parameters
-    ----------
-    surface : Surface
-    degree : int
-    ends : (E, 2) int ndarray
-        Edges across which there is no curvature.
-    noise : (V, 3) float64 ndarray
-        Displacements of the vertices.
 
     Returns
     -------
@@ -128,35 +108,16 @@ def _curvature_guides(
     confidence : (F,) float64 ndarray
         From 0 to 1.
     """
-    x, y = face_frames(surface)
-    with progress(0.02, 0.1):
-        fans = smooth_fans(
-            surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
-        )
-    with progress(0.1, 0.2):
-        mean, deviator = bounded_curvature(surface, fans, x, y)
-    with_noise = replace(surface, vertices=surface.vertices + noise)
-    report(0.2, "computing principal directions")
-    normal = with_noise.face_normal
-    x_noise = normalize(x - dot(x, normal)[:, None] * normal)
-    with progress(0.2, 0.3):
-        _, deviator_noise = bounded_curvature(with_noise, fans, x_noise, np.cross(normal, x_noise))
-    with progress(0.3, 0.38):
-        connection = build_connection(surface)
-    report(0.38, "averaging curvature")
-    averages = SurfaceAverages(surface, connection, x, y)
-    matrix = laplacian(connection, 2)
-    flat_matrix = laplacian(connection, 0)
-    matrix = matrix.with_values(matrix.data.astype(np.complex64))
-    flat_matrix = flat_matrix.with_values(flat_matrix.data.real.astype(np.float32))
-    deviators = averages.node_sums(deviator, 2), averages.node_sums(deviator_noise - deviator, 2)
+    averages = measured.averages
+    matrix, flat_matrix = averages.laplacian(2), averages.laplacian(0)
+    deviators = [averages.node_sums(d, 2) for d in (measured.deviator, measured.deviator_noise)]
     z = z_noise = None
     for index, scale in enumerate(SCALES):
         area = scale**2
-        start = 0.45 + 0.1 * index
-        with progress(start, start + 0.05):
+        start = 0.2 * index
+        with progress(start, start + 0.1):
             z = averages.smooth(matrix, area, deviators[0], z)
-        with progress(start + 0.05, start + 0.1):
+        with progress(start + 0.1, start + 0.2):
             z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
         # The angle of a cross is a quarter of that of the square of a deviator.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
@@ -165,21 +126,16 @@ def _curvature_guides(
         if weighted_median(turn, clear) <= MAX_TURN:
             break
     with progress(0.85, 0.9):
-        mean = averages.smooth(flat_matrix, area, averages.node_sums(mean, 0))
+        mean = averages.smooth(flat_matrix, area, averages.node_sums(measured.mean, 0))
     power = averages.mass * np.abs(z_noise) ** 2
     with progress(0.9, 0.95):
         power = averages.smooth(flat_matrix, 4 * area, power)
-    report(0.95, "averaging curvature")
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2
     modulus = np.abs(z)
     curvature = np.maximum(np.abs(mean), modulus) + FLAT_CURVATURE
-    report(0.96, "averaging curvature")
     signal = modulus**2
     confidence = modulus / curvature * (signal / np.maximum(signal + power, 1e-300))
     confidence = np.clip((confidence - MIN_CONFIDENCE) / (1 - MIN_CONFIDENCE), 0.0, 1.0)
-    z = confidence * np.divide(z, modulus, out=np.zeros_like(z), where=modulus > 0)
-    face_z = averages.face_means(z, 2)
-    report(0.98, "averaging curvature")
-    confidence = np.abs(face_z)
-    phase = np.divide(face_z, confidence, out=np.zeros_like(face_z), where=confidence > 0)
-    return from_representation(phase ** (degree // 2), x, y, degree), confidence
+    face_z = averages.face_means(confidence * unit_complex(z), 2)
+    z = unit_complex(face_z) ** (degree // 2)
+    return from_representation(z, averages.x, averages.y, degree), np.abs(face_z)

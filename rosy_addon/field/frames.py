@@ -13,6 +13,11 @@ def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.einsum("...i,...i->...", a, b)
 
 
+def coordinates(vectors: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(F, N) complex coordinates of (F, N, 3) vectors in (F, 3) frames x, y."""
+    return dot(vectors, x[:, None]) + 1j * dot(vectors, y[:, None])
+
+
 def normalize(vectors: np.ndarray) -> np.ndarray:
     """(..., 3) vectors scaled to length 1; zero vectors stay zero."""
     length = np.sqrt(dot(vectors, vectors))[..., None]

@@ -18,8 +18,7 @@ from .cheapest_singularities import cheapest_singularities
 from .curvature import TINY, curvature_field
 from .form import form
 from .frames import normalize, unit_direction
-from .guided import guided_or_smoothest
-from .guided_system import firmness_weights
+from .guided_system import firmness_weights, guided_field
 from .guides import (
     average_guides,
     feature_edges,
@@ -160,7 +159,7 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
         length = max(settings.smoothing_length * surface.extent, TINY)
         weight = (field.magnitude / length) ** 2
         with progress(split, 1.0):
-            return guided_or_smoothest(surface, degree, normalize(field.vectors), weight)
+            return guided_field(surface, degree, normalize(field.vectors), weight)
     if settings.kind == "features":
         return _features(surface, settings, degree)
     if settings.kind == "guided":
@@ -200,8 +199,7 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
-        with progress(0.0, 0.1):
-            ends = feature_edges(surface, settings.sharp_angle)
+        ends = feature_edges(surface, settings.sharp_angle)
     if not len(ends):
         raise NoFeaturesError(
             f"{surface.name}: has no border or sharp edge: reduce the sharp angle, or mark edges"
@@ -213,7 +211,7 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
             f"{degree}: choose another degree"
         )
     with progress(0.1, 1.0):
-        return guided_or_smoothest(surface, degree, guides)
+        return guided_field(surface, degree, guides)
 
 
 def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
@@ -247,7 +245,7 @@ def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
             firmness[guide.any(axis=1)] = 1.0
     reach = settings.smoothing_length * surface.extent
     weight, is_exact = firmness_weights(firmness, surface.mean_edge_length, reach)
-    return guided_or_smoothest(surface, degree, guides, weight, is_exact)
+    return guided_field(surface, degree, guides, weight, is_exact)
 
 
 def axis_field(

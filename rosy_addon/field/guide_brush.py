@@ -242,7 +242,7 @@ class BrushStroke:
         if brush.front_faces:
             is_reached &= normal[near] @ normal[on_face].sum(axis=0) > 0
         direction = (1 - t)[:, None] * tangents[0] + t[:, None] * tangents[-1]
-        x, y = self._system.x[near], self._system.y[near]
+        x, y = self._system.averages.x[near], self._system.averages.y[near]
         member = np.hypot(dot(direction, x), dot(direction, y))
         if brush.effect == "comb":
             is_reached &= member > MIN_PROJECTION
@@ -256,7 +256,8 @@ class BrushStroke:
             effect *= brush.strength * pressure
         arc_length = dabs[-1].arc_length
         if brush.effect == "smooth":
-            self._smooth(face, effect)
+            mean = self._system.neighbor_means(self.guides, face)
+            self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
             return
         is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * brush.radius]
         self._last_arc_length[face] = arc_length
@@ -272,18 +273,13 @@ class BrushStroke:
         self._least_distance[face] = distance[is_closest]
         target = to_representation(
             normalize(direction[is_reached][is_closest]),
-            self._system.x[face],
-            self._system.y[face],
+            self._system.averages.x[face],
+            self._system.averages.y[face],
             self._system.degree,
         )
         target *= (1.0 if brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
         coverage = self._coverage[face]
         self._store(face, (1 - coverage) * self._base[face] + coverage * target)
-
-    def _smooth(self, face: np.ndarray, effect: np.ndarray) -> None:
-        """Move guides toward the mean of those around them."""
-        mean = self._system.neighbor_means(self.guides, face)
-        self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
 
     def _store(self, face: np.ndarray, guides: np.ndarray) -> None:
         guides[np.abs(guides) < LEAST_FIRMNESS] = 0

@@ -16,8 +16,8 @@ import numpy as np
 from ..progress import progress
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import FaceGraph
-from .representation import complex_bincount
-from .sparse_multigrid import CSRMatrix, Level, from_coo, hierarchy, w_cycle
+from .representation import complex_bincount, unit_complex
+from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .turning_angles import added_resistance
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
@@ -103,18 +103,10 @@ def guided_rotation(
 
 def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
     """The Laplacian of the faces, with the penalty on its diagonal."""
-    count = len(penalty)
-    source, target = graph.source.astype(np.intp), graph.target.astype(np.intp)
-    diagonal = np.bincount(np.concatenate([source, target]), np.tile(stiffness, 2), count)
+    ends = np.concatenate([graph.source, graph.target])
+    diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
-    faces = np.arange(count)
-    return from_coo(
-        np.concatenate([source, target, faces]),
-        np.concatenate([target, source, faces]),
-        np.concatenate([-stiffness, -stiffness, diagonal]),
-        count,
-        count,
-    )
+    return from_edges(graph.source, graph.target, -stiffness, diagonal)
 
 
 def _initial_angle(
@@ -126,8 +118,7 @@ def _initial_angle(
     penalty: np.ndarray,
 ) -> np.ndarray:
     """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
-    modulus = np.abs(offset)
-    unit = np.divide(offset, modulus, out=np.zeros_like(offset), where=modulus > 0)
+    unit = unit_complex(offset)
     with progress(0.0, 0.3):
         mean = _solve(matrix, penalty * unit, levels)
     difference = np.angle(mean[graph.target] * mean[graph.source].conj())

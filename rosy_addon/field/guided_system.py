@@ -1,4 +1,4 @@
-"""The linear system of a smooth field that follows guides.
+"""Smooth fields that follow guides, and their linear system.
 
 The field minimizes its Dirichlet energy plus a penalty for the difference from the guides, as by
 Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013, section 4. The weight of the penalty may vary
@@ -10,17 +10,27 @@ The system of a surface is kept while its guides change: they only add to the di
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
+from ..errors import RosyError
+from ..memory import raise_mmap_threshold
 from ..progress import progress, report
+from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
-from .connection import Connection, build_connection, laplacian
-from .representation import complex_bincount, face_frames
-from .smoothest import corner_frame_angles, node_sum_per_face
+from .connection import build_connection, laplacian
+from .representation import (
+    complex_bincount,
+    face_frames,
+    from_representation,
+    to_representation,
+)
+from .rosy_field import RosyField, check_degree
+from .smoothest import smoothest_field
 from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
 from .surface import Surface
+from .surface_averages import SurfaceAverages
 
 #: Residual norm, relative to that of the right-hand side, at which a solution near some nodes stops.
 NEAR_TOLERANCE = 1e-4
@@ -63,11 +73,8 @@ class GuidedSystem:
     ----------
     surface : Surface
     degree : int
-    x, y : (F, 3) float64 ndarray
-        `face_frames` of the surface.
-    connection : Connection
-    frame_angle : (3 T,) float64 ndarray
-        `corner_frame_angles`.
+    averages : SurfaceAverages
+        With `face_frames` of the surface.
     laplacian : (n, n) CSRMatrix
     levels : list of Level
         Of `laplacian`. Empty until a first solution.
@@ -75,12 +82,17 @@ class GuidedSystem:
 
     surface: Surface
     degree: int
-    x: np.ndarray
-    y: np.ndarray
-    connection: Connection
-    frame_angle: np.ndarray
+    averages: SurfaceAverages
     laplacian: CSRMatrix
     levels: list[Level] = field(default_factory=list)
+
+    def to_representation(self, vectors: np.ndarray) -> np.ndarray:
+        """Convert (F, 3) member vectors to (F,) representations in the frames of the faces."""
+        return to_representation(vectors, self.averages.x, self.averages.y, self.degree)
+
+    def to_vectors(self, z: np.ndarray) -> np.ndarray:
+        """Convert (F,) representations in the frames of the faces to (F, 3) member vectors."""
+        return from_representation(z, self.averages.x, self.averages.y, self.degree)
 
     def node_guides(
         self,
@@ -101,14 +113,12 @@ class GuidedSystem:
         corner : (m,) int ndarray or slice
             Corners of triangles that are taken into account.
         """
-        node, count = self.connection.corner_node[corner], self.connection.node_count
-        to_node = np.exp(-1j * self.degree * self.frame_angle[corner])
-        face, area = self._corner_face[corner], self._corner_area[corner]
-        penalty = np.bincount(node, area * weight[face], count)
-        rhs = complex_bincount(node, area * (weight * target)[face] * to_node, count)
+        sums = self.averages.node_sums
+        penalty = sums(weight, 0, corner)
+        rhs = sums(weight * target, self.degree, corner)
         # Nodes of faces with hard guides are fixed at the mean guide, unless the guides cancel.
-        fixed = complex_bincount(node, area * (is_hard * target)[face] * to_node, count)
-        max_modulus = np.bincount(node, area * (is_hard * np.abs(target))[face], count)
+        fixed = sums(is_hard * target, self.degree, corner)
+        max_modulus = sums(is_hard * np.abs(target), 0, corner)
         is_fixed = np.abs(fixed) > 1e-6 * max_modulus
         fixed[~is_fixed] = 0
         fixed[is_fixed] /= np.abs(fixed[is_fixed])
@@ -187,51 +197,40 @@ class GuidedSystem:
             max_iterations=max_iterations,
         )
 
-    def face_representations(self, z: np.ndarray) -> np.ndarray:
-        """(F,) complex128 means of (n,) representations at the nodes, in the frames x, y."""
-        return node_sum_per_face(self.surface, self.connection, z, self.frame_angle, self.degree)
-
     def face_representations_at(self, z: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """(m,) complex128: those of `face_representations` on (m,) faces."""
-        is_chosen = np.zeros(self.surface.face_count, dtype=bool)
-        is_chosen[face] = True
-        corner = np.flatnonzero(is_chosen[self._corner_face])
-        value = z[self.connection.corner_node[corner]] * self._corner_area[corner]
-        value *= np.exp(1j * self.degree * self.frame_angle[corner])
-        return complex_bincount(self._corner_face[corner], value, self.surface.face_count)[face]
-
-    def node_means(self, values: np.ndarray) -> np.ndarray:
-        """(n,) complex128 means at the nodes of (F,) representations."""
-        node, count = self.connection.corner_node, self.connection.node_count
-        term = self._corner_area * values[self._corner_face]
-        term *= np.exp(-1j * self.degree * self.frame_angle)
-        return complex_bincount(node, term, count) / self.connection.positive_mass
+        """(m,) complex128 means of (n,) representations at the nodes, on (m,) faces."""
+        corner = self._corners_of_faces(face)
+        value = z[self.averages.connection.corner_node[corner]] * self.averages.corner_area[corner]
+        value *= np.exp(1j * self.degree * self.averages.frame_angle[corner])
+        corner_face = self.averages.corner_face[corner]
+        return complex_bincount(corner_face, value, self.surface.face_count)[face]
 
     def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:
         """(m,) complex128 means of (F,) representations around each of (m,) faces."""
+        averages = self.averages
         corner = self.corners_of_nodes(self.nodes_of_faces(face))
-        node, count = self.connection.corner_node[corner], self.connection.node_count
-        area = self._corner_area[corner]
-        term = area * values[self._corner_face[corner]]
-        term *= np.exp(-1j * self.degree * self.frame_angle[corner])
-        total = complex_bincount(node, term, count)
-        mean = total / np.maximum(np.bincount(node, area, count), 1e-300)
-        face_area = np.bincount(self._corner_face[corner], area, self.surface.face_count)[face]
+        total = averages.node_sums(values, self.degree, corner)
+        mass = averages.node_sums(np.ones(self.surface.face_count), 0, corner)
+        mean = total / np.maximum(mass, 1e-300)
+        corner_face, area = averages.corner_face[corner], averages.corner_area[corner]
+        face_area = np.bincount(corner_face, area, self.surface.face_count)[face]
         return self.face_representations_at(mean, face) / np.maximum(face_area, 1e-300)
+
+    def _corners_of_faces(self, face: np.ndarray) -> np.ndarray:
+        """(k,) intp: the corners of the triangles of (m,) faces, in ascending order."""
+        is_chosen = mask(self.surface.face_count, face)
+        return np.flatnonzero(is_chosen[self.averages.corner_face])
 
     def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
         """(k,) intp: the nodes of (m,) faces, in ascending order."""
-        is_chosen = np.zeros(self.surface.face_count, dtype=bool)
-        is_chosen[face] = True
-        is_node = np.zeros(self.connection.node_count, dtype=bool)
-        is_node[self.connection.corner_node[is_chosen[self._corner_face]]] = True
-        return np.flatnonzero(is_node)
+        connection = self.averages.connection
+        node = connection.corner_node[self._corners_of_faces(face)]
+        return np.flatnonzero(mask(connection.node_count, node))
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
         """(k,) intp: the corners of triangles at (m,) nodes, in ascending order."""
-        is_chosen = np.zeros(self.connection.node_count, dtype=bool)
-        is_chosen[node] = True
-        return np.flatnonzero(is_chosen[self.connection.corner_node])
+        is_chosen = mask(len(self.laplacian), node)
+        return np.flatnonzero(is_chosen[self.averages.connection.corner_node])
 
     def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
         """Grow a set of nodes ring by ring, until it has at least a number of nodes or is closed.
@@ -246,8 +245,7 @@ class GuidedSystem:
         (k,) intp ndarray
             In ascending order.
         """
-        is_near = np.zeros(self.connection.node_count, dtype=bool)
-        is_near[node] = True
+        is_near = mask(len(self.laplacian), node)
         total, ring = len(node), node
         while len(ring) and total < count:
             neighbor = self.laplacian.indices[self.laplacian.entries_of_rows(ring)]
@@ -255,16 +253,6 @@ class GuidedSystem:
             is_near[ring] = True
             total += len(ring)
         return np.flatnonzero(is_near)
-
-    @cached_property
-    def _corner_face(self) -> np.ndarray:
-        """(3 T,) int32: the face of each corner of the triangles."""
-        return np.repeat(self.surface.triangle_face, 3)
-
-    @cached_property
-    def _corner_area(self) -> np.ndarray:
-        """(3 T,) float64: a third of the area of the triangle of each corner."""
-        return np.repeat(self.connection.area / 3, 3)
 
 
 def firmness_weights(
@@ -300,13 +288,75 @@ def firmness_weights(
 
 def guided_system(surface: Surface, degree: int) -> GuidedSystem:
     """Build the system of a surface."""
-    label = "building the connection Laplacian"
-    report(0.0, label)
-    x, y = face_frames(surface)
-    with progress(0.0, 0.5):
-        connection = build_connection(surface)
-    report(0.5, label)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
+    connection = build_connection(surface)
+    averages = SurfaceAverages(surface, connection, *face_frames(surface))
     matrix = laplacian(connection, degree)
     matrix = matrix.plus_diagonal(REGULAR_SHIFT * matrix.diagonal)
-    return GuidedSystem(surface, degree, x, y, connection, frame_angle, matrix)
+    return GuidedSystem(surface, degree, averages, matrix)
+
+
+def guided_field(
+    surface: Surface,
+    degree: int,
+    guides: np.ndarray,
+    weight: np.ndarray | float | None = None,
+    hard: np.ndarray | None = None,
+    tolerance: float = RELATIVE_TOLERANCE,
+) -> RosyField:
+    """Compute the smooth field that follows guides, on components without a guide the smoothest field.
+
+    Parameters
+    ----------
+    surface : Surface
+    degree : int
+    guides : (F, 3) ndarray
+        One member vector for each face, in object space; zero where there is no guide. Lengths
+        matter: a guide of length 1/2 requests a field of magnitude 1/2.
+    weight : (F,) ndarray or float, optional
+        Weight of the guide of each face, in units of 1 / area. The influence of a guide of weight w
+        falls off over a distance of about 1 / sqrt(w). If not given, all guides are followed exactly.
+    hard : (F,) bool ndarray, optional
+        Faces on which the guide is followed exactly.
+    tolerance : float
+        Residual norm relative to that of the right-hand side at which the solver stops.
+
+    Returns
+    -------
+    RosyField
+        Of magnitude 1; zero on faces without area.
+
+    Raises
+    ------
+    RosyError
+        If no face with an area has a guide, or the degree is out of range.
+    """
+    degree = check_degree(degree)
+    raise_mmap_threshold()
+    if weight is None:
+        weight, hard = 0.0, guides.any(axis=1)
+    system = guided_system(surface, degree)
+    target = system.to_representation(np.asarray(guides, dtype=np.float64))
+    if not target.any():
+        raise RosyError(f"{surface.name}: all guides are zero, or on faces without area")
+    weight = np.where(target != 0, np.broadcast_to(weight, target.shape), 0.0)
+    is_hard = np.zeros(surface.face_count, dtype=bool) if hard is None else hard & (target != 0)
+    node_guides = system.node_guides(target, weight, is_hard)
+    with progress(0.1, 0.75):
+        z = system.solve(node_guides, tolerance=tolerance)
+    report(0.75, "averaging the field on the faces")
+    face_z = unit_representations(system.averages.face_sums(z, degree))
+    face_z[is_hard] = target[is_hard] / np.abs(target[is_hard])
+    vectors = system.to_vectors(face_z)
+    del system  # it is large
+    unguided = (face_z == 0) & surface.face_normal.any(axis=1)
+    if unguided.any():
+        with progress(0.8, 1.0):
+            vectors[unguided] = smoothest_field(surface, degree).vectors[unguided]
+    return RosyField(degree, vectors)
+
+
+def unit_representations(z: np.ndarray) -> np.ndarray:
+    """Divide (F,) representations by their moduli; 0 where the modulus is a rounding error."""
+    modulus = np.abs(z)
+    is_defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
+    return np.divide(z, modulus, out=np.zeros_like(z), where=is_defined)

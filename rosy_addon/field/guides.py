@@ -6,12 +6,11 @@ A guide is a member vector that a generated field should follow; it is zero on f
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import progress
+from .blocks import mask
 from .closest_point import closest_triangles
 from .frames import dot, normalize
 from .representation import complex_bincount, face_frames, from_representation, to_representation
@@ -74,10 +73,8 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     (E, 2) int32 ndarray
         Pairs of vertices. Nonmanifold edges count as border edges.
     """
-    with progress(0.0, 0.5):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
-    is_feature = np.ones(len(edges.ends), dtype=bool)
-    is_feature[edges.interior] = False
+    edges = build_edges(surface.corner_vertex, surface.face_start)
+    is_feature = ~mask(len(edges.ends), edges.interior)
     normal = surface.face_normal
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
     # Faces without area have no normal, so their edges have no angle.
@@ -112,19 +109,18 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
     """
     spacing = max(0.5 * surface.mean_edge_length, MIN_STROKE_SPACING * surface.extent)
     polylines = [
-        polyline
-        for stroke in strokes
-        if (polyline := _Polyline.of(np.asarray(stroke, dtype=np.float64).reshape(-1, 3)))
+        _polyline(np.asarray(stroke, dtype=np.float64).reshape(-1, 3)) for stroke in strokes
     ]
+    polylines = [(points, arc_length) for points, arc_length in polylines if len(points) > 1]
     if not polylines:
         raise RosyError(f"{surface.name}: no stroke has two different points")
-    length = sum(polyline.arc_length[-1] for polyline in polylines)
+    length = sum(arc_length[-1] for _, arc_length in polylines)
     if length > MAX_STROKE_SAMPLES * spacing:
         raise RosyError(
             f"{surface.name}: the strokes are {length:.3g} long, too long for a mesh of size "
             f"{surface.extent:.3g}: scale them, or move their points to the surface"
         )
-    samples = [polyline.resample(spacing) for polyline in polylines]
+    samples = [_resampled(points, arc_length, spacing) for points, arc_length in polylines]
     sample, direction = (np.concatenate(arrays) for arrays in zip(*samples, strict=True))
     max_distance = MAX_STROKE_DISTANCE * surface.extent
     triangle, distance = closest_triangles(surface, sample, max_distance)
@@ -156,17 +152,14 @@ def guides_from_axes(
     (F, 3) float64 ndarray
         Unit, or zero.
     """
-    face, directions = [], []
+    face = []
     closest_face = surface.triangle_face[closest_triangles(surface, position)[0]]
-    for point, direction, max_distance, closest in zip(
-        position, axis, radius, closest_face, strict=True
-    ):
+    for point, max_distance, closest in zip(position, radius, closest_face, strict=True):
         offset = surface.face_center - point
         chosen = np.flatnonzero(dot(offset, offset) <= max_distance**2)
-        chosen = chosen if len(chosen) else np.array([closest])
-        face.append(chosen)
-        directions.append(np.tile(direction, (len(chosen), 1)))
-    return average_guides(surface, np.concatenate(face), np.concatenate(directions), degree)
+        face.append(chosen if len(chosen) else np.array([closest]))
+    directions = np.repeat(axis, list(map(len, face)), axis=0)
+    return average_guides(surface, np.concatenate(face), directions, degree)
 
 
 def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
@@ -241,47 +234,32 @@ def average_guides(
     return from_representation(total, x, y, degree)
 
 
-@dataclass(frozen=True, eq=False)
-class _Polyline:
-    """A polyline without segments of length zero.
+def _polyline(stroke: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Leave out repeated ones of (n, 3) points. Return the others, and their arc lengths from the first."""
+    with np.errstate(over="ignore"):  # a length may be infinite
+        length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
+    is_kept = np.ones(len(stroke), dtype=bool)
+    is_kept[1:] = length > 0
+    return stroke[is_kept], np.concatenate([[0], np.cumsum(length[length > 0])])
 
-    Attributes
-    ----------
+
+def _resampled(
+    points: np.ndarray, arc_length: np.ndarray, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Resample a polyline at about equal distances.
+
+    Returns
+    -------
     points : (n, 3) float64 ndarray
-    arc_length : (n,) float64 ndarray
-        Of each point, from the first.
+        About `spacing` apart along the polyline.
+    directions : (n, 3) float64 ndarray
+        Unit directions of the polyline at these points, by central differences.
     """
 
-    points: np.ndarray
-    arc_length: np.ndarray
-
-    @classmethod
-    def of(cls, stroke: np.ndarray) -> _Polyline | None:
-        """Return the polyline of (n, 3) points; None if no two of them are different."""
-        with np.errstate(over="ignore"):  # a length may be infinite
-            length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
-        if not length.any():
-            return None
-        points = stroke[np.concatenate([[True], length > 0])]
-        return cls(points, np.concatenate([[0], np.cumsum(length[length > 0])]))
-
-    def resample(self, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-        """Resample at about equal distances along the polyline.
-
-        Returns
-        -------
-        points : (n, 3) float64 ndarray
-            About `spacing` apart along the polyline.
-        directions : (n, 3) float64 ndarray
-            Unit directions of the polyline at these points, by central differences.
-        """
-        length = self.arc_length[-1]
-        count = max(int(length / spacing), 1)
-        midpoint = (np.arange(count) + 0.5) * (length / count)
-        ahead, behind = self._points_at(midpoint + spacing), self._points_at(midpoint - spacing)
-        return self._points_at(midpoint), normalize(ahead - behind)
-
-    def _points_at(self, arc_length: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) points at (n,) arc lengths, which are clamped to the polyline."""
-        columns = [np.interp(arc_length, self.arc_length, column) for column in self.points.T]
+    def points_at(place: np.ndarray) -> np.ndarray:
+        columns = [np.interp(place, arc_length, column) for column in points.T]
         return np.stack(columns, axis=1)
+
+    count = max(int(arc_length[-1] / spacing), 1)
+    middle = (np.arange(count) + 0.5) * (arc_length[-1] / count)
+    return points_at(middle), normalize(points_at(middle + spacing) - points_at(middle - spacing))

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import RosyError
 from .directional_field import closest_rosy, field_directions
-from .frames import dot
+from .frames import coordinates
 from .representation import face_frames, face_representation, from_representation
 from .rosy_field import RosyField
 from .surface import Surface
@@ -62,7 +62,9 @@ def interpolate_fields(
         z = _between(*(face_representation(*pair) for pair in (first, second)), share)
         return RosyField(degree, from_representation(z, x, y, degree))
     family_count = min(field.family_count for _, field in (first, second))
-    start, stop = (_directions(*pair) for pair in (first, second))
+    start, stop = (
+        coordinates(field_directions(*pair), *face_frames(pair[0])) for pair in (first, second)
+    )
     angle, rho, ratios = closest_rosy(_between(start, _matched(start, stop, family_count), share))
     vectors = rho[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y)
     return RosyField(degree, vectors, ratios, family_count)
@@ -81,13 +83,6 @@ def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
     # The ratio of the two is the square root of 1/2 in the middle of a quarter turn.
     wanted = np.minimum(linear, np.sqrt(2) * modulus)
     return z * np.divide(wanted, modulus, out=np.zeros_like(modulus), where=modulus > 0)
-
-
-def _directions(surface: Surface, field: RosyField) -> np.ndarray:
-    """(F, N) complex128 directions of a field in `face_frames`."""
-    x, y = face_frames(surface)
-    directions = field_directions(surface, field)
-    return dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
 
 
 def _matched(first: np.ndarray, second: np.ndarray, family_count: int) -> np.ndarray:

@@ -15,9 +15,15 @@ from ..progress import progress, report
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .guided_rotation import guided_rotation
-from .representation import complex_bincount, face_frames, from_representation, to_representation
+from .representation import (
+    complex_bincount,
+    face_frames,
+    from_representation,
+    to_representation,
+    unit_complex,
+)
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, face_area_vectors, next_corners
+from .surface import Surface, face_area_vectors
 from .turning_angles import turning_angles
 
 
@@ -74,23 +80,12 @@ def prescribed_field(
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    vertex, index = np.asarray(vertex, dtype=np.int64), np.asarray(index, dtype=np.int64)
     x, y = face_frames(surface)
-    with progress(0.0, 0.2, LABEL):
-        graph = face_graph(surface, x, y)
-    report(0.2, LABEL)
-    node_index = index_at_nodes(surface, graph, vertex, index)
-    _check_sums(surface, graph, graph.defect * (degree / (2 * np.pi)), node_index, degree)
-    required = 2 * np.pi / degree * node_index - graph.defect
-    with progress(0.2, 0.85):
-        angle, direction = turning_angles(surface, graph, degree, required)
-    _check_angles(surface, graph, degree, angle)
-    report(0.85, LABEL)
+    graph = face_graph(surface, x, y)
+    angle, direction = _turning(surface, graph, degree, vertex, index, graph.defect)
     z = np.exp(1j * degree * direction) * x.any(axis=1)
-    edge = surface.vertices[surface.corner_vertex[next_corners(surface.face_start)]]
-    edge = edge - surface.vertices[surface.corner_vertex]
-    face = surface.corner_face
-    edge_z = to_representation(edge, x[face], y[face], degree)
+    points, face = surface.vertices[surface.corner_vertex], surface.corner_face
+    edge_z = to_representation(points[surface.next_corner] - points, x[face], y[face], degree)
     z *= _rotation_to(complex_bincount(face, edge_z, surface.face_count), z, graph.component)
     if guides is not None:
         target = to_representation(normalize(np.asarray(guides, dtype=np.float64)), x, y, degree)
@@ -136,25 +131,36 @@ def change_singularities(
     z = to_representation(field.vectors, x, y, degree)
     is_defined = z != 0
     z[is_defined] /= np.abs(z[is_defined])
-    with progress(0.0, 0.2, LABEL):
-        graph = face_graph(surface, x, y, is_defined)
-    report(0.2, LABEL)
-    node_change = index_at_nodes(
-        surface, graph, np.asarray(vertex, dtype=np.int64), np.asarray(change, dtype=np.int64)
-    )
-    _check_sums(surface, graph, np.zeros(graph.node_count), node_change, degree)
+    graph = face_graph(surface, x, y, is_defined)
     transported = z[graph.source] * np.exp(1j * degree * graph.unfolding)
     present = np.angle(z[graph.target] * transported.conj()) / degree
-    required = 2 * np.pi / degree * node_change
-    with progress(0.2, 0.85):
-        added, direction = turning_angles(surface, graph, degree, required, present)
-    _check_angles(surface, graph, degree, present + added)
-    report(0.85, LABEL)
+    no_defect = np.zeros(graph.node_count)
+    added, direction = _turning(surface, graph, degree, vertex, change, no_defect, present)
     turned = np.exp(1j * degree * direction) * is_defined
     turned *= _rotation_to(z, turned, graph.component)
     with progress(0.9, 1.0):
         turned = _bent(surface, graph, degree, present + added, turned, z, reach)
     return RosyField(degree, magnitude * from_representation(turned, x, y, degree))
+
+
+def _turning(
+    surface: Surface,
+    graph: FaceGraph,
+    degree: int,
+    vertex: np.ndarray,
+    index: np.ndarray,
+    defect: np.ndarray,
+    present: np.ndarray | float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The results of `turning_angles` that give vertices their indices, where nodes have (n,) defects."""
+    node_index = index_at_nodes(surface, graph, vertex, index)
+    _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
+    required = 2 * np.pi / degree * node_index - defect
+    with progress(0.2, 0.85):
+        angle, direction = turning_angles(surface, graph, degree, required, present)
+    _check_angles(surface, graph, degree, present + angle)
+    report(0.85, LABEL)
+    return angle, direction
 
 
 def _bent(
@@ -178,7 +184,7 @@ def index_at_nodes(
     surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
 ) -> np.ndarray:
     """(n,) int64 indices of the vertex nodes. That of a vertex is at its first node."""
-    vertex_count = len(surface.vertices)
+    vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
         raise RosyError(
@@ -255,6 +261,4 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
     """(F,) factors that turn the representation z to a target as a whole, on each connected component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
-    modulus = np.abs(total)
-    rotation = np.divide(total, modulus, out=np.ones_like(total), where=modulus > 0)
-    return rotation[component]
+    return unit_complex(total, otherwise=1)[component]

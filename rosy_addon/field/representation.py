@@ -38,6 +38,12 @@ def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
     return result if exponent > 0 else result.conj()
 
 
+def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
+    """Divide complex numbers by their moduli; what is 0 becomes `otherwise`."""
+    modulus = np.abs(z)
+    return np.divide(z, modulus, out=np.full_like(z, otherwise), where=modulus > 0)
+
+
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
     """(count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
     real = np.bincount(index, weights.real, count)
@@ -125,8 +131,7 @@ def edge_unfolding(
     edge_in_source = dot(edge, x[source_face]) + 1j * dot(edge, y[source_face])
     edge_in_target = dot(edge, x[target_face]) + 1j * dot(edge, y[target_face])
     unfolding = edge_in_target * edge_in_source.conj()
-    modulus = np.abs(unfolding)
-    return np.divide(unfolding, modulus, out=np.ones_like(unfolding), where=modulus > 0)
+    return unit_complex(unfolding, otherwise=1)
 
 
 def matching_angles(

@@ -85,3 +85,10 @@ class RosyField:
     def magnitude(self) -> np.ndarray:
         """(F,) float64: rho, the common length of the members."""
         return np.linalg.norm(self.vectors, axis=1)
+
+    def check_rosy(self, name: str) -> None:
+        """Raise an error, which names the mesh, if the directions are not a RoSy."""
+        if self.direction_ratios is not None:
+            raise RosyError(
+                f"{name}: only RoSy fields can be changed, but the directions of this field are not a RoSy"
+            )

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import counted
 from ..progress import progress, report
+from .blocks import mask
 from .frames import dot
 from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
@@ -53,8 +54,7 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     x, y = face_frames(surface)
     report(0.1, label)
     z = to_representation(field.vectors, x, y, field.degree)
-    with progress(0.2, 0.3, label):
-        edges = build_edges(surface.corner_vertex, surface.face_start)
+    edges = build_edges(surface.corner_vertex, surface.face_start)
     report(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.4, 0.7):
@@ -72,10 +72,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     angle_sum = angle_sum + angle_defect
     index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
 
-    has_index = np.zeros(count, dtype=bool)
-    has_index[corner_vertex] = True
-    not_interior = np.ones(len(edges.face_count), dtype=bool)
-    not_interior[edges.interior] = False
+    has_index = mask(count, corner_vertex)
+    not_interior = ~mask(len(edges.face_count), edges.interior)
     has_index[edges.ends[not_interior].ravel()] = False
     has_index[corner_vertex[(z == 0)[surface.corner_face]]] = False
     vertex = np.flatnonzero(has_index & (index != 0)).astype(np.int32)
@@ -104,15 +102,33 @@ def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularit
     """
     parts = []
     if count_singularities:
-        count = 0
-        for surface, field in fields:
-            vertices, _ = find_singularities(surface, field)
-            count += len(vertices)
+        count = sum(len(find_singularities(*pair)[0]) for pair in fields)
         parts.append(counted(count, "singularity", "singularities"))
     undefined = sum(int((~field.vectors.any(axis=1)).sum()) for _, field in fields)
     if undefined:
         parts.append(f"{counted(undefined, 'face')} without a direction")
     return ", ".join(parts)
+
+
+def first_pairs(pairs: np.ndarray) -> np.ndarray:
+    """Choose the first of some pairs, each thing in one of them at most.
+
+    Parameters
+    ----------
+    pairs : (n, 2) int ndarray
+
+    Returns
+    -------
+    (m,) intp ndarray
+        Indices of the chosen pairs.
+    """
+    taken: set[int] = set()
+    chosen = []
+    for number, pair in enumerate(pairs.tolist()):
+        if taken.isdisjoint(pair):
+            taken.update(pair)
+            chosen.append(number)
+    return np.array(chosen, dtype=np.intp)
 
 
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -7,17 +7,19 @@ of a mesh are solved separately.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..errors import RosyError
 from ..memory import raise_mmap_threshold
 from ..progress import progress, report
-from .connection import BLOCK_TRIANGLES, Connection, build_connection, laplacian
-from .frames import dot
-from .representation import complex_bincount, face_frames, from_representation
+from .connection import Connection, build_connection, laplacian
+from .representation import complex_bincount, face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .sparse_multigrid import CSRMatrix, Level, hierarchy, w_cycle
 from .surface import Surface
+from .surface_averages import SurfaceAverages
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
 #: an angle). At `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
@@ -56,17 +58,16 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
-    with progress(0.0, 0.1):
-        connection = build_connection(surface)
+    connection = build_connection(surface)
     if not connection.mass.any():
         raise RosyError(f"{surface.name}: no face has an area")
     with progress(0.1, 0.95):
         z, _ = smallest_eigenvectors(connection, degree)
-    report(0.95, "aligning the field")
     z = _align_to_edges(connection, z, degree)
     report(0.95, "averaging the field on the faces")
-    vectors = face_vectors(surface, connection, z, degree)
-    return RosyField(degree, vectors)
+    x, y = face_frames(surface)
+    mean = SurfaceAverages(surface, connection, x, y).face_sums(z, degree)
+    return RosyField(degree, from_representation(unit_complex(mean), x, y, degree))
 
 
 def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:
@@ -79,12 +80,10 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
-    report(0.0, "building the connection Laplacian")
     mass = connection.positive_mass
     shift = spectral_shift(mass)
     matrix = laplacian(connection, degree, shift)
-    with progress(0.1, 1.0):
-        z, energy = eigenproblem(matrix, mass, connection.component)
+    z, energy = eigenproblem(matrix, mass, connection.component)
     return z, energy - shift
 
 
@@ -118,29 +117,22 @@ def eigenproblem(
         levels = hierarchy(matrix)
     masses, components = [mass], [component]
     for level in levels[:-1]:
-        weight = np.abs(level.prolongation.data)
-        coarse_node = level.prolongation.indices
-        coarse_count = len(levels[len(masses)].matrix)
-        masses.append(
-            np.bincount(
-                coarse_node, masses[-1][level.prolongation.row_indices] * weight, coarse_count
-            )
-        )
-        coarse_component = np.zeros(coarse_count, dtype=component.dtype)
-        coarse_component[coarse_node] = components[-1][level.prolongation.row_indices]
+        p = level.prolongation
+        terms = masses[-1][p.row_indices] * np.abs(p.data)
+        masses.append(np.bincount(p.indices, terms, p.column_count))
+        coarse_component = np.zeros(p.column_count, dtype=component.dtype)
+        coarse_component[p.indices] = components[-1][p.row_indices]
         components.append(coarse_component)
     random = np.random.default_rng(0)
     count = len(masses[-1])
     z = random.standard_normal(count) + 1j * random.standard_normal(count)
     for index in reversed(range(len(levels))):
-        is_finest = index == 0
-        max_iterations = (
-            MAX_ITERATIONS if is_finest or index == len(levels) - 1 else COARSE_ITERATIONS
-        )
+        is_between = 0 < index < len(levels) - 1
+        max_iterations = COARSE_ITERATIONS if is_between else MAX_ITERATIONS
         start = 0.5 - 0.1 * index / len(levels)
         with progress(start, start + 0.1 / len(levels) if index else 1.0):
             z, energy = _lobpcg(levels[index:], masses[index], components[index], z, max_iterations)
-        if not is_finest:
+        if index:
             z = levels[index - 1].prolongation @ z
     return z, energy
 
@@ -170,13 +162,17 @@ def _lobpcg(
     matrix, component_count = levels[0].matrix, int(component.max()) + 1
     tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
 
-    def gram_matrices(a: list[np.ndarray], b: list[np.ndarray]) -> np.ndarray:
+    def sums(values: np.ndarray) -> np.ndarray:
+        """(components,) sums of (n,) values over each component."""
+        return _component_sums(component, values, component_count)
+
+    def gram_matrices(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
         """(components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
         gram = np.empty((component_count, len(a), len(b)), dtype=np.complex128)
         for i, conjugate in enumerate(a):
             conjugate = conjugate.conj()
             for j in range(i, len(b)):
-                gram[:, i, j] = _component_sums(component, conjugate * b[j], component_count)
+                gram[:, i, j] = sums(conjugate * b[j])
                 gram[:, j, i] = gram[:, i, j].conj()
         return gram
 
@@ -184,63 +180,48 @@ def _lobpcg(
         """Expand a value for each component to its nodes."""
         return values[component] if component_count > 1 else values
 
-    def normalize_in_place(vector: np.ndarray, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Divide a vector and its image by the mass norm of the vector, on each component."""
-        norm = np.sqrt(
-            _component_sums(
-                component, mass * (vector.real**2 + vector.imag**2), component_count
-            ).real
-        )
-        factor = broadcast(1 / np.where(norm > 0, norm, 1))
-        vector *= factor
-        image *= factor
-        return vector, image
+    def mass_norms(vector: np.ndarray) -> np.ndarray:
+        """(components,) mass norms of a vector."""
+        return np.sqrt(sums(mass * (vector.real**2 + vector.imag**2)).real)
 
-    def combine(vectors: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
-        """The linear combination of vectors with (components, k) coefficients."""
-        total = vectors[0] * broadcast(coefficients[:, 0])
-        for index, vector in enumerate(vectors[1:], 1):
-            total += vector * broadcast(coefficients[:, index])
+    def normalized(pair: np.ndarray) -> np.ndarray:
+        """Divide a (2, n) vector and its image in place by the mass norm of the vector."""
+        norm = mass_norms(pair[0])
+        pair *= broadcast(1 / np.where(norm > 0, norm, 1))
+        return pair
+
+    def combine(pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
+        """The linear combination of pairs with (components, k) coefficients."""
+        total = pairs[0] * broadcast(coefficients[:, 0])
+        for index, pair in enumerate(pairs[1:], 1):
+            total += pair * broadcast(coefficients[:, index])
         return total
 
-    z, image = normalize_in_place(z, matrix @ z)
-    previous_step: list[tuple[np.ndarray, np.ndarray]] = []
-    energy = _component_sums(component, z.conj() * image, component_count).real
+    # Vectors are in pairs with their images: their products with the matrix.
+    current = normalized(np.stack([z, matrix @ z]))
+    previous_step: list[np.ndarray] = []
+    energy = sums(current[0].conj() * current[1]).real
     for iteration in range(max_iterations):
         # 20 to 50 iterations are usual; the progress bar is scaled for that.
         report(1 - 0.95**iteration, "solving for the smoothest field")
-        residual = image - broadcast(energy) * (mass * z)
-        direction = w_cycle(levels, residual)
-        direction -= (
-            broadcast(_component_sums(component, mass * (z.conj() * direction), component_count))
-            * z
-        )
-        search = normalize_in_place(direction, matrix @ direction)
-        basis = [(z, image), search, *previous_step]
-        vectors, images = [pair[0] for pair in basis], [pair[1] for pair in basis]
-        weighted = [mass * vector for vector in vectors]
+        z, image = current
+        direction = w_cycle(levels, image - broadcast(energy) * (mass * z))
+        direction -= broadcast(sums(mass * (z.conj() * direction))) * z
+        search = normalized(np.stack([direction, matrix @ direction]))
+        basis = [current, search, *previous_step]
+        vectors, images = zip(*basis, strict=True)
         coefficients, energy = _rayleigh_ritz(
-            gram_matrices(vectors, images), gram_matrices(vectors, weighted)
+            gram_matrices(vectors, images),
+            gram_matrices(vectors, [mass * vector for vector in vectors]),
         )
+        step = combine(basis[1:], coefficients[:, 1:])
+        change = mass_norms(step[0]).max()
         new_coefficients = np.stack([coefficients[:, 0], np.ones(component_count)], axis=1)
-        z_change, image_change = (
-            combine(vectors[1:], coefficients[:, 1:]),
-            combine(images[1:], coefficients[:, 1:]),
-        )
-        change = np.sqrt(
-            _component_sums(
-                component, mass * (z_change.real**2 + z_change.imag**2), component_count
-            ).real.max()
-        )
-        z, image = (
-            combine([z, z_change], new_coefficients),
-            combine([image, image_change], new_coefficients),
-        )
-        z, image = normalize_in_place(z, image)
-        previous_step = [normalize_in_place(z_change, image_change)]
+        current = normalized(combine([current, step], new_coefficients))
+        previous_step = [normalized(step)]
         if change < tolerance:
             break
-    return z, energy
+    return current[0], energy
 
 
 def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -293,79 +274,4 @@ def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.nd
     node = connection.corner_node
     edge_z = np.exp(1j * degree * connection.edge_direction) * np.repeat(connection.area, 3)
     total = _component_sums(component[node], edge_z * z[node].conj(), count)
-    modulus = np.abs(total)
-    rotation = np.divide(total, modulus, out=np.ones_like(total), where=modulus > 0)
-    return z * rotation[component]
-
-
-def face_vectors(
-    surface: Surface, connection: Connection, z: np.ndarray, degree: int
-) -> np.ndarray:
-    """(F, 3) unit members on the faces, from (n,) representations at the nodes.
-
-    Zero on faces where the mean is zero.
-    """
-    x, y = face_frames(surface)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
-    mean = node_sum_per_face(surface, connection, z, frame_angle, degree)
-    modulus = np.abs(mean)
-    mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    return from_representation(mean, x, y, degree)
-
-
-def corner_frame_angles(
-    surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
-) -> np.ndarray:
-    """The angles that convert directions at the nodes to the frames of the faces.
-
-    The bisector of a corner is the same direction in the polar map of the node and on the face.
-
-    Returns
-    -------
-    (3 T,) float64 ndarray
-        For each corner, the angle in radians to add to a direction in the map of its node to get
-        its direction in the frame x, y of its face.
-    """
-    angle = np.empty(surface.triangle_vertex.shape)
-    for start in range(0, len(angle), BLOCK_TRIANGLES):
-        block = slice(start, start + BLOCK_TRIANGLES)
-        face = surface.triangle_face[block]
-        block_x, block_y = x.take(face, axis=0), y.take(face, axis=0)
-        points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[block].T]
-        for corner in range(3):
-            edge = points[(corner + 1) % 3] - points[corner]
-            angle[block, corner] = np.arctan2(dot(edge, block_y), dot(edge, block_x))
-    angle = angle.ravel()
-    angle += 0.5 * connection.corner_angle
-    angle -= connection.bisector_direction
-    return angle
-
-
-def node_sum_per_face(
-    surface: Surface, connection: Connection, z: np.ndarray, frame_angle: np.ndarray, degree: int
-) -> np.ndarray:
-    """Sum node values over the triangle corners of each face, weighted by triangle area.
-
-    Parameters
-    ----------
-    surface : Surface
-    connection : Connection
-    z : (n,) complex ndarray
-        Representations at the nodes.
-    frame_angle : (3 T,) float64 ndarray
-        From `corner_frame_angles`.
-    degree : int
-
-    Returns
-    -------
-    (F,) complex128 ndarray
-        In the frames of the faces; not divided by the weights.
-    """
-    weighted = np.empty((len(connection.area), 3), dtype=np.complex128)
-    node, frame_angle = connection.corner_node.reshape(-1, 3), frame_angle.reshape(-1, 3)
-    for start in range(0, len(weighted), BLOCK_TRIANGLES):
-        block = slice(start, start + BLOCK_TRIANGLES)
-        angle = degree * frame_angle[block]
-        np.multiply(z.take(node[block]), np.cos(angle) + 1j * np.sin(angle), out=weighted[block])
-        weighted[block] *= connection.area[block, None]
-    return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
+    return z * unit_complex(total, otherwise=1)[component]

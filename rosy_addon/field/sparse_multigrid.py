@@ -17,6 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from ..progress import progress, report
+from .blocks import concatenated_ranges
 
 #: Relative increase of the diagonal of a matrix that is singular, and smallest value on a diagonal,
 #: relative to the largest one.
@@ -102,11 +103,7 @@ class CSRMatrix:
 
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
         """(k,) intp: the entries of (m,) rows, row by row."""
-        count = np.diff(self.indptr)[rows]
-        stop = np.cumsum(count)
-        return np.arange(stop[-1] if len(stop) else 0) + np.repeat(
-            self.indptr[:-1][rows] - stop + count, count
-        )
+        return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
         """Return the (m, n) matrix of (m,) rows."""
@@ -154,6 +151,25 @@ def from_coo(
     return CSRMatrix(indptr, column.take(order), value.take(order), column_count)
 
 
+def from_edges(
+    tail: np.ndarray, head: np.ndarray, value: np.ndarray, diagonal: np.ndarray
+) -> CSRMatrix:
+    """Make a Hermitian matrix from its entries at edges and on the diagonal.
+
+    Parameters
+    ----------
+    tail, head : (E,) int ndarray
+        Row and column of the entry of each edge. The conjugate is at (head, tail).
+    value : (E,) complex or float ndarray
+    diagonal : (n,) float64 ndarray
+    """
+    count = len(diagonal)
+    nodes = np.arange(count)
+    row = np.concatenate([tail, head, nodes]).astype(np.intp)
+    column = np.concatenate([head, tail, nodes]).astype(np.intp)
+    return from_coo(row, column, np.concatenate([value, value.conj(), diagonal]), count, count)
+
+
 def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
     """The matrix product a b."""
     return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
@@ -167,9 +183,7 @@ def _product_terms(
     first = b.indptr.take(inner)
     count = b.indptr.take(inner + 1) - first
     entry = np.repeat(np.arange(len(inner)), count)
-    first -= np.cumsum(count) - count
-    source = first.take(entry)
-    source += np.arange(len(entry))
+    source = concatenated_ranges(first, count)
     value = a.data[block].take(entry)
     value *= b.data.take(source)
     return a.row_indices[block].take(entry), b.indices.take(source), value

@@ -26,7 +26,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..progress import progress, report
-from .blocks import row_blocks
+from .blocks import mask, row_blocks
+from .connection import sums_in_umbrellas, umbrella_order
+from .representation import unit_complex
 from .surface import build_edges, next_corners, sorted_with_order
 
 #: Label of the progress.
@@ -85,7 +87,7 @@ class CornerDirections:
         return self.degree // 2 if self.has_opposites else self.degree
 
     def phase_changes(self, spacing: float) -> np.ndarray:
-        """(T, 3, M) changes of the phase from each corner to the next, for lines along the field."""
+        """(3 T, M) changes of the phase from each corner to the next, for lines along the field."""
         edge = np.roll(self.offset, -1, axis=1) - self.offset
         middle = 0.5 * (self.angle + np.roll(self.angle, -1, axis=1))
         result = np.empty((*edge.shape, self.family_count))
@@ -97,7 +99,7 @@ class CornerDirections:
                 direction = direction * ends / np.maximum(np.abs(ends), 1e-12)
             result[:, :, family] = (edge * direction.conj()).imag / spacing
         result[~self.defined] = 0
-        return result
+        return result.reshape(-1, self.family_count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,21 +184,23 @@ def stripe_pattern(
     """
     report(0.0, LABEL)
     change = directions.phase_changes(spacing)
-    with progress(0.0, 0.1):
-        gluing = _gluing(triangle_vertex, directions)
-    with progress(0.1, 0.2):
-        change = _shared_changes(change, gluing, directions)
+    gluing = _gluing(triangle_vertex, directions)
+    change = _shared_changes(change, gluing, directions)
     report(0.2, LABEL)
     covering = _covering(triangle_vertex, gluing, directions)
     graph = _graph(covering, gluing, change, directions)
     with progress(0.4, 0.9):
         z = _smoothest(graph)
+    change, node, conjugated = (
+        values.reshape(-1, 3, directions.family_count)
+        for values in (change, covering.node, covering.conjugated)
+    )
     phase = np.empty((len(change), directions.family_count, 3), dtype=np.float32)
     index = np.empty(phase.shape[:2], dtype=np.float32)
     for block in row_blocks(len(phase)):
         report(0.95, LABEL)
-        corner = z[covering.node[block]]
-        np.conjugate(corner, out=corner, where=covering.conjugated[block])
+        corner = z[node[block]]
+        np.conjugate(corner, out=corner, where=conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
         # From corner to corner, the phase changes by nearly as much as it should.
         step = np.roll(corner_phase, -1, axis=1) - corner_phase
@@ -232,15 +236,12 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
     """Match the directions of neighboring triangles, unfolded into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
-    with progress(0.0, 0.6, LABEL):
-        edges = build_edges(corner_vertex, start)
-    report(0.6, LABEL)
+    edges = build_edges(corner_vertex, start)
     a, b = edges.halfedges.T
     is_defined = directions.defined[a // 3] & directions.defined[b // 3]
     a, b = a[is_defined], b[is_defined]
     edge = (np.roll(directions.offset, -1, axis=1) - directions.offset).reshape(-1)
     angle = (0.5 * (directions.angle + np.roll(directions.angle, -1, axis=1))).reshape(-1)
-    report(0.8, LABEL)
     unfolding = np.angle(-edge[b] * edge[a].conj())
     turn = (angle[a] + unfolding - angle[b]) * directions.degree / (2 * np.pi)
     shift_from_a = np.rint(turn).astype(np.int32) % directions.degree
@@ -253,19 +254,17 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
 def _shared_changes(
     change: np.ndarray, gluing: _Gluing, directions: CornerDirections
 ) -> np.ndarray:
-    """(T, 3, M) changes of phases that are exactly opposite in the two triangles of an edge."""
+    """(3 T, M) changes of phases that are exactly opposite in the two triangles of an edge."""
     families = directions.family_count
-    flat = change.reshape(-1, families)
-    result = flat.copy()
+    result = change.copy()
     glued = np.flatnonzero(gluing.twin >= 0)
     twin, shift = gluing.twin[glued], gluing.shift[glued]
     for family in range(families):
-        report(family / families, LABEL)
         direction = (family + shift) % directions.degree
-        neighbor = flat.reshape(-1).take(twin * np.intp(families) + direction % families)
+        neighbor = change.reshape(-1).take(twin * np.intp(families) + direction % families)
         np.negative(neighbor, out=neighbor, where=direction < families)
-        result[glued, family] = 0.5 * (flat[glued, family] + neighbor)
-    return result.reshape(change.shape)
+        result[glued, family] = 0.5 * (change[glued, family] + neighbor)
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,12 +273,12 @@ class _Covering:
 
     Attributes
     ----------
-    node : (T, 3, M) int32 ndarray
+    node : (3 T, M) int32 ndarray
         Node of each corner and family.
-    conjugated : (T, 3, M) bool ndarray
+    conjugated : (3 T, M) bool ndarray
         Whether the family has the conjugate of the value of the node.
     node_count : int
-    is_singular : (T, 3) bool ndarray
+    is_singular : (3 T,) bool ndarray
         Whether the vertex is singular. Its corners are separate nodes, because around it, a family
         comes back as another one.
     """
@@ -296,28 +295,14 @@ def _covering(
     """Count the directions of all corners around a vertex from the same one."""
     degree, families = directions.degree, directions.family_count
     corner = np.arange(len(gluing.twin), dtype=np.int32)
-    # Around a vertex, the previous corner lies across the edge that leaves from a corner.
-    has_previous = gluing.twin >= 0
-    previous = np.where(has_previous, gluing.next_corner[gluing.twin], corner)
-    first, pointer = corner, previous
-    for _ in range(int(np.bincount(triangle_vertex.reshape(-1)).max()).bit_length()):
-        first, pointer = np.minimum(first, first[pointer]), pointer[pointer]
-    # A closed fan begins at its first corner, an open one at the corner without a previous one.
-    is_closed = has_previous[pointer]
-    start = np.where(is_closed & (first == corner), corner, previous)
-    shift = np.where(start != corner, gluing.shift, 0)
-    while True:
-        following = start[start]
-        if np.array_equal(following, start):
-            break
-        shift, start = (shift + shift[start]) % degree, following
-    closes = has_previous & (start == corner)
-    turn = (gluing.shift + shift[previous]) % degree
-    is_singular = (closes & (turn != 0))[start]
+    previous, _ = umbrella_order(triangle_vertex.reshape(-1), gluing.twin, gluing.next_corner)
+    start, shift = sums_in_umbrellas(previous, gluing.shift)
+    last = gluing.next_corner[gluing.twin]
+    closes = (gluing.twin >= 0) & (start == corner)
+    is_singular = (closes & ((gluing.shift + shift[last]) % degree != 0))[start]
     fan = np.where(is_singular, corner, start)
-    shift = np.where(is_singular, 0, shift)
-    is_used = np.zeros(len(corner), dtype=bool)
-    is_used[fan] = True
+    shift = np.where(is_singular, 0, shift % degree)
+    is_used = mask(len(corner), fan)
     number = (np.cumsum(is_used) - 1)[fan]
     node = np.empty((len(corner), families), dtype=np.int32)
     conjugated = np.empty(node.shape, dtype=bool)
@@ -325,13 +310,7 @@ def _covering(
         direction = (family + shift) % degree
         node[:, family] = number * families + direction % families
         conjugated[:, family] = direction >= families
-    shape = (-1, 3, families)
-    return _Covering(
-        node.reshape(shape),
-        conjugated.reshape(shape),
-        int(np.count_nonzero(is_used)) * families,
-        is_singular.reshape(-1, 3),
-    )
+    return _Covering(node, conjugated, int(np.count_nonzero(is_used)) * families, is_singular)
 
 
 def _edge_weights(directions: CornerDirections) -> np.ndarray:
@@ -392,23 +371,17 @@ def _graph(
     has_twin = gluing.twin >= 0
     weight = weight + np.where(has_twin, weight[gluing.twin], 0)
     # Each edge once. At singular vertices, both triangles have nodes of their own.
-    singular = covering.is_singular.reshape(-1)
-    cut = singular | singular[gluing.next_corner]
+    cut = covering.is_singular | covering.is_singular[gluing.next_corner]
     tail = np.flatnonzero(~has_twin | (corner < gluing.twin) | cut)
     head = gluing.next_corner[tail]
-    families = directions.family_count
-    node, conjugated = (
-        covering.node.reshape(-1, families),
-        covering.conjugated.reshape(-1, families),
-    )
-    tail_flipped, head_flipped = conjugated[tail], conjugated[head]
-    turn = change.reshape(-1, families)[tail]
+    tail_flipped, head_flipped = covering.conjugated[tail], covering.conjugated[head]
+    turn = change[tail]
     np.negative(turn, out=turn, where=head_flipped)
     value = np.exp((2j * np.pi) * turn)
     value *= weight[tail, None]
     flips = tail_flipped != head_flipped
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
-    tail_node, head_node = node[tail].reshape(-1), node[head].reshape(-1)
+    tail_node, head_node = covering.node[tail].reshape(-1), covering.node[head].reshape(-1)
     return _graph_of_entries(
         covering.node_count,
         np.concatenate([head_node, tail_node]),
@@ -531,9 +504,7 @@ def _clustering(graph: _Graph) -> _Clustering:
     follower = np.flatnonzero(~is_root)
     a, b = graph.a[link[follower]], graph.b[link[follower]]
     keeps = np.abs(a) >= np.abs(b)
-    value = np.where(keeps, a, b)
-    modulus = np.abs(value)
-    value = np.divide(value, modulus, out=np.ones_like(value), where=modulus > 0)
+    value = unit_complex(np.where(keeps, a, b), otherwise=1)
     p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
     number = np.cumsum(is_root) - 1
     return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))

@@ -11,6 +11,7 @@ import numpy as np
 from ..cache import content_hash
 from ..errors import RosyError, counted
 from ..progress import progress, report
+from .blocks import mask, row_blocks
 from .frames import dot, normalize
 from .triangulate import triangulate
 
@@ -134,14 +135,12 @@ class Surface:
     @cached_property
     def fans_share_normals(self) -> bool:
         """Whether all corner normals equal that of their fan; custom normals may differ."""
-        for start in range(0, len(self.corner_fan), BLOCK_ELEMENTS):
-            block = slice(start, start + BLOCK_ELEMENTS)
-            difference = self.corner_normal[block] - self.fan_normal.take(
-                self.corner_fan[block], axis=0
-            )
-            if np.abs(difference).max() > NORMAL_TOLERANCE:
-                return False
-        return True
+        normals = self.fan_normal
+        return all(
+            np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()
+            <= NORMAL_TOLERANCE
+            for block in row_blocks(len(self.corner_fan), BLOCK_ELEMENTS)
+        )
 
     @cached_property
     def face_normal(self) -> np.ndarray:
@@ -210,14 +209,13 @@ def build_surface(
         with progress(0.1, 0.3):
             triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
     if corner_fan is None:
-        with progress(0.3, 0.8):
-            corner_fan = smooth_fans(
-                vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-            )
+        report(0.3, "finding smooth edges")
+        corner_fan = smooth_fans(
+            vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+        )
     report(0.8, "computing normals")
     if corner_normal is None:
-        with progress(0.8, 1.0):
-            corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
+        corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return Surface(
         name=name,
         vertices=vertices,
@@ -245,13 +243,32 @@ def smooth_fans(
 
     Without a sharp angle, the result does not depend on the vertex positions.
     """
-    label = "finding smooth edges"
-    with progress(0.0, 0.5, label):
-        pairs = _smooth_corner_pairs(
-            vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-        )
-    with progress(0.5, 1.0, label):
-        return connected_components(len(corner_vertex), pairs)
+    edges = build_edges(corner_vertex, face_start)
+    corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    smooth = np.ones(len(a), dtype=bool)
+    if flat_faces is not None:
+        flat = np.asarray(flat_faces, dtype=bool)
+        smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
+    if sharp_angle is not None:
+        normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
+        smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
+    if sharp_edges is not None and len(sharp_edges):
+        stride = int(corner_vertex.max()) + 1
+        sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
+        ends = edges.ends[edges.interior].astype(np.int64)
+        smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
+    a, b = a[smooth], b[smooth]
+    return connected_corners(a, b, next_corner)
+
+
+def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
+    """(C,) int32 components of corners that meet at the ends of edges.
+
+    (I,) a and b are the corners where the edges start in the faces on both sides.
+    """
+    ends = np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)
+    return connected_components(len(next_corner), np.concatenate(ends))
 
 
 def corner_faces(face_start: np.ndarray) -> np.ndarray:
@@ -275,9 +292,7 @@ def box_corners(points: np.ndarray) -> np.ndarray:
 
 def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
     """(n,) intp: the vertices that a corner refers to, in ascending order."""
-    used = np.zeros(vertex_count, dtype=bool)
-    used[corner_vertex] = True
-    return np.flatnonzero(used)
+    return np.flatnonzero(mask(vertex_count, corner_vertex))
 
 
 def sum_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
@@ -361,23 +376,18 @@ class Edges:
 
 def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
     """Find the edges of a polygon mesh; the parameters are arrays of `Surface`."""
-    label = "finding edges"
-    report(0.0, label)
     tail = corner_vertex.astype(np.int64)
     head = tail[next_corners(face_start)]
     stride = int(corner_vertex.max(initial=0)) + 1
-    report(0.2, label)
     key, corner_by_edge = sorted_with_order(
         np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
     )
-    report(0.6, label)
     is_first = np.ones(len(key), dtype=bool)
     np.not_equal(key[1:], key[:-1], out=is_first[1:])
     first = np.flatnonzero(is_first)
     edge_key, face_count = key[first], np.diff(first, append=len(key))
     corner_edge = np.empty(len(key), dtype=np.int32)
     corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
-    report(0.8, label)
     interior = np.flatnonzero(face_count == 2)
     a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
     opposite = tail[a] == head[b]
@@ -415,8 +425,8 @@ def count_inconsistent_edges(surface: Surface) -> int:
     """
     edges = build_edges(surface.corner_vertex, surface.face_start)
     degenerate = ~surface.face_normal.any(axis=1)
-    borders_degenerate = np.zeros(len(edges.face_count), dtype=bool)
-    borders_degenerate[edges.corner_edge[degenerate[surface.corner_face]]] = True
+    degenerate_edge = edges.corner_edge[degenerate[surface.corner_face]]
+    borders_degenerate = mask(len(edges.face_count), degenerate_edge)
     inconsistent = (edges.face_count == 2) & ~borders_degenerate
     inconsistent[edges.interior] = False
     return int(np.count_nonzero(inconsistent))
@@ -463,40 +473,6 @@ def _check_polygons(
     points = vertices if len(used) == len(vertices) else vertices[used]
     if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
-
-
-def _smooth_corner_pairs(
-    vertices: np.ndarray,
-    corner_vertex: np.ndarray,
-    face_start: np.ndarray,
-    sharp_edges: np.ndarray | None,
-    sharp_angle: float | None,
-    flat_faces: np.ndarray | None,
-) -> np.ndarray:
-    """(K, 2) pairs of corners at the same vertex of two faces that share a smooth edge."""
-    label = "finding smooth edges"
-    with progress(0.0, 0.4, label):
-        edges = build_edges(corner_vertex, face_start)
-    report(0.4, label)
-    corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    smooth = np.ones(len(a), dtype=bool)
-    if flat_faces is not None:
-        flat = np.asarray(flat_faces, dtype=bool)
-        smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
-    if sharp_angle is not None:
-        normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
-        report(0.7, label)
-        smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
-    if sharp_edges is not None and len(sharp_edges):
-        stride = int(corner_vertex.max()) + 1
-        sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
-        ends = edges.ends[edges.interior].astype(np.int64)
-        smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
-    a, b = a[smooth], b[smooth]
-    return np.concatenate(
-        [np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)]
-    )
 
 
 def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
@@ -552,23 +528,18 @@ def _fan_normals(
 
     Where the mean is zero, the face normal; (0, 0, 1) if that is zero, too.
     """
-    label = "computing normals"
     angle = np.empty(len(corner_vertex))
-    for faces, corners, starts in face_blocks(face_start):
-        report(0.5 * faces.start / len(face_start), label)
+    for _, corners, starts in face_blocks(face_start):
         points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
         following = next_corners(starts)
         to_next = normalize(points[following] - points)
         to_previous = np.empty_like(to_next)
         to_previous[following] = -to_next
         angle[corners] = np.arccos(np.clip(dot(to_next, to_previous), -1, 1))
-    report(0.5, label)
     face_normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
-    report(0.7, label)
     face = corner_faces(face_start)
     fan_count = int(corner_fan.max()) + 1
     total = [np.bincount(corner_fan, angle * column[face], fan_count) for column in face_normal.T]
-    report(0.8, label)
     normal = normalize(np.stack(total, axis=1))[corner_fan]
     undefined = ~normal.any(axis=1)
     normal[undefined] = face_normal[face[undefined]]

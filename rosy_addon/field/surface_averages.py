@@ -1,19 +1,18 @@
-"""Curvature of faces, and averages of face values over lengths on a surface."""
+"""Averages of face values at the nodes of a surface, back on the faces, and over lengths."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ..progress import progress, report
-from .connection import Connection
-from .curvature import TINY, face_curvature
+from ..progress import report
+from .connection import BLOCK_TRIANGLES, Connection, laplacian
 from .frames import dot
 from .representation import complex_bincount
-from .smoothest import corner_frame_angles, node_sum_per_face
 from .sparse_multigrid import CSRMatrix
-from .surface import Surface, build_surface, face_area_vectors
+from .surface import Surface
 
 #: Relative residual norm at which conjugate gradients stop.
 AVERAGE_TOLERANCE = 1e-2
@@ -22,44 +21,11 @@ AVERAGE_TOLERANCE = 1e-2
 MAX_STEPS = 500
 
 
-def of_unit_extent(surface: Surface) -> Surface:
-    """Return a surface of extent 1 around the origin, so that no number is very large or small."""
-    used = surface.used_vertices
-    vertices = np.zeros_like(surface.vertices)
-    low, high = surface.vertices[used].min(axis=0), surface.vertices[used].max(axis=0)
-    vertices[used] = (surface.vertices[used] - 0.5 * (low + high)) / surface.extent
-    return replace(surface, vertices=vertices, rest_vertices=None)
-
-
-def bounded_curvature(
-    surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Curvature of each face, with normals that are smooth within the given fans of corners.
-
-    A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
-    """
-    with progress(0.0, 0.6, "averaging normals"):
-        smooth = build_surface(
-            surface.vertices,
-            surface.corner_vertex,
-            surface.face_start,
-            name=surface.name,
-            corner_fan=corner_fan,
-            triangles=surface.triangles,
-            triangle_face=surface.triangle_face,
-        )
-    mean, deviator = face_curvature(smooth, x, y)
-    vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
-    limit = np.maximum(0.5 * np.sqrt(dot(vectors, vectors)), 1e-300) ** -0.5
-    modulus = np.abs(deviator)
-    deviator = deviator * np.divide(limit, modulus, out=np.ones_like(limit), where=modulus > limit)
-    return np.clip(mean, -limit, limit), deviator
-
-
+@dataclass(frozen=True, eq=False)
 class SurfaceAverages:
-    """Averages of face values over a length, by way of the nodes of a connection.
+    """Averages of representations on the faces at the n nodes of a connection, and the way back.
 
-    Parameters
+    Attributes
     ----------
     surface : Surface
     connection : Connection
@@ -67,30 +33,103 @@ class SurfaceAverages:
         Frames of the faces.
     """
 
-    def __init__(
-        self, surface: Surface, connection: Connection, x: np.ndarray, y: np.ndarray
-    ) -> None:
-        self.surface, self.connection = surface, connection
-        self.frame_angle = corner_frame_angles(surface, connection, x, y)
-        self.corner_face = np.repeat(surface.triangle_face, 3)
-        self.corner_area = np.repeat(connection.area / 3, 3)
-        self.mass = connection.positive_mass
+    surface: Surface
+    connection: Connection
+    x: np.ndarray
+    y: np.ndarray
 
-    def node_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(n,) ndarray: integrals of face values around the nodes; complex if the degree is not 0."""
-        terms = self.corner_area * values[self.corner_face]
-        node, count = self.connection.corner_node, self.connection.node_count
+    @cached_property
+    def frame_angle(self) -> np.ndarray:
+        """(3 T,) float64 angles that convert directions at the nodes to the frames of the faces.
+
+        For each corner of a triangle, the angle in radians to add to a direction in the map of its node.
+        The bisector of a corner is the same direction in the polar map of the node and on the face.
+        """
+        surface = self.surface
+        angle = np.empty(surface.triangle_vertex.shape)
+        for start in range(0, len(angle), BLOCK_TRIANGLES):
+            block = slice(start, start + BLOCK_TRIANGLES)
+            face = surface.triangle_face[block]
+            x, y = self.x.take(face, axis=0), self.y.take(face, axis=0)
+            points = [surface.vertices.take(v, axis=0) for v in surface.triangle_vertex[block].T]
+            for corner in range(3):
+                edge = points[(corner + 1) % 3] - points[corner]
+                angle[block, corner] = np.arctan2(dot(edge, y), dot(edge, x))
+        angle = angle.ravel()
+        angle += 0.5 * self.connection.corner_angle
+        angle -= self.connection.bisector_direction
+        return angle
+
+    @cached_property
+    def corner_face(self) -> np.ndarray:
+        """(3 T,) int32: the face of each corner of the triangles."""
+        return np.repeat(self.surface.triangle_face, 3)
+
+    @cached_property
+    def corner_area(self) -> np.ndarray:
+        """(3 T,) float64: a third of the area of the triangle of each corner."""
+        return np.repeat(self.connection.area / 3, 3)
+
+    @cached_property
+    def mass(self) -> np.ndarray:
+        """(n,) float64 masses of the nodes, all positive."""
+        return self.connection.positive_mass
+
+    def node_sums(
+        self, values: np.ndarray, degree: int, corner: np.ndarray | slice = slice(None)
+    ) -> np.ndarray:
+        """Integrate face values around the nodes.
+
+        Parameters
+        ----------
+        values : (F,) ndarray
+            Representations in the frames of the faces.
+        degree : int
+            N of the representations; 0 for real numbers.
+        corner : (m,) int ndarray or slice
+            Corners of triangles that are taken into account.
+
+        Returns
+        -------
+        (n,) ndarray
+            Complex if the degree is not 0.
+        """
+        terms = self.corner_area[corner] * values[self.corner_face[corner]]
+        node, count = self.connection.corner_node[corner], self.connection.node_count
         if not degree:
             return np.bincount(node, terms, count)
-        return complex_bincount(node, terms * np.exp(-1j * degree * self.frame_angle), count)
+        to_node = np.exp(-1j * degree * self.frame_angle[corner])
+        return complex_bincount(node, terms * to_node, count)
+
+    def face_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
+        """(F,) complex128: (n,) node values at the corners of triangles times the areas, added up."""
+        area = self.connection.area
+        weighted = np.empty((len(area), 3), dtype=np.complex128)
+        node, frame_angle = (
+            self.connection.corner_node.reshape(-1, 3),
+            self.frame_angle.reshape(-1, 3),
+        )
+        for start in range(0, len(weighted), BLOCK_TRIANGLES):
+            block = slice(start, start + BLOCK_TRIANGLES)
+            angle = degree * frame_angle[block]
+            to_face = np.cos(angle) + 1j * np.sin(angle)
+            np.multiply(values.take(node[block]), to_face, out=weighted[block])
+            weighted[block] *= area[block, None]
+        surface = self.surface
+        return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
 
     def face_means(self, values: np.ndarray, degree: int) -> np.ndarray:
         """(F,) complex128: mean of the node values of a degree on each face."""
-        total = node_sum_per_face(self.surface, self.connection, values, self.frame_angle, degree)
-        area = np.bincount(
-            self.surface.triangle_face, 3 * self.connection.area, self.surface.face_count
-        )
+        total, surface = self.face_sums(values, degree), self.surface
+        area = np.bincount(surface.triangle_face, 3 * self.connection.area, surface.face_count)
         return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
+
+    def laplacian(self, degree: int) -> CSRMatrix:
+        """Return the matrix of `connection.laplacian` in single precision; real for degree 0."""
+        matrix = laplacian(self.connection, degree)
+        if degree:
+            return matrix.with_values(matrix.data.astype(np.complex64))
+        return matrix.with_values(matrix.data.real.astype(np.float32))
 
     def smooth(
         self, matrix: CSRMatrix, area: float, sums: np.ndarray, start: np.ndarray | None = None
@@ -100,7 +139,7 @@ class SurfaceAverages:
         Parameters
         ----------
         matrix : CSRMatrix
-            L, of single precision.
+            L, from `laplacian`.
         area : float
             The square of the length of the average.
         sums : (n,) ndarray
@@ -115,7 +154,7 @@ class SurfaceAverages:
         """
         dtype = matrix.data.dtype
         scale = float(np.abs(sums).max())
-        if scale < TINY:
+        if scale < np.finfo(np.float64).tiny:
             return np.zeros_like(sums)
         # All numbers are of order 1 after this, whatever the size of the mesh.
         mass = (self.mass / self.mass.mean()).astype(np.float32)

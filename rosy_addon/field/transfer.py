@@ -67,7 +67,6 @@ def transfer_field(
         )
     vectors = field.vectors[face]
     length = np.sqrt(dot(vectors, vectors))[:, None]
-    report(0.95, "transferring the field")
     vectors = normalize(transport(vectors, source.face_normal[face], normal)) * length
     vectors[undefined] = 0
     direction_ratios = None if field.direction_ratios is None else field.direction_ratios[face]

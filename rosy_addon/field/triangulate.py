@@ -53,10 +53,8 @@ def triangulate(
     size = np.diff(face_start)
     apex = np.zeros(len(size), dtype=np.int32)
     faces = np.flatnonzero(size > 3)
-    ear_faces = faces[:0]
-    if len(faces):
-        apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
-        ear_faces = faces[needs_ears]
+    apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
+    ear_faces = faces[needs_ears]
     report(0.7, LABEL)
     triangles, triangle_face = _triangle_fans(face_start, apex)
     first_triangle = np.cumsum(size - 2) - (size - 2)

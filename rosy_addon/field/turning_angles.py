@@ -6,7 +6,7 @@ solves linear equations for the angles, one for each interior vertex; and on sur
 several borders, one for each loop that no vertex can contract.
 
 The angles of least squares are those of a potential at the vertices, which solves a Poisson equation on the
-triangles (`triangle_graph`); and those of one harmonic solution for each loop. Around a loop, the field may
+triangles (`face_graph.TriangleGraph`); and those of one harmonic solution for each loop. Around a loop, the field may
 turn by any multiple of 2 pi / N; the multiples of least energy are chosen.
 """
 
@@ -20,10 +20,9 @@ import numpy as np
 
 from ..progress import progress, report
 from .conjugate_gradient import conjugate_gradient
-from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest
-from .sparse_multigrid import CSRMatrix, from_coo, hierarchy, w_cycle
+from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
+from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
 from .surface import Surface, connected_components
-from .triangle_graph import triangle_graph
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-10
@@ -98,8 +97,7 @@ def turning_angles(
             changed = _least_angles_near(
                 triangles.graph, required, loops, between, np.flatnonzero(factor > 1)
             )
-        if changed is None:
-            with progress(start, stop):
+            if changed is None:
                 changed = triangles.graph.conductance * least_angles(
                     triangles.graph, degree, required, loops, present_between
                 )
@@ -145,9 +143,9 @@ def _least_angles_near(
     )
     rest = (required - graph.turn_around_nodes(fixed))[is_near]
     with progress(0.2, 0.5):
-        solver = _potential_solver(near)
+        solver = potential_solver(near)
     with progress(0.5, 1.0):
-        fixed[edges] = near.conductance * solver(rest)
+        fixed[edges] = near.conductance * near.drop(solver(rest))
     change = [(signs * (fixed - angle)[crossed]).sum() for crossed, signs in loops]
     return fixed if np.abs(change).max(initial=0.0) < MAX_LOOP_CHANGE else None
 
@@ -170,19 +168,18 @@ def least_angles(
 ) -> np.ndarray:
     """(I,) angles of least squares, divided by the conductances; see `turning_angles`."""
     with progress(0.0, 0.5):
-        solver = _potential_solver(graph)
+        solver = potential_solver(graph)
     share = 0.5 / (len(loops) + 1)
     with progress(0.5, 0.5 + share):
-        drop = solver(required)
+        drop = graph.drop(solver(required))
     harmonics = []
     for number, (edges, signs) in enumerate(loops, 1):
         crossing = np.zeros(len(drop))
         np.add.at(crossing, edges, signs)
         start = 0.5 + number * share
         with progress(start, start + share):
-            harmonics.append(
-                crossing + solver(-graph.turn_around_nodes(graph.conductance * crossing))
-            )
+            potential = solver(-graph.turn_around_nodes(graph.conductance * crossing))
+        harmonics.append(crossing + graph.drop(potential))
     if loops:
         turn = 2 * np.pi / degree
         total = graph.conductance * drop + present + graph.unfolding
@@ -199,12 +196,14 @@ def least_angles(
     return drop
 
 
-def _potential_solver(graph: FaceGraph) -> Callable[[np.ndarray], np.ndarray]:
-    """A function that computes the (I,) differences of the potential with (n,) sums around the nodes."""
+def potential_solver(
+    graph: FaceGraph, tolerance: float = TOLERANCE
+) -> Callable[[np.ndarray], np.ndarray]:
+    """A function that computes the (n,) potential with (n,) sums around the interior nodes."""
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):
-            matrix = potential_matrix(graph)
+            matrix = _potential_matrix(graph)
         with progress(0.2, 1.0):
             levels = hierarchy(matrix)
 
@@ -213,20 +212,20 @@ def _potential_solver(graph: FaceGraph) -> Callable[[np.ndarray], np.ndarray]:
         if matrix is not None:
             rhs, precondition = sums[graph.is_interior], partial(w_cycle, levels)
             potential[graph.is_interior] = conjugate_gradient(
-                matrix, rhs, TOLERANCE, precondition, LABEL
+                matrix, rhs, tolerance, precondition, LABEL
             )
-        return potential[graph.head] - potential[graph.tail]
+        return potential
 
     return solve
 
 
-def potential_matrix(graph: FaceGraph) -> CSRMatrix:
+def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
     """The Laplacian of potentials at interior nodes, which are 0 at the others.
 
     On closed components, the first node is tied to 0 as well; the sums of a solvable equation do not change
     that node.
     """
-    count, unknown = int(graph.is_interior.sum()), np.cumsum(graph.is_interior) - 1
+    unknown = np.cumsum(graph.is_interior) - 1
     tail, head, conductance = graph.tail, graph.head, graph.conductance
     diagonal = np.bincount(np.concatenate([tail, head]), np.tile(conductance, 2), graph.node_count)
     _, first = np.unique(graph.node_component, return_index=True)
@@ -236,13 +235,7 @@ def potential_matrix(graph: FaceGraph) -> CSRMatrix:
     diagonal[tied] += diagonal[tied] / 6
     inside = graph.is_interior[tail] & graph.is_interior[head]
     tail, head = unknown[tail[inside]], unknown[head[inside]]
-    nodes = np.arange(count)
-    value = np.concatenate(
-        [-conductance[inside], -conductance[inside], diagonal[graph.is_interior]]
-    )
-    row = np.concatenate([tail, head, nodes]).astype(np.intp)
-    column = np.concatenate([head, tail, nodes]).astype(np.intp)
-    return from_coo(row, column, value, count, count)
+    return from_edges(tail, head, -conductance[inside], diagonal[graph.is_interior])
 
 
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,25 +19,21 @@ from .directional_field import (
     ratio_harmonics,
     ratios_from_harmonics,
 )
-from .frames import dot, normalize, tangent_frame
+from .frames import coordinates, dot, normalize, tangent_frame
 from .representation import (
     face_frames,
     from_representation,
-    power,
     signed_power,
     to_representation,
 )
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, mean_per_face
 
-#: Largest angle in degrees between a vector and the plane of its face. Larger angles mean that the
-#: field belongs to another mesh or another space. Rounding in text files causes about a thousandth
-#: of this.
-FACE_TOLERANCE_DEG = 5.0
-
-#: The same for vectors on vertices. Programs define vertex normals differently: on coarse meshes,
-#: angle-weighted and area-weighted normals differ by this much.
-VERTEX_TOLERANCE_DEG = 20.0
+#: Largest angle in degrees between a vector and the plane of its face or vertex. Larger angles mean
+#: that the field belongs to another mesh or another space. Rounding in text files causes about a
+#: thousandth of that on faces. Programs define vertex normals differently: on coarse meshes,
+#: angle-weighted and area-weighted normals differ by as much as that on vertices.
+TOLERANCE_DEG = {"face": 5.0, "vertex": 20.0}
 
 #: Largest fraction of the nonzero vectors that may exceed the tolerance, for example on needle
 #: faces whose normals are inaccurate.
@@ -100,27 +97,30 @@ def validated_field(
     """
     degree = check_degree(degree)
     vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
+    domain = _checked_domain(surface, len(vectors), domain, source)
+    apply_nonfinite_policy(vectors, source, domain, nonfinite)
+    normal = tangent_normals(surface, domain)
+    with progress(0.4, 0.6):
+        vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
+    if domain == "vertex":
+        x, y = face_frames(surface.in_rest_shape())
+        z = to_representation(vectors, *tangent_frame(normal), degree)
+        face_z = _vertex_averages(surface.in_rest_shape(), normal, x)(z, degree)
+        vectors = from_representation(face_z, x, y, degree)
+    return RosyField(degree, vectors)
+
+
+def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
+    """The domain of a number of vectors. Raise an error if they are too many or too few for it."""
+    domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
-    domain = infer_domain(surface, len(vectors)) if domain is None else domain
-    if len(vectors) != {"face": faces, "vertex": vertices}.get(domain):
+    if count != {"face": faces, "vertex": vertices}.get(domain):
         raise RosyError(
-            f"{source}: contains {counted(len(vectors), 'vector')}, "
+            f"{source}: contains {counted(count, 'vector')}, "
             f"but {surface.name} has {counted(faces, 'face')} and "
             f"{counted(vertices, 'vertex', 'vertices')}"
         )
-    apply_nonfinite_policy(vectors, source, domain, nonfinite)
-    normal = tangent_normals(surface, domain)
-    if domain == "face":
-        with progress(0.4, 1.0):
-            return RosyField(
-                degree, project_to_tangent(vectors, normal, FACE_TOLERANCE_DEG, source, "face")
-            )
-    with progress(0.4, 0.6):
-        vectors = project_to_tangent(vectors, normal, VERTEX_TOLERANCE_DEG, source, "vertex")
-    with progress(0.6, 1.0):
-        return RosyField(
-            degree, _average_to_faces(surface.in_rest_shape(), vectors, normal, degree)
-        )
+    return domain
 
 
 def validated_directions(
@@ -153,30 +153,21 @@ def validated_directions(
         As for `validated_field`.
     """
     directions = np.array(directions, dtype=np.float64)
-    count, degree = directions.shape[:2]
-    domain = infer_domain(surface, count) if domain is None else domain
-
-    def usable_rows(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        unusable = ~has_finite_square(rows).all(axis=(1, 2))
-        return unusable, np.where(unusable[:, None, None], 0.0, rows)
-
-    with progress(0.0, 0.1):
-        unusable, usable_directions = by_rows(usable_rows, directions, label=LABEL)
+    count, degree = len(directions), check_degree(directions.shape[1])
+    domain = _checked_domain(surface, count, domain, source)
+    with np.errstate(invalid="ignore"):
+        unusable = ~(np.abs(directions) < MAX_COMPONENT).all(axis=(1, 2))
+    usable_directions = np.where(unusable[:, None, None], 0.0, directions)
     source_directions = usable_directions if domain == "face" else None
     directions[unusable] = np.nan
-    count_matches = domain is not None and count == _element_count(surface, domain)
-    are_rosys = True
-    if count_matches:
-        normal = tangent_normals(surface, domain)
-        for rows in row_blocks(count):
-            report(0.2 + 0.1 * rows.start / count, LABEL)
-            x, y = tangent_frame(normal[rows])
-            usable = usable_directions[rows]
-            are_rosys &= is_rosy(dot(usable, x[:, None]) + 1j * dot(usable, y[:, None]))
-            if not are_rosys:
-                break
-    report(0.3, LABEL)
-    if are_rosys:
+    normal = tangent_normals(surface, domain)
+
+    def are_rosys(rows: slice) -> bool:
+        x, y = tangent_frame(normal[rows])
+        return is_rosy(coordinates(usable_directions[rows], x, y))
+
+    report(0.1, LABEL)
+    if all(map(are_rosys, row_blocks(count))):
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
         with progress(0.3, 0.6):
@@ -186,64 +177,58 @@ def validated_directions(
                 detect_families(surface.in_rest_shape(), field), source_directions=source_directions
             )
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
-    report(0.3, LABEL)
-    tolerance_deg = FACE_TOLERANCE_DEG if domain == "face" else VERTEX_TOLERANCE_DEG
     flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
     with progress(0.3, 0.5):
         directions = project_to_tangent(
-            flat_directions, normals, tolerance_deg, source, domain
+            flat_directions, normals, TOLERANCE_DEG[domain], source, domain
         ).reshape(count, degree, 3)
     surface = surface.in_rest_shape()
-    if domain == "face":
-        with progress(0.5, 1.0, LABEL):
-            return replace(
-                field_from_directions(surface, directions), source_directions=source_directions
-            )
-    with progress(0.5, 0.8):
-        field = _average_directions_to_faces(surface, directions, normal)
-    with progress(0.8, 1.0, LABEL):
-        return detect_families(surface, field)
+    with progress(0.5, 1.0, LABEL):
+        if domain == "face":
+            field = field_from_directions(surface, directions)
+            return replace(field, source_directions=source_directions)
+        return detect_families(surface, _average_directions(surface, directions, normal))
 
 
-def _average_directions_to_faces(
-    surface: Surface, directions: np.ndarray, normal: np.ndarray
-) -> RosyField:
+def _average_directions(surface: Surface, directions: np.ndarray, normal: np.ndarray) -> RosyField:
     """Average (V, N, 3) directions onto the faces, as means of z and of each harmonic.
 
     (V, 3) `normal` are the vertex normals.
     """
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
-    w = dot(directions, x[:, None]) + 1j * dot(directions, y[:, None])
+    w = coordinates(directions, x, y)
     with progress(0.0, 0.2):
         first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
     face_x, face_y = face_frames(surface)
-    with progress(0.3, 0.5):
-        rotation = corner_rotations(
-            surface.face_normal, face_x, surface.corner_face, normal[surface.corner_vertex], LABEL
-        )
-
-    def corner_mean(values: np.ndarray, order: int) -> np.ndarray:
-        face_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
-        return mean_per_face(face_values, surface.face_start)
-
-    z = corner_mean(rho * np.exp(1j * degree * first_angle), degree)
-    report(0.6, LABEL)
+    average = _vertex_averages(surface, normal, face_x)
+    z = average(rho * np.exp(1j * degree * first_angle), degree)
     member = np.exp(1j * np.angle(z) / degree)
-    harmonics = ratio_harmonics(direction_ratios)
     coefficients = {}
-    for j, values in harmonics.items():
-        report(0.7 + 0.2 * len(coefficients) / len(harmonics), LABEL)
-        mean = corner_mean(values * np.exp(-1j * j * first_angle), -j)
+    for j, values in ratio_harmonics(direction_ratios).items():
+        report(0.5, LABEL)
+        mean = average(values * np.exp(-1j * j * first_angle), -j)
         coefficients[j] = mean * signed_power(member, j)
-    report(0.9, LABEL)
     vectors = from_representation(z, face_x, face_y, degree)
     return RosyField(degree, vectors, ratios_from_harmonics(coefficients, degree))
 
 
-def _element_count(surface: Surface, domain: str) -> int:
-    """The number of faces or vertices."""
-    return surface.face_count if domain == "face" else len(surface.vertices)
+def _vertex_averages(
+    surface: Surface, normal: np.ndarray, face_x: np.ndarray
+) -> Callable[[np.ndarray, int], np.ndarray]:
+    """A function that averages (V,) complex numbers of an order N onto the faces.
+
+    They turn by exp(i N t) if a frame turns by -t. (V, 3) `normal` are the vertex normals, (F, 3) `face_x`
+    the x axes of the frames of the faces.
+    """
+    corner_normal = normal[surface.corner_vertex]
+    rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
+
+    def average(values: np.ndarray, order: int) -> np.ndarray:
+        corner_values = values[surface.corner_vertex] * np.conj(signed_power(rotation, order))
+        return mean_per_face(corner_values, surface.face_start)
+
+    return average
 
 
 def infer_domain(surface: Surface, count: int) -> str | None:
@@ -382,29 +367,3 @@ def as_float64(values: np.ndarray) -> np.ndarray:
     """Return a copy of numbers as float64, without a warning for signalling NaN."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)
-
-
-def has_finite_square(values: np.ndarray) -> np.ndarray:
-    """Whether numbers and their squares are finite, element by element."""
-    with np.errstate(invalid="ignore"):
-        return np.abs(values) < MAX_COMPONENT
-
-
-def _average_to_faces(
-    surface: Surface, vectors: np.ndarray, normal: np.ndarray, degree: int
-) -> np.ndarray:
-    """(F, 3) members of the mean RoSy of the vertices of each face, transported to its plane.
-
-    (V, 3) `vectors` are members at the vertices, (V, 3) `normal` the vertex normals.
-    """
-    z = to_representation(vectors, *tangent_frame(normal), degree)[surface.corner_vertex]
-    report(0.0, LABEL)
-    x, y = face_frames(surface)
-    report(0.2, LABEL)
-    corner_normal = normal[surface.corner_vertex]
-    with progress(0.2, 0.8):
-        rotation = corner_rotations(
-            surface.face_normal, x, surface.corner_face, corner_normal, LABEL
-        )
-    mean = mean_per_face(z * power(rotation, degree).conj(), surface.face_start)
-    return from_representation(mean, x, y, degree)

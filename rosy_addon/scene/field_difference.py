@@ -9,8 +9,7 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
-from ..field.analysis import ErrorStatistics
-from ..field.field_comparison import compare_fields
+from ..field.analysis import ErrorStatistics, compare_fields
 from ..worker.job import Call, Steps, job
 from .combed_guides import GUIDE_ATTRIBUTE
 from .field_attributes import (

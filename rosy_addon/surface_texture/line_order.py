@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..field.bisection import BisectionTree, bisect
-from ..field.connection import build_connection, laplacian
+from ..field.connection import build_connection
 from ..field.representation import power
 from ..field.surface import build_surface, connected_components
 from ..field.surface_averages import SurfaceAverages
@@ -256,8 +256,7 @@ def _aligned(
     """
     averages = refined.averages
     connection = averages.connection
-    matrix = laplacian(connection, degree)
-    matrix = matrix.with_values(matrix.data.astype(np.complex64))
+    matrix = averages.laplacian(degree)
     nodes = None
     for number, length in enumerate(lengths):
         snapped = power(nearest_member(_unit_root(first, degree), z, z_degree), degree)

@@ -19,7 +19,7 @@ import numpy as np
 
 with atheris.instrument_imports(include=["rosy_addon"]):
     from rosy_addon.errors import RosyError
-    from rosy_addon.field.field_io import READ_SUFFIXES, read_field
+    from rosy_addon.field.field_io import READ_SUFFIXES, load_field
     from rosy_addon.field.formats.guide_strokes import read_guide_strokes
     from rosy_addon.field.formats.sings import read_sings
     from rosy_addon.field.mesh_io import READERS, read_mesh
@@ -73,7 +73,7 @@ def _reader(kind: str) -> Callable[[Path], Any]:
     if kind in READERS:
         return read_mesh
     if kind in READ_SUFFIXES:
-        return lambda path: read_field(path, PYRAMID)
+        return lambda path: load_field(path, PYRAMID)
     return {
         "guides.txt": read_guide_strokes,
         ".sings": read_sings,

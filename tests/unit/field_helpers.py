@@ -6,6 +6,7 @@ import numpy as np
 from conftest import ROOT
 from scipy import sparse
 
+from rosy_addon.field.field_io import load_field
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.surface import build_surface
 
@@ -31,3 +32,8 @@ def angle_differences(surface, first, second, degree):
     x, y = face_frames(surface)
     z, w = (to_representation(vectors, x, y, degree) for vectors in (first, second))
     return np.abs(np.angle(z * w.conj())) / degree
+
+
+def read_field(*arguments, **settings):
+    """`load_field` without the note."""
+    return load_field(*arguments, **settings).field

@@ -16,7 +16,7 @@ from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
 from rosy_addon.field.guided_system import guided_system
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.singularity_moves import move_index
+from rosy_addon.field.singularity_changes import move_index
 from rosy_addon.field.surface import Surface
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.gbuffer import MeshInstance

@@ -15,7 +15,7 @@ import numpy as np
 from rosy_addon.compositor.compose import compose, compose_planar
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.curvature import curvature_field
-from rosy_addon.field.field_io import read_field
+from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
@@ -95,7 +95,7 @@ def write_others(folder: Path) -> None:
         _surface_row(bunny, curved, (25, 12), "The Stanford bunny, N = 4"),
         _surface_row(
             vase,
-            read_field(folder / "fields" / "vase-4.rawfield", vase),
+            load_field(folder / "fields" / "vase-4.rawfield", vase).field,
             (-30, 35),
             "A vase, N = 4",
         ),

@@ -28,13 +28,14 @@ from ..representation import (
     from_representation,
     power,
     to_representation,
+    unit_complex,
 )
 from ..rosy_field import RosyField, check_degree
 from ..surface import Surface
 from ..validate import vertex_normals
 from .obj import read_obj
-from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, format_blocks, format_rows, read_rows
+from .polygons import RawField
+from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, format_rows, read_rows
 
 
 def read_fieldgen(path: Path) -> RawField:
@@ -56,7 +57,7 @@ def read_fieldgen(path: Path) -> RawField:
         polygons = read_obj(path)
     with progress(0.5, 0.7):
         rows = read_rows(path, comment=None, data=data)
-    degree, vertex_lines = None, []
+    degree, is_vertex_row = None, np.zeros(len(rows), dtype=bool)
     for row, words in enumerate(rows.words):
         if row % ROWS_PER_BLOCK == 0:
             report(0.7 + 0.1 * row / len(rows), LABEL)
@@ -70,17 +71,11 @@ def read_fieldgen(path: Path) -> RawField:
             except (ValueError, RosyError):
                 continue  # a comment at the top of the file explains the format with such a line
         elif kind == b"field" and len(words) == 5 and words[1].isdigit():
-            vertex_lines.append((row, words[1:]))
-    if degree is None or not vertex_lines:
+            is_vertex_row[row] = True
+    if degree is None or not is_vertex_row.any():
         raise RosyError(f"{path}: has no field: there are no lines '# field i x y z'")
-    vertex_rows = TextRows(
-        path,
-        [words for _, words in vertex_lines],
-        [rows.line_numbers[row] for row, _ in vertex_lines],
-    )
     with progress(0.8, 1.0):
-        numbers = vertex_rows.floats("part of a vector")
-    report(1.0, LABEL)
+        numbers = rows.select(is_vertex_row, slice(-4, None)).floats("part of a vector")
     numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)
@@ -100,26 +95,19 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
     It is zero where the mean is zero.
     """
-    label = "averaging the field at the vertices"
+    report(0.0, "averaging the field at the vertices")
     count = len(surface.vertices)
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
     normal = vertex_normals(surface)
-    report(0.5, label)
     face_x, face_y = face_frames(surface)
-    report(0.6, label)
     z = to_representation(field.vectors, face_x, face_y, field.degree)
-    with progress(0.6, 0.8):
-        rotation = power(
-            corner_rotations(surface.face_normal, face_x, face, normal[vertex], label),
-            field.degree,
-        )
-    report(0.8, label)
+    rotation = power(
+        corner_rotations(surface.face_normal, face_x, face, normal[vertex]),
+        field.degree,
+    )
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
-    modulus = np.abs(mean)
-    mean = np.divide(mean, modulus, out=np.zeros_like(mean), where=modulus > 0)
-    report(0.9, label)
-    member = from_representation(mean, *tangent_frame(normal), field.degree)
+    member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
     return chain(
         format_blocks(surface.vertices, "v "),
         format_blocks(normal, "vn "),

@@ -30,61 +30,61 @@ def read_obj(path: Path) -> Polygons:
     """
     with progress(0.0, 0.4):
         rows = read_rows(path)
-    with progress(0.4, 0.5):
-        is_vertex, is_face = _rows_of_kinds(rows, b"v", b"f")
-    vertex_rows = _select_rows(rows, is_vertex, 3)
+    is_vertex, is_face = _is_kind(rows, b"v"), _is_kind(rows, b"f")
     with progress(0.5, 0.6):
-        vertices = vertex_rows.points("vertex")
-    report(0.6, LABEL)
-    corners = _select_rows(rows, is_face)
+        vertices = rows.select(is_vertex, slice(1, 4)).points("vertex")
+    corners = rows.select(is_face, slice(1, None))
     for row, words in enumerate(corners.words):
         if len(words) < 3:
             raise corners.error(
                 row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
             )
-    sizes = [len(words) for words in corners.words]
     with progress(0.6, 0.9):
         positions = _position_indices(corners)
     with progress(0.9, 1.0):
-        index = positions.ints("vertex of a face")
-    report(1.0, LABEL)
-    # A negative index is relative to the number of vertices above its line.
-    vertices_so_far = np.cumsum(is_vertex)[is_face]
-    corner_vertex = np.where(index < 0, index + np.repeat(vertices_so_far, sizes), index - 1)
-    out_of_range = (corner_vertex < 0) | (corner_vertex >= len(vertices))
-    if out_of_range.any():
-        corner = int(np.argmax(out_of_range))
-        raise corners.error(
-            corners.row_of_word(corner),
-            f"a face refers to vertex {index[corner]}, but the vertices are numbered 1 to {len(vertices)}",
+        corner_vertex = _resolved(
+            positions,
+            "vertex of a face",
+            np.cumsum(is_vertex)[is_face],
+            len(vertices),
+            "a face refers to vertex {}, but the vertices",
         )
-    return Polygons(vertices, corner_vertex, offsets_from_sizes(sizes))
+    return Polygons(vertices, corner_vertex, offsets_from_sizes(list(map(len, corners.words))))
 
 
-def _rows_of_kinds(
-    rows: TextRows,
-    *kinds: bytes,
-) -> list[np.ndarray]:
-    """Whether the first word of each row is that of a kind: a (rows,) bool ndarray for each kind."""
-    masks = [np.zeros(len(rows), dtype=bool) for _ in kinds]
-    for start in range(0, len(rows), ROWS_PER_BLOCK):
-        report(start / len(rows), LABEL)
-        block = slice(start, start + ROWS_PER_BLOCK)
-        first_words = [words[0] for words in rows.words[block]]
-        for mask, kind in zip(masks, kinds, strict=True):
-            mask[block] = [word == kind for word in first_words]
-    return masks
+def _resolved(
+    rows: TextRows, label: str, defined_above: np.ndarray, count: int, message: str
+) -> np.ndarray:
+    """Return the indices in rows, counted from 0, of things that the file numbers from 1.
+
+    Parameters
+    ----------
+    rows : TextRows
+        Of indices. Negative ones are relative to the number of things above the line.
+    label : str
+        What the indices are, for messages.
+    defined_above : (rows,) int ndarray
+        The number of things above each line.
+    count : int
+        Of all things.
+    message : str
+        Begins the message about an index out of range, with a place for it.
+    """
+    index = rows.ints(label)
+    defined_above = np.repeat(defined_above, list(map(len, rows.words)))
+    result = np.where(index < 0, index + defined_above, index - 1)
+    out_of_range = (result < 0) | (result >= count)
+    if out_of_range.any():
+        word = int(np.argmax(out_of_range))
+        raise rows.error(
+            rows.row_of_word(word), f"{message.format(index[word])} are numbered 1 to {count}"
+        )
+    return result
 
 
-def _select_rows(rows: TextRows, is_selected: np.ndarray, max_words: int | None = None) -> TextRows:
-    """The selected rows without their first word, cut to at most `max_words` further words."""
-    end = None if max_words is None else max_words + 1
-    selected = np.flatnonzero(is_selected).tolist()
-    return TextRows(
-        rows.path,
-        [rows.words[row][1:end] for row in selected],
-        [rows.line_numbers[row] for row in selected],
-    )
+def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
+    """(rows,) bool: whether the first word of each row is that of a kind."""
+    return np.array([words[0] == kind for words in rows.words], dtype=bool)
 
 
 def _position_indices(corners: TextRows) -> TextRows:
@@ -115,29 +115,26 @@ def read_uv(path: Path) -> np.ndarray | None:
         If only some of the corners have texture coordinates, or an index is out of range.
     """
     rows = read_rows(path)
-    is_uv = np.array([words[0] == b"vt" for words in rows.words], dtype=bool)
-    is_face = np.array([words[0] == b"f" for words in rows.words], dtype=bool)
+    is_uv, is_face = _is_kind(rows, b"vt"), _is_kind(rows, b"f")
     if not is_uv.any():
         return None
-    table = _select_rows(rows, is_uv, 2)
+    table = rows.select(is_uv, slice(1, 3))
     for row, words in enumerate(table.words):
         if len(words) < 2:
             raise table.error(row, "a texture coordinate has fewer than 2 numbers")
     uv = table.floats("texture coordinate").reshape(-1, 2)
-    corners = _select_rows(rows, is_face)
+    corners = rows.select(is_face, slice(1, None))
     words = [[word.split(b"/")[1:2] for word in line] for line in corners.words]
     for row, line in enumerate(words):
         if not all(word and word[0] for word in line):
             raise corners.error(row, "a corner has no texture coordinate")
     uv_rows = TextRows(path, [[word[0] for word in line] for line in words], corners.line_numbers)
-    index = uv_rows.ints("texture coordinate of a corner")
-    coordinates_so_far = np.repeat(np.cumsum(is_uv)[is_face], [len(line) for line in words])
-    uv_index = np.where(index < 0, index + coordinates_so_far, index - 1)
-    out_of_range = (uv_index < 0) | (uv_index >= len(uv))
-    if out_of_range.any():
-        corner = int(np.argmax(out_of_range))
-        raise uv_rows.error(
-            uv_rows.row_of_word(corner),
-            f"a corner refers to texture coordinate {index[corner]}, but they are numbered 1 to {len(uv)}",
+    return uv[
+        _resolved(
+            uv_rows,
+            "texture coordinate of a corner",
+            np.cumsum(is_uv)[is_face],
+            len(uv),
+            "a corner refers to texture coordinate {}, but they",
         )
-    return uv[uv_index]
+    ]

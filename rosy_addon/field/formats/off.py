@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import RosyError, counted
-from ...progress import progress, report
+from ...progress import progress
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, TextRows, abbreviate, read_rows
+from .text_rows import TextRows, abbreviate, read_rows
 
 _KEYWORD = re.compile(rb"(ST)?C?N?OFF$", re.IGNORECASE)
 
@@ -66,7 +66,6 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     """`corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
     first_words = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers)
     sizes = first_words.ints("number of corners of a face")
-    report(0.5, LABEL)
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
         if not 3 <= size < len(words):
             message = (
@@ -82,7 +81,6 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
     )
     with progress(0.5, 1.0):
         corner_vertex = corners.ints("vertex of a face")
-    report(1.0, LABEL)
     out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))

@@ -15,12 +15,12 @@ import numpy as np
 
 from ...errors import RosyError, counted
 from ...file_io import read_bytes
-from ...progress import progress, report
+from ...progress import progress
 from ..blocks import row_blocks
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
-from .raw_field import RawField
-from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, read_rows
+from .polygons import RawField
+from .text_rows import ROWS_PER_BLOCK, format_blocks, read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -56,7 +56,6 @@ def read_text(path: Path) -> RawField:
             )
     with progress(0.4, 1.0):
         values = rows.floats("part of a vector")
-    report(1.0, LABEL)
     return _raw_field(values.reshape(-1, columns))
 
 
@@ -93,10 +92,8 @@ def read_npy(path: Path) -> RawField:
         raise RosyError(
             f"{path}: expected an array of shape (n, 3 N) or (n, N, 3), found {values.shape}"
         )
-    report(0.5, LABEL)
     values = as_float64(values.reshape(len(values), -1))
     _check_columns(str(path), values.shape[1])
-    report(0.8, LABEL)
     return _raw_field(values)
 
 

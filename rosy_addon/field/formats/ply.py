@@ -66,7 +66,6 @@ def read_ply(path: Path) -> Polygons:
         is out of range.
     """
     columns, _ = _read_columns(path)
-    report(1.0, LABEL)
     try:
         vertices = np.stack([columns["vertex"][axis] for axis in "xyz"], axis=1)
     except KeyError as missing:
@@ -76,8 +75,7 @@ def read_ply(path: Path) -> Polygons:
     if not isinstance(corner_list, tuple):
         raise RosyError(f"{path}: the mesh has no faces")
     corner_vertex, face_start = corner_list
-    in_range = (corner_vertex >= 0) & (corner_vertex < len(vertices))
-    out_of_range = ~in_range | (np.where(in_range, corner_vertex, 0) % 1 != 0)
+    out_of_range = ~_is_index(corner_vertex, len(vertices))
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))
         face_index = int(np.searchsorted(face_start, corner, side="right")) - 1
@@ -87,6 +85,12 @@ def read_ply(path: Path) -> Polygons:
         )
     vertices = as_float64(vertices)
     return Polygons(vertices, corner_vertex.astype(np.int64), face_start)
+
+
+def _is_index(values: np.ndarray, count: int) -> np.ndarray:
+    """(n,) bool: whether numbers are whole ones from 0 to `count` - 1."""
+    in_range = (values >= 0) & (values < count)
+    return in_range & (np.where(in_range, values, 0) % 1 == 0)
 
 
 def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
@@ -139,9 +143,9 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
             match line.split():
                 case ["format", name, _]:
                     byte_order = _BYTE_ORDERS[name]
-                case ["element", name, count]:
+                case ["element", name, count] if int(count) >= 0:
                     _check_unique(path, line_number, "element", name, elements)
-                    elements.append(_Element(name, _parse_count(count)))
+                    elements.append(_Element(name, int(count)))
                 case ["property", "list", count_type, kind, name]:
                     _check_unique(path, line_number, "property", name, elements[-1].properties)
                     list_property = _Property(name, _DTYPES[kind], _DTYPES[count_type])
@@ -173,14 +177,6 @@ def _check_unique(
         raise RosyError(f"{path}:{line_number}: {kind} '{name}' is declared twice")
 
 
-def _parse_count(word: str) -> int:
-    """A number of rows; raises `ValueError` if it is not a whole number from 0 on."""
-    count = int(word)
-    if count < 0:
-        raise ValueError
-    return count
-
-
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
     """The values of all elements of a text file."""
     # The header is included, so that line numbers are those of the file.
@@ -202,7 +198,6 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
     """The values of one element, given its rows."""
     starts = offsets_from_sizes([len(words) for words in rows.words])
     values = rows.floats(f"value of a {element.name}")
-    report(1.0, LABEL)
     position = starts[:-1]
     columns: _Columns = {}
     for prop in element.properties:
@@ -210,8 +205,7 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
         if prop.count_type is not None:
             _check_row_lengths(rows, element, position + 1, starts)
             count_value = values[position]
-            in_range = (count_value >= 0) & (count_value <= len(values))
-            invalid = ~in_range | (np.where(in_range, count_value, 0) % 1 != 0)
+            invalid = ~_is_index(count_value, len(values) + 1)
             if invalid.any():
                 row = int(np.argmax(invalid))
                 raise rows.error(row, f"expected the length of a list, found {count_value[row]:g}")
@@ -241,117 +235,80 @@ def _check_row_lengths(
 def _binary_elements(
     path: Path, data: bytes, offset: int, byte_order: str, elements: list[_Element]
 ) -> dict[str, _Columns]:
-    """The values of all elements of a binary file, whose data begin at `offset`."""
+    """The values of all elements of a binary file, whose data begin at `offset`.
+
+    If all rows of an element have the same list lengths, it is read as one structured array.
+    """
     columns = {}
     for element in elements:
-        columns[element.name], offset = _binary_columns(path, data, offset, byte_order, element)
+        if not element.properties:
+            columns[element.name] = {}
+            continue
+        first_row, _ = _read_rows(path, data, offset, byte_order, element, min(element.count, 1))
+        layout = []
+        for prop in element.properties:
+            if prop.count_type is None:
+                layout.append((prop.name, byte_order + prop.type))
+            else:
+                layout.append((f"{prop.name} count", byte_order + prop.count_type))
+                layout.append((prop.name, byte_order + prop.type, first_row[prop.name][0].shape))
+        dtype = np.dtype(layout)
+        end, count = offset + dtype.itemsize * element.count, element.count
+        lists = [prop.name for prop in element.properties if prop.count_type is not None]
+        if end > len(data) and not lists:
+            raise _truncated(path, element, (len(data) - offset) // dtype.itemsize)
+        table = np.frombuffer(data, dtype, count, offset) if end <= len(data) else None
+        if table is not None and all(
+            (table[f"{name} count"] == table[name].shape[1]).all() for name in lists
+        ):
+            columns[element.name] = {
+                prop.name: table[prop.name]
+                if prop.count_type is None
+                else (table[prop.name].ravel(), np.arange(count + 1) * table[prop.name].shape[1])
+                for prop in element.properties
+            }
+            offset = end
+        else:
+            columns[element.name], offset = _read_rows(
+                path, data, offset, byte_order, element, count
+            )
     return columns
 
 
-def _binary_columns(
-    path: Path, data: bytes, offset: int, byte_order: str, element: _Element
+def _read_rows(
+    path: Path, data: bytes, offset: int, byte_order: str, element: _Element, row_count: int
 ) -> tuple[_Columns, int]:
-    """The values of one element, and the offset of the next one in bytes.
-
-    If all rows have the same list lengths, the element is read as one structured array.
-    """
-    if not element.properties:
-        return {}, offset
-    lengths = _first_row_list_lengths(path, data, offset, byte_order, element)
-    layout = _row_dtype(element, byte_order, lengths)
-    if layout.itemsize * element.count <= len(data) - offset:
-        table = np.frombuffer(data, layout, element.count, offset)
-        if all((table[f"{name} count"] == length).all() for name, length in lengths.items()):
-            columns = {
-                prop.name: table[prop.name]
-                if prop.count_type is None
-                else (
-                    table[prop.name].ravel(),
-                    offsets_from_sizes(np.full(element.count, lengths[prop.name])),
-                )
-                for prop in element.properties
-            }
-            return columns, offset + layout.itemsize * element.count
-    if not lengths:
-        raise _truncated(path, element, (len(data) - offset) // max(layout.itemsize, 1))
-    return _ragged_columns(path, data, offset, byte_order, element)
-
-
-def _first_row_list_lengths(
-    path: Path, data: bytes, offset: int, byte_order: str, element: _Element
-) -> dict[str, int]:
-    """Lengths of the lists in the first row, by property; most files have the same in all rows."""
-    lengths: dict[str, int] = {}
-    if not element.count:
-        return {prop.name: 0 for prop in element.properties if prop.count_type}
-    for prop in element.properties:
-        if prop.count_type is not None:
-            layout = _row_dtype(element, byte_order, lengths, until=prop.name)
-            if offset + layout.itemsize > len(data):
-                raise _truncated(path, element, 0)
-            row = np.frombuffer(data, layout, 1, offset)[0]
-            length = _list_length(path, element, 0, row[f"{prop.name} count"])
-            if layout.itemsize + length * np.dtype(prop.type).itemsize > len(data) - offset:
-                raise _truncated(path, element, 0)
-            lengths[prop.name] = length
-    return lengths
-
-
-def _row_dtype(
-    element: _Element, byte_order: str, lengths: dict[str, int], until: str | None = None
-) -> np.dtype:
-    """The layout of a row with these list lengths, up to the count of the list `until`."""
-    layout = []
-    for prop in element.properties:
-        if prop.count_type is None:
-            layout.append((prop.name, byte_order + prop.type))
-            continue
-        layout.append((f"{prop.name} count", byte_order + prop.count_type))
-        if prop.name == until:
-            break
-        layout.append((prop.name, byte_order + prop.type, (lengths[prop.name],)))
-    return np.dtype(layout)
-
-
-def _ragged_columns(
-    path: Path, data: bytes, offset: int, byte_order: str, element: _Element
-) -> tuple[_Columns, int]:
-    """The values of an element whose rows differ in length, and the offset of the next element.
+    """The values of the first rows of an element, and the offset of what follows them.
 
     Each row begins where the previous one ends, so the rows are read in a loop.
     """
-    dtypes = [
-        (
-            np.dtype(byte_order + prop.type),
-            prop.count_type and np.dtype(byte_order + prop.count_type),
-        )
+    types = [np.dtype(byte_order + prop.type) for prop in element.properties]
+    counts = [
+        None if prop.count_type is None else Struct(byte_order + np.dtype(prop.count_type).char)
         for prop in element.properties
     ]
-    chunks: list[list[bytes]] = [[] for _ in dtypes]
-    sizes: list[list[int]] = [[] for _ in dtypes]
-    read_length = [count and Struct(byte_order + count.char).unpack_from for _, count in dtypes]
-    position = offset
-    for row in range(element.count):
-        for column, (kind, count) in enumerate(dtypes):
+    chunks: list[list[bytes]] = [[] for _ in types]
+    sizes: list[list[int]] = [[] for _ in types]
+    for row in range(row_count):
+        for column, (kind, count) in enumerate(zip(types, counts, strict=True)):
             length = 1
             if count is not None:
-                if position + count.itemsize > len(data):
+                if offset + count.size > len(data):
                     raise _truncated(path, element, row)
-                length = _list_length(path, element, row, read_length[column](data, position)[0])
-                position += count.itemsize
-            end = position + length * kind.itemsize
+                length = _list_length(path, element, row, count.unpack_from(data, offset)[0])
+                offset += count.size
+            end = offset + length * kind.itemsize
             if end > len(data):
                 raise _truncated(path, element, row)
-            chunks[column].append(data[position:end])
+            chunks[column].append(data[offset:end])
             sizes[column].append(length)
-            position = end
+            offset = end
     columns: _Columns = {}
-    for prop, (kind, count), column_chunks, size in zip(
-        element.properties, dtypes, chunks, sizes, strict=True
-    ):
-        values = np.frombuffer(b"".join(column_chunks), kind)
-        columns[prop.name] = values if count is None else (values, offsets_from_sizes(size))
-    return columns, position
+    for column, prop in enumerate(element.properties):
+        values = np.frombuffer(b"".join(chunks[column]), types[column])
+        is_list = prop.count_type is not None
+        columns[prop.name] = (values, offsets_from_sizes(sizes[column])) if is_list else values
+    return columns, offset
 
 
 def _list_length(path: Path, element: _Element, row: int, length) -> int:

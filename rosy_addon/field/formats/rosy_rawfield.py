@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import RosyError, counted
 from ...progress import progress
 from ..rosy_field import RosyField, check_degree
-from .raw_field import RawField
+from .polygons import RawField
 from .text_rows import TextRows, abbreviate, format_blocks, read_rows
 
 

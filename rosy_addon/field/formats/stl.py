@@ -11,7 +11,7 @@ from ...file_io import read_bytes
 from ...progress import progress, report
 from ..validate import as_float64
 from .polygons import Polygons
-from .text_rows import LABEL, TextRows, read_rows
+from .text_rows import LABEL, read_rows
 
 #: Size of the header of a binary file, with the number of triangles in its last 4 bytes.
 _HEADER_BYTES = 84
@@ -76,9 +76,9 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
     """(3 T, 3) float32 corners of the triangles of a binary file."""
     available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
-    if len(data) < _HEADER_BYTES or available < count:
-        if len(data) < _HEADER_BYTES:
-            raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
+    if len(data) < _HEADER_BYTES:
+        raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
+    if available < count:
         raise RosyError(
             f"{path}: declares {counted(count, 'triangle')}, but ends after {available}"
         )
@@ -89,20 +89,14 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
     """(3 T, 3) float64 corners of the triangles of a text file."""
     with progress(0.0, 0.6):
         rows = read_rows(path, comment=None, data=data)
-    corner_rows = [row for row, words in enumerate(rows.words) if words[0].lower() == b"vertex"]
+    is_corner = np.array([words[0].lower() == b"vertex" for words in rows.words], dtype=bool)
+    corners = rows.select(is_corner, slice(1, None))
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
-    if len(corner_rows) != 3 * loops:
+    if len(corners) != 3 * loops:
         raise rows.error(
-            corner_rows[-1] if corner_rows else len(rows),
-            f"the file has {counted(len(corner_rows), 'corner')} in "
+            np.flatnonzero(is_corner)[-1] if len(corners) else len(rows),
+            f"the file has {counted(len(corners), 'corner')} in "
             f"{counted(loops, 'complete triangle')}; is it truncated?",
         )
-    vertex_rows = TextRows(
-        path,
-        [rows.words[row][1:] for row in corner_rows],
-        [rows.line_numbers[row] for row in corner_rows],
-    )
-    if not corner_rows:
-        return np.zeros((0, 3))
     with progress(0.6, 1.0):
-        return vertex_rows.points("corner")
+        return corners.points("corner")

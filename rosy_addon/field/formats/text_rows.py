@@ -44,6 +44,15 @@ class TextRows:
     def __getitem__(self, rows: slice) -> TextRows:
         return TextRows(self.path, self.words[rows], self.line_numbers[rows])
 
+    def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
+        """Some of the rows, given as (rows,) bool, cut to some of their words."""
+        rows = np.flatnonzero(is_selected).tolist()
+        return TextRows(
+            self.path,
+            [self.words[row][words] for row in rows],
+            [self.line_numbers[row] for row in rows],
+        )
+
     def error(self, row: int, message: str) -> RosyError:
         """The error to raise for a row: names the file and, if the row exists, its line."""
         if row < len(self.line_numbers):
@@ -136,7 +145,6 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     # Also accept a lone CR, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        report(0.0, LABEL)
     lines = data.split(b"\n")
     has_comments = comment is not None and comment in data
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from field_helpers import read_field
 from shapes import cube, icosphere, plane
 
 from rosy_addon.field.array_field import SurfaceArrays, array_field, find_array
-from rosy_addon.field.field_io import read_field
 from rosy_addon.field.validate import vertex_normals
 
 

@@ -14,7 +14,6 @@ from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
 from rosy_addon.field.guided_system import guided_system
-from rosy_addon.field.representation import to_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
@@ -46,7 +45,7 @@ def draw(combing: Combing, points: np.ndarray, batch: int = 1000, pressure: floa
 def angles(combing: Combing, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(F,) degrees between the RoSys of (F, 3) members."""
     system = combing.system
-    z = [to_representation(vectors, system.x, system.y, system.degree) for vectors in (a, b)]
+    z = [system.to_representation(vectors) for vectors in (a, b)]
     return np.degrees(np.abs(np.angle(z[0] * z[1].conj())) / system.degree)
 
 

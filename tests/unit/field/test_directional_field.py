@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import mainly
+from field_helpers import read_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
@@ -22,7 +23,6 @@ from rosy_addon.field.directional_field import (
     ratios_from_harmonics,
     tensor_field,
 )
-from rosy_addon.field.field_io import read_field
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames

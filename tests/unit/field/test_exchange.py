@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from field_helpers import read_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import from_triangles, icosphere, plane, torus
@@ -13,7 +14,7 @@ from shapes import from_triangles, icosphere, plane, torus
 from rosy_addon.errors import RosyError
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.directional_field import field_directions
-from rosy_addon.field.field_io import load_field, read_field, write_field
+from rosy_addon.field.field_io import load_field, write_field
 from rosy_addon.field.formats.sings import read_sings
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field

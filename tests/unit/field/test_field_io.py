@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from field_helpers import read_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import cylinder, from_quads, icosphere, plane, torus
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field.directional_field import field_directions
-from rosy_addon.field.field_io import read_field, write_field
+from rosy_addon.field.field_io import write_field
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.mesh_io import read_mesh

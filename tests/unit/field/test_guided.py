@@ -15,12 +15,13 @@ from rosy_addon.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.field.guided import guided_field
+from rosy_addon.field.guided_system import guided_field
 from rosy_addon.field.guides import feature_edges, guides_from_edges
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
-from rosy_addon.field.smoothest import corner_frame_angles
+from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.field.surface_averages import SurfaceAverages
 
 BUNNY = MESHES / "stanford-bunny.obj"
 
@@ -53,7 +54,7 @@ def test_soft_guides_match_a_direct_solver(degree):
     guides, weight = random_guides(surface, 30), 40.0
     x, y = face_frames(surface)
     connection = build_connection(surface)
-    frame_angle = corner_frame_angles(surface, connection, x, y)
+    frame_angle = SurfaceAverages(surface, connection, x, y).frame_angle
     # One row for each corner of a face with a guide, one column for each node.
     corner = np.flatnonzero(np.repeat(guides.any(axis=1), 3))
     shape = len(corner), connection.node_count
@@ -152,7 +153,7 @@ def test_the_field_does_not_depend_on_numbering_or_position(degree, hard):
     )
 
 
-def test_a_component_without_guides_has_no_field():
+def test_a_component_without_guides_has_the_smoothest_field():
     ball = icosphere(2)
     points = np.concatenate([ball.vertices, ball.vertices + 5])
     triangles = ball.corner_vertex.reshape(-1, 3)
@@ -160,8 +161,9 @@ def test_a_component_without_guides_has_no_field():
     guides = np.zeros((both.face_count, 3))
     guides[0] = normalize(np.cross(both.face_normal[0], [0.0, 0.0, 1.0])[None])[0]
     field = guided_field(both, 4, guides, 1.0)
-    length = np.linalg.norm(field.vectors, axis=1)
-    np.testing.assert_allclose(length, np.arange(both.face_count) < ball.face_count, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(field.vectors, axis=1), 1, atol=1e-9)
+    unguided = slice(ball.face_count, None)
+    assert np.array_equal(field.vectors[unguided], smoothest_field(both, 4).vectors[unguided])
 
 
 def test_no_guide_at_all_is_an_error():

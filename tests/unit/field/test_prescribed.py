@@ -10,12 +10,11 @@ from shapes import cylinder, from_quads, globe, icosphere, torus
 
 from rosy_addon.errors import RosyError
 from rosy_addon.field import prescribed, turning_angles
-from rosy_addon.field.face_graph import face_graph, spanning_forest
+from rosy_addon.field.face_graph import face_graph, spanning_forest, triangle_graph
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_frames, matching_angles, to_representation
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
 from rosy_addon.field.surface import Surface, build_surface
-from rosy_addon.field.triangle_graph import triangle_graph
 
 
 def block(holes: int, missing: int = 0) -> Surface:

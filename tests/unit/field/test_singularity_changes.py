@@ -14,7 +14,7 @@ from rosy_addon.field.prescribed import change_singularities, prescribed_field
 from rosy_addon.field.representation import face_frames, face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.singularity_pairs import opposite_pairs
+from rosy_addon.field.singularity_changes import opposite_pairs
 from rosy_addon.field.surface import build_surface
 
 #: Many faces meet at its poles, so that they can have large indices.

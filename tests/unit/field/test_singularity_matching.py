@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from rosy_addon.field.singularity_matching import match_singularities
+from rosy_addon.field.analysis import match_on_surface
 
 
-def match(*arguments):
-    return match_singularities(*arguments)
+def match(points, index, other_points, other_index, reach):
+    """Match singularities at vertices at these points, on a mesh of extent 1."""
+    surface = SimpleNamespace(vertices=np.concatenate([points, other_points]), extent=1.0)
+    other_vertex = len(points) + np.arange(len(other_points))
+    singularities = np.arange(len(points)), index
+    return match_on_surface(surface, singularities, (other_vertex, other_index), reach)
 
 
 def greedy_pairs(points, index, other_points, other_index, reach):

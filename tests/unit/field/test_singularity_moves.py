@@ -10,7 +10,7 @@ from rosy_addon.errors import RosyError
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.singularity_moves import OUTSIDE, move_index
+from rosy_addon.field.singularity_changes import OUTSIDE, move_index
 
 BALL = globe(24, 48)
 NORTH, SOUTH = 0, len(BALL.vertices) - 1

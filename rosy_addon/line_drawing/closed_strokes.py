@@ -237,6 +237,5 @@ def _loop_strokes(
         member=mesh.to_world(triangle, direction),
         spacing=spacing.at(triangle, weights, direction),
         width=np.ones(len(triangle)),
-        opacity=np.ones(len(triangle)),
         closed=np.ones(len(loop_index), dtype=bool),
     )

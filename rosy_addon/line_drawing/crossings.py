@@ -202,8 +202,8 @@ def _intersect_segments(
     return first[crosses], second[crosses], t[crosses], u[crosses]
 
 
-def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Strokes:
-    """Cut a gap into one of the two strokes at each crossing.
+def with_crossing_gaps(strokes: Strokes, gap: float) -> Strokes:
+    """Cut a gap into one of the two strokes at each crossing: strokes pass over and under in turn.
 
     Parameters
     ----------
@@ -211,22 +211,13 @@ def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Str
         As they were traced, before `clip_to_visible`.
     gap : float
         Length of the gap in spacings.
-    weave : bool
-        If true, strokes pass over and under in turn. Otherwise the stroke of the family with the
-        lower number passes over.
     """
     with progress(0.0, 0.6):
         crossings = find_crossings(strokes)
     report(0.6, "cutting gaps")
     if not len(crossings.stroke):
         return strokes
-    if weave:
-        under = _alternating_under(crossings)
-    else:
-        family = strokes.family[crossings.stroke]
-        under = np.where(family[:, 0] > family[:, 1], 0, 1)
-        same_family = family[:, 0] == family[:, 1]
-        under[same_family] = np.argmax(crossings.stroke[same_family], axis=1)
+    under = _alternating_under(crossings)
     row = np.arange(len(under))
     stroke, arc = crossings.stroke[row, under], crossings.arc[row, under]
     # The gaps of a stroke are measured in the spacing at its start.
@@ -313,7 +304,7 @@ def cut_intervals(
     columns = {}
     for name in POINT_COLUMNS:
         values = getattr(strokes, name)
-        if name in ("points", "normal", "spacing", "width", "opacity"):
+        if name in ("points", "normal", "spacing", "width"):
             columns[name] = interpolate(values)
         else:
             columns[name] = values[np.where(is_original, source, after)]

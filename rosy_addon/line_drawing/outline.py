@@ -273,6 +273,5 @@ def _to_strokes(families: list[list[_Chain]], surface: Surface) -> Strokes:
         member=np.zeros((total, 3)),
         spacing=np.zeros(total),
         width=np.ones(total),
-        opacity=np.ones(total),
         closed=np.array([closed for _, _, _, closed in chains], dtype=bool),
     )

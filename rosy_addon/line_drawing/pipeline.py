@@ -273,7 +273,7 @@ def _trace_instance(
         strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
     if style.gaps:
         with progress(0.95, 0.98):
-            strokes = with_crossing_gaps(strokes, style.gaps, weave=True)
+            strokes = with_crossing_gaps(strokes, style.gaps)
     if style.taper:
         with progress(0.98, 0.99):
             ends = ~head_on_ends(strokes)

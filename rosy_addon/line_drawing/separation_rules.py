@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
-
 #: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
 MIN_SELF_ARC = 2.5
 
@@ -32,23 +30,9 @@ class SeparationRules:
         Shorter strokes are removed.
     max_length : float
         Strokes end when they are longer than this.
-
-    Raises
-    ------
-    RosyError
-        If a limit is out of range.
     """
 
     min_separation: float = 0.75
     max_gap: float = 1.24
     min_length: float = 1.5
     max_length: float = np.inf
-
-    def __post_init__(self) -> None:
-        if not 0.1 <= self.min_separation < 1 < self.max_gap:
-            raise RosyError(
-                f"min_separation ({self.min_separation:g}) must be from 0.1 to below 1, and max_gap "
-                f"({self.max_gap:g}) above 1"
-            )
-        if not 0 <= self.min_length < self.max_length:
-            raise RosyError("min_length of strokes must be less than max_length")

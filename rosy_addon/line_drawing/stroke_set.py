@@ -19,7 +19,6 @@ POINT_COLUMNS = (
     "member",
     "spacing",
     "width",
-    "opacity",
 )
 
 
@@ -54,8 +53,6 @@ class Strokes:
         Required spacing, in world space.
     width : (n,) float64 ndarray
         Width as a fraction of the full width, from 0 to 1.
-    opacity : (n,) float64 ndarray
-        From 0 to 1.
     closed : (S,) bool ndarray
         Whether the last point is the same as the first.
     free_ends : (S, 2) bool ndarray or None
@@ -74,7 +71,6 @@ class Strokes:
     member: np.ndarray
     spacing: np.ndarray
     width: np.ndarray
-    opacity: np.ndarray
     closed: np.ndarray
     free_ends: np.ndarray | None = None
 
@@ -239,8 +235,7 @@ class Strokes:
         weights = self.weights[point]
         weights[fraction < 1] = np.nan
         interpolated = {
-            name: interpolate(getattr(self, name))
-            for name in ("points", "spacing", "width", "opacity")
+            name: interpolate(getattr(self, name)) for name in ("points", "spacing", "width")
         }
         repeated = {name: getattr(self, name)[point] for name in ("face", "triangle", "member")}
         return replace(

@@ -375,39 +375,6 @@ def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
     )
 
 
-def corner_values(mesh: TangentMesh, values: np.ndarray | float, surface_name: str) -> np.ndarray:
-    """Return (T, 3) float64: values at the corners of triangles.
-
-    Parameters
-    ----------
-    mesh : TangentMesh
-    values : float, or (V,), (F,) or (T, 3) ndarray
-        One value, or one for each vertex, face or corner of a triangle.
-    surface_name : str
-        For the error message.
-
-    Raises
-    ------
-    RosyError
-        If the number of values is that of neither the vertices, the faces nor the corners.
-    """
-    values = np.asarray(values, dtype=np.float64)
-    shape = mesh.triangle_vertex.shape
-    if values.ndim == 0:
-        return np.full(shape, float(values))
-    if values.shape == shape:
-        return values
-    face_count, vertex_count = int(mesh.face.max()) + 1, int(mesh.triangle_vertex.max()) + 1
-    if values.shape == (face_count,):
-        return np.repeat(values[mesh.face][:, None], 3, axis=1)
-    if values.ndim == 1 and len(values) >= vertex_count:
-        return values[mesh.triangle_vertex]
-    raise RosyError(
-        f"{surface_name}: expected one value per vertex ({vertex_count}) or per face ({face_count}), "
-        f"found values of shape {values.shape}"
-    )
-
-
 def _triangle_frames(points: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return the normals, x axes, y axes and areas of triangles.
 

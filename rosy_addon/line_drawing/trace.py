@@ -1,4 +1,4 @@
-"""Trace evenly spaced strokes on a mesh instance, from its tangent mesh to `Strokes`."""
+"""Trace evenly spaced strokes on a tangent mesh, to `Strokes`."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..cache import Cache
 from ..errors import RosyError
 from ..progress import progress, report
-from ..projection.gbuffer import MeshInstance
 from .closed_strokes import close_loops
 from .directional_spacing import CornerSpacing
-from .families import label_families
 from .growing_strokes import StrokeSegments
 from .placement import StreamlinePlacer
 from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds
@@ -21,7 +18,7 @@ from .separation_rules import SeparationRules
 from .singularity_seeds import seeds_around_singularities
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles
-from .tangent_mesh import TangentMesh, build_tangent_mesh, corner_values
+from .tangent_mesh import TangentMesh
 
 #: Samples by which tips grow between two attempts to seed beside strokes.
 SAMPLES_PER_SEEDING = 8
@@ -42,62 +39,33 @@ FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.
 FIRST_WARMUP, SECOND_WARMUP, WARMUP_SEPARATION = (3, 3), (2, 2, 2, 2, 2), 0.6
 
 
-def trace_strokes(
-    instance: MeshInstance,
-    spacing: np.ndarray | float,
-    *,
+def trace_on_mesh(
+    mesh: TangentMesh,
+    spacing: CornerSpacing,
     rules: SeparationRules | None = None,
-    display: str = "smooth",
-    cross_creases: bool = False,
-    cache: Cache | None = None,
+    surface_name: str = "mesh",
 ) -> Strokes:
-    """Cover a mesh instance with evenly spaced strokes along its field.
+    """Cover a tangent mesh with evenly spaced strokes along its field.
 
     Parameters
     ----------
-    instance : MeshInstance
-        With a field.
-    spacing : float, or (V,), (F,) or (T, 3) array_like
-        Spacing between strokes of a family in world space: one value, or one for each vertex, face
-        or corner of a triangle.
+    mesh : TangentMesh
+    spacing : CornerSpacing
+        Spacing between strokes of a family.
     rules : SeparationRules, optional
-    display : {"smooth", "flat"}
-        As in `build_tangent_mesh`.
-    cross_creases : bool
-        As in `build_tangent_mesh`.
-    cache : Cache, optional
-        Cache for corner fields.
+    surface_name : str
+        For error messages.
 
     Returns
     -------
     Strokes
-        World space, with families.
+        World space. All are in one family; see `label_families`.
 
     Raises
     ------
     RosyError
-        If there is no field, the spacing is not above 0, or it is so small that there would be too
-        many strokes.
+        If the spacing is not above 0, or it is so small that there would be too many strokes.
     """
-    with progress(0.0, 0.1):
-        mesh = build_tangent_mesh(
-            instance, display=display, cross_creases=cross_creases, cache=cache
-        )
-    with progress(0.1, 0.95):
-        strokes = trace_on_mesh(mesh, spacing, rules, instance.surface.name)
-    with progress(0.95, 1.0):
-        return label_families(strokes, mesh)
-
-
-def trace_on_mesh(
-    mesh: TangentMesh,
-    spacing: CornerSpacing | np.ndarray | float,
-    rules: SeparationRules | None = None,
-    surface_name: str = "mesh",
-) -> Strokes:
-    """Do the same as `trace_strokes` on a tangent mesh, but do not assign families."""
-    if not isinstance(spacing, CornerSpacing):
-        spacing = CornerSpacing(corner_values(mesh, spacing, surface_name))
     if not (np.isfinite(spacing.values).all() and (spacing.values > 0).all()):
         raise RosyError(f"{surface_name}: the spacing of strokes must be above 0")
     placer = StreamlinePlacer(mesh, spacing, rules or SeparationRules())
@@ -258,6 +226,5 @@ def collect(placer: StreamlinePlacer) -> Strokes:
         member=mesh.to_world(triangle, direction),
         spacing=spacing,
         width=np.ones(len(points)),
-        opacity=np.ones(len(points)),
         closed=np.zeros(len(stroke_ids), dtype=bool),
     )

@@ -60,7 +60,7 @@ def new_curves(
     _set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
     _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colors[strokes.family])
     values = {
-        "opacity": strokes.opacity,
+        "opacity": np.ones(len(geometry.points)),
         "spacing": strokes.spacing,
         "member": strokes.member,
         "surface_normal": strokes.normal,

@@ -66,7 +66,7 @@ def new_grease_pencil(
             np.diff(strokes.start)[stroke_mask],
             geometry.points[point_mask].astype(np.float32),
             geometry.radius[point_mask].astype(np.float32),
-            strokes.opacity[point_mask].astype(np.float32),
+            np.ones(int(point_mask.sum()), dtype=np.float32),
             material_index,
         )
     return data

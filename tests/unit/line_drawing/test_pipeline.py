@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import trace_strokes
 from listeners import cancel_at
 from shapes import from_triangles, icosphere, moved, plane
 
@@ -23,7 +24,6 @@ from rosy_addon.line_drawing.pipeline import (
 from rosy_addon.line_drawing.spacing import lit_tone
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
-from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
 from rosy_addon.progress import listening
 from rosy_addon.projection.camera import (

@@ -12,6 +12,7 @@ import pytest
 from conftest import long, mainly
 from field_helpers import bumpy
 from harness.stroke_spacing import lateral_gaps
+from harness.stroke_tracing import trace_strokes
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
@@ -30,7 +31,6 @@ from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.head_on_ends import head_on_ends
 from rosy_addon.line_drawing.outline import outline
 from rosy_addon.line_drawing.separation import enforce_separation
-from rosy_addon.line_drawing.separation_rules import SeparationRules
 from rosy_addon.line_drawing.singularity_seeds import singularities
 from rosy_addon.line_drawing.spacing import (
     headlight_tone,
@@ -43,7 +43,6 @@ from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -399,7 +398,6 @@ def planar_strokes(points, directions, spacing):
         member=directions,
         spacing=np.full(point_count, spacing),
         width=np.ones(point_count),
-        opacity=np.ones(point_count),
         closed=np.zeros(stroke_count, dtype=bool),
     )
 
@@ -677,9 +675,13 @@ def test_gaps_at_crossings(columns):
     assert not len(find_crossings(gapped).stroke)
     removed_length = strokes.length.sum() - gapped.length.sum()
     assert np.isclose(removed_length, len(crossings.stroke) * 0.3 * 0.2, rtol=0.1)
-    upper = gapped.select(gapped.family == 0)
-    assert np.isclose(upper.length.sum(), strokes.length[strokes.family == 0].sum())
-    assert not len(find_crossings(with_crossing_gaps(strokes, 0.3, weave=True)).stroke)
+    for family in (
+        0,
+        1,
+    ):  # strokes pass over and under in turn, so each family has half of the gaps
+        cut = strokes.length[strokes.family == family].sum()
+        cut -= gapped.length[gapped.family == family].sum()
+        assert np.isclose(cut, removed_length / 2, rtol=0.1)
 
 
 @pytest.mark.slow
@@ -921,6 +923,3 @@ def test_errors_are_one_line(error_of):
     assert "zero everywhere" in error_of(
         trace_strokes, MeshInstance(surface, IDENTITY, RosyField(4, np.zeros((16, 3)))), 0.1
     )
-    assert "per vertex" in error_of(trace_strokes, instance, np.ones(7))
-    assert "min_separation" in error_of(SeparationRules, min_separation=1.2)
-    assert "min_length" in error_of(SeparationRules, min_length=5.0, max_length=3.0)

@@ -7,7 +7,6 @@ chosen such that the stroke arrives exactly at its first point.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -70,13 +69,13 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
+        Strokes before `label_families`: all are in one family.
     spacing : CornerSpacing
 
     Returns
     -------
     Strokes
-        The open strokes, then the loops. If there are loops, all families are 0: call this before
-        `label_families`.
+        The open strokes, then the loops.
     """
     candidates = _candidates(strokes)
     if not len(candidates):
@@ -118,8 +117,7 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     is_open = np.ones(len(strokes), dtype=bool)
     is_open[candidates[closes]] = False
     loops = _loop_strokes(mesh, strokes.select(candidates), trace, closes, spacing)
-    result = Strokes.concatenate(strokes.select(is_open), loops)
-    return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
+    return Strokes.join([strokes.select(is_open), loops])
 
 
 def _left_offset(strokes: Strokes, first: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -225,17 +223,5 @@ def _loop_strokes(
     weights = np.concatenate([start.weights, trace.weights[keep]])[order]
     direction = np.concatenate([start.member, trace.direction[keep]])[order]
     count = np.bincount(particle, minlength=len(strokes))[loop_index]
-    return Strokes(
-        points=mesh.points_at(triangle, weights),
-        start=np.concatenate([[0], np.cumsum(count)]),
-        family=np.zeros(len(loop_index), dtype=np.int32),
-        names=strokes.names,
-        face=mesh.face[triangle],
-        triangle=triangle,
-        weights=weights,
-        normal=mesh.shading_normals_at(triangle, weights),
-        member=mesh.to_world(triangle, direction),
-        spacing=spacing.at(triangle, weights, direction),
-        width=np.ones(len(triangle)),
-        closed=np.ones(len(loop_index), dtype=bool),
-    )
+    spacings = spacing.at(triangle, weights, direction)
+    return Strokes.on_mesh(mesh, count, triangle, weights, direction, spacings, closed=True)

@@ -12,17 +12,17 @@ from typing import NamedTuple
 import numpy as np
 
 from .column_table import ColumnTable
-from .surface_particles import SurfaceParticles, TracedPath
+from .surface_particles import SurfaceParticles
 
 
 @dataclass(eq=False)
-class Tips:
+class Tips(SurfaceParticles):
     """The growing ends of strokes, n of them.
+
+    The sign is that of the half of the stroke.
 
     Attributes
     ----------
-    particles : SurfaceParticles
-        Their positions. The sign is that of the half of the stroke.
     stroke : (n,) int32 ndarray
     arc : (n,) float64 ndarray
         Signed arc length from the seed, in world space.
@@ -30,42 +30,28 @@ class Tips:
         Fraction of a full step to try next.
     """
 
-    particles: SurfaceParticles
     stroke: np.ndarray
     arc: np.ndarray
     step_scale: np.ndarray
 
     @staticmethod
-    def empty() -> Tips:
-        """Return no tips."""
-        return Tips(SurfaceParticles.empty(), np.empty(0, np.int32), np.empty(0), np.empty(0))
+    def at(particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray) -> Tips:
+        """Return tips at particles that try full steps."""
+        return Tips(*particles.columns, stroke.astype(np.int32), arc, np.ones(len(stroke)))
 
-    def __len__(self) -> int:
-        return len(self.stroke)
+    @property
+    def particles(self) -> SurfaceParticles:
+        """Their positions: the same arrays."""
+        return SurfaceParticles(self.triangle, self.weights, self.member, self.sign)
 
     @property
     def end(self) -> np.ndarray:
         """(n,) int64: the end of its stroke that each tip is, 0 or 1."""
-        return np.where(self.particles.sign > 0, 1, 0)
+        return np.where(self.sign > 0, 1, 0)
 
-    def take(self, indices: np.ndarray) -> Tips:
-        """Return a copy of some tips."""
-        return Tips(
-            self.particles.take(indices),
-            self.stroke[indices],
-            self.arc[indices],
-            self.step_scale[indices],
-        )
 
-    @staticmethod
-    def concatenate(first: Tips, second: Tips) -> Tips:
-        """Return both sets, one after the other."""
-        return Tips(
-            SurfaceParticles.concatenate(first.particles, second.particles),
-            np.concatenate([first.stroke, second.stroke]),
-            np.concatenate([first.arc, second.arc]),
-            np.concatenate([first.step_scale, second.step_scale]),
-        )
+#: No tips.
+NO_TIPS = Tips.at(SurfaceParticles.empty(), np.empty(0), np.empty(0))
 
 
 class StrokeSegments(NamedTuple):
@@ -89,18 +75,6 @@ class StrokeSegments(NamedTuple):
     begin_weights: np.ndarray
     end_weights: np.ndarray
     direction: np.ndarray
-
-    @staticmethod
-    def of_tips(tips: Tips, path: TracedPath) -> StrokeSegments:
-        """Return the segments that tips have traced."""
-        return StrokeSegments(
-            tips.stroke[path.particle],
-            tips.particles.sign[path.particle].astype(np.int8),
-            path.triangle,
-            path.begin_weights,
-            path.end_weights,
-            path.direction,
-        )
 
 
 class GrowingStrokes(ColumnTable):

@@ -22,8 +22,8 @@ import numpy as np
 from ..field.frames import dot
 from ..progress import report
 from .directional_spacing import CornerSpacing
-from .growing_strokes import GrowingStrokes, StrokeSegments, Tips
-from .lateral_neighbors import find_lateral_neighbors
+from .growing_strokes import NO_TIPS, GrowingStrokes, StrokeSegments, Tips
+from .lateral_neighbors import LateralNeighbors, find_lateral_neighbors
 from .path_samples import PathSamples, SampledPath
 from .samples import SAMPLE_STEP, StrokeSamples
 from .seeding import lateral_seeds, longest_open_runs
@@ -88,7 +88,7 @@ class StreamlinePlacer:
         self.mesh, self.spacing, self.rules = mesh, spacing, rules
         self.samples = StrokeSamples(mesh, spacing)
         self.strokes = GrowingStrokes()
-        self.tips = Tips.empty()
+        self.tips = NO_TIPS
         self.segments: list[StrokeSegments] = []
 
     # --- growing ----------------------------------------------------------------------------------
@@ -104,13 +104,8 @@ class StreamlinePlacer:
         tip, tip_count = traced.particle, len(tips)
         stroke, arc = tips.stroke[tip], tips.arc[tip] + traced.position.sign * traced.arc
         sample = samples.add(traced.position, stroke, arc, samples.next_steps(traced.rank))
-        neighbors = find_lateral_neighbors(
-            samples, sample, self.rules.min_separation, self.rules.max_gap, traced.previous
-        )
-        samples.remove(sample[neighbors.rejected])
-        samples.mark_covered(neighbors.covering)
+        neighbors = self._compare(sample, traced.previous)
         accepted = np.flatnonzero(~neighbors.rejected)
-        samples.add_open_sides(sample[accepted])
         strokes.extend(stroke[accepted], tips.end[tip[accepted]], arc[accepted], sample[accepted])
         traced_count = np.bincount(tip, minlength=tip_count)
         strokes.end_yielded[tips.stroke, tips.end] &= traced_count == 0
@@ -125,15 +120,35 @@ class StreamlinePlacer:
         moved = np.flatnonzero(last >= 0)
         walked = np.zeros(tip_count)
         walked[moved] = traced.arc[last[moved]]
-        self.segments.append(StrokeSegments.of_tips(tips, path.cut(walked)))
+        walked_path = path.cut(walked)
+        self.segments.append(
+            StrokeSegments(
+                tips.stroke[walked_path.particle],
+                tips.sign[walked_path.particle].astype(np.int8),
+                walked_path.triangle,
+                walked_path.begin_weights,
+                walked_path.end_weights,
+                walked_path.direction,
+            )
+        )
         tips.particles.assign(moved, traced.position.take(last[moved]))
-        tips.arc += tips.particles.sign * walked
+        tips.arc += tips.sign * walked
         tips.step_scale[rejected] /= 2
         ended = np.where(rejected, tips.step_scale < MIN_STEP_SCALE, ended)
         max_length = self.rules.max_length * strokes.spacing[tips.stroke]
         ended |= strokes.length(tips.stroke) > max_length
         self._finish_tips(tips.take(np.flatnonzero(ended)))
         self.tips = tips.take(np.flatnonzero(~ended))
+
+    def _compare(self, sample: np.ndarray, previous: np.ndarray | None = None) -> LateralNeighbors:
+        """Compare new samples with others by the rules, and remove those that are rejected."""
+        neighbors = find_lateral_neighbors(
+            self.samples, sample, self.rules.min_separation, self.rules.max_gap, previous
+        )
+        self.samples.remove(sample[neighbors.rejected])
+        self.samples.mark_covered(neighbors.covering)
+        self.samples.add_open_sides(sample[~neighbors.rejected])
+        return neighbors
 
     def _trace_samples(self, sample_count: int) -> tuple[SampledPath, PathSamples, np.ndarray]:
         """Trace the next samples of all tips, without comparing them with strokes.
@@ -147,7 +162,7 @@ class StreamlinePlacer:
             Whether a tip cannot continue after its last sample.
         """
         mesh, tips, strokes = self.mesh, self.tips, self.strokes
-        step = SAMPLE_STEP * tips.step_scale * self.samples.spacing_at(tips.particles)
+        step = SAMPLE_STEP * tips.step_scale * self.samples.spacing_at(tips)
         # Both tips of a stroke may grow by all of the length that is left.
         left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
         count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
@@ -160,14 +175,14 @@ class StreamlinePlacer:
             max_segment_length=SAMPLES_PER_SEGMENT * step,
             max_segments=max_segments,
         )
-        path = SampledPath(path, tips.particles.sign)
+        path = SampledPath(path, tips.sign)
 
         def next_step(position: SurfaceParticles, tip: np.ndarray) -> np.ndarray:
             return SAMPLE_STEP * tips.step_scale[tip] * self.samples.spacing_at(position)
 
         traced = path.samples(step, next_step, ended)
         # In sliver triangles, a particle may walk without a change of position.
-        start = mesh.points_at(tips.particles.triangle, tips.particles.weights)
+        start = mesh.points_at(tips.triangle, tips.weights)
         points = mesh.points_at(traced.position.triangle, traced.position.weights)
         is_first = traced.previous < 0
         chord = points - np.where(
@@ -211,20 +226,12 @@ class StreamlinePlacer:
         samples = self.samples
         stroke, end = self.strokes.resume_yielded_ends()
         sample = self.strokes.end_sample[stroke, end]
-        particles = SurfaceParticles(
-            samples.triangle[sample],
-            samples.weights[sample],
-            samples.local_member[sample],
-            np.where(end > 0, 1.0, -1.0),
-        )
-        new_tips = Tips(
-            particles, stroke.astype(np.int32), samples.arc[sample], np.ones(len(stroke))
-        )
-        self.tips = Tips.concatenate(self.tips, new_tips)
+        particles = samples.particles(sample, np.where(end > 0, 1.0, -1.0))
+        self.tips = self.tips.join(Tips.at(particles, stroke, samples.arc[sample]))
 
     def suspend(self) -> None:
         """End all tips as if they had yielded. No stroke is seeded beside them before `rescan`."""
-        tips, self.tips = self.tips, Tips.empty()
+        tips, self.tips = self.tips, NO_TIPS
         self.strokes.end_yielded[tips.stroke, tips.end] = True
         self._finish_tips(tips)
         self.samples.close_open_sides()
@@ -269,26 +276,16 @@ class StreamlinePlacer:
         step = samples.next_steps(np.zeros(count, dtype=np.int32))
         sample = samples.add(particles, stroke, np.zeros(count), step)
         strokes.set_seeds(stroke, sample)
-        neighbors = find_lateral_neighbors(
-            samples, sample, self.rules.min_separation, self.rules.max_gap
-        )
-        samples.remove(sample[neighbors.rejected])
-        strokes.alive[stroke[neighbors.rejected]] = False
-        samples.mark_covered(neighbors.covering)
-        accepted = np.flatnonzero(~neighbors.rejected)
-        samples.add_open_sides(sample[accepted])
+        is_accepted = ~self._compare(sample).rejected
+        strokes.alive[stroke] = is_accepted
+        accepted = np.flatnonzero(is_accepted)
         strokes.add_active_children(parent_side[accepted], 1)
         for sign in (1.0, -1.0):
             tip_particles = particles.take(accepted)
             tip_particles.sign = np.full(len(accepted), sign)
-            new_tips = Tips(
-                tip_particles,
-                stroke[accepted].astype(np.int32),
-                np.zeros(len(accepted)),
-                np.ones(len(accepted)),
-            )
-            self.tips = Tips.concatenate(self.tips, new_tips)
-        return ~neighbors.rejected
+            new_tips = Tips.at(tip_particles, stroke[accepted], np.zeros(len(accepted)))
+            self.tips = self.tips.join(new_tips)
+        return is_accepted
 
     def seed_neighbors(self) -> int:
         """Start strokes beside existing ones, and return how many.

@@ -159,6 +159,11 @@ class StrokeSamples(ColumnTable):
         """Return (n,) float64: the required spacing at particles, in world space."""
         return self.required_spacing.at(particles.triangle, particles.weights, particles.member)
 
+    def particles(self, sample: np.ndarray, sign: np.ndarray) -> SurfaceParticles:
+        """Return particles with (n,) signs at samples."""
+        columns = self.triangle, self.weights, self.local_member
+        return SurfaceParticles(*(column[sample] for column in columns), sign)
+
     # --- adding and removing ----------------------------------------------------------------------
 
     def next_steps(self, step: np.ndarray) -> np.ndarray:

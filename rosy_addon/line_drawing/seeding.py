@@ -204,12 +204,7 @@ def _lateral_points(
     samples: StrokeSamples, sample: np.ndarray, side: np.ndarray, distance: np.ndarray
 ) -> tuple[SurfaceParticles, np.ndarray]:
     """Return the points at (n,) distances beside samples, in spacings; see `lateral_seeds`."""
-    particles = SurfaceParticles(
-        samples.triangle[sample],
-        samples.weights[sample],
-        samples.local_member[sample],
-        np.ones(len(sample)),
-    )
+    particles = samples.particles(sample, np.ones(len(sample)))
     direction = samples.local_direction[sample] * np.where(side == 0, 1j, -1j)
     length = distance * samples.spacing[sample]
     arrived, _, walked = trace_geodesics(samples.mesh, particles, direction, length)

@@ -58,14 +58,14 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`: their families are not used.
+        Strokes before `label_families`: all are in one family.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
 
     Returns
     -------
     Strokes
-        Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
+        Strokes that were not cut, then the remaining parts.
     """
     label = "separating strokes"
     with progress(0.0, 0.3, label):
@@ -89,10 +89,13 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     too_close = _dilate(refined, too_close)
     report(0.8, label)
     cut = np.unique(refined.stroke[too_close])
-    remaining = refined.runs_where(~too_close, free_at_removed=False)
+    # Of the runs, those of strokes that were not cut are left out: these stay as they were.
     is_cut = np.zeros(len(candidates), dtype=bool)
     is_cut[cut] = True
-    remaining = remaining.select(is_cut[_run_owner(refined, ~too_close)])
+    numbered = replace(refined, family=np.arange(len(refined), dtype=np.int32))
+    remaining = numbered.runs_where(~too_close, free_at_removed=False)
+    remaining = remaining.select(is_cut[remaining.family])
+    remaining = replace(remaining, family=np.zeros(len(remaining), dtype=np.int32))
     remaining = replace(remaining, weights=mesh.weights_at(remaining.triangle, remaining.points))
     remaining = remaining.select(
         remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
@@ -100,10 +103,7 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     report(0.9, label)
     untouched = np.ones(len(strokes), dtype=bool)
     untouched[candidates[cut]] = False
-    kept = strokes.select(untouched)
-    report(0.95, label)
-    result = Strokes.concatenate(kept, remaining)
-    return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
+    return Strokes.join([strokes.select(untouched), remaining])
 
 
 def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
@@ -295,12 +295,3 @@ def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
     np.add.at(coverage, low, 1)
     np.add.at(coverage, high, -1)
     return np.cumsum(coverage[:-1]) > 0
-
-
-def _run_owner(strokes: Strokes, kept: np.ndarray) -> np.ndarray:
-    """Return the stroke of each run that `Strokes.runs_where(kept)` returns."""
-    stroke = strokes.stroke
-    starts_run = kept.copy()
-    starts_run[1:] &= ~kept[:-1] | (stroke[1:] != stroke[:-1])
-    run = np.cumsum(starts_run) - 1
-    return stroke[starts_run][np.bincount(run[kept], minlength=int(starts_run.sum())) >= 2]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.frames import dot, normalize
+from .tangent_mesh import TangentMesh
 
 #: The attributes of `Strokes` that have a row for each point.
 POINT_COLUMNS = (
@@ -106,19 +107,15 @@ class Strokes:
         start = np.concatenate([[0], np.cumsum(count)])
         point = np.arange(start[-1]) + np.repeat(self.start[:-1][selection] - start[:-1], count)
         return replace(
-            self._take_points(point),
+            self.take_points(point),
             start=start,
             family=self.family[selection],
             closed=self.closed[selection],
             free_ends=self.free_end_mask[selection],
         )
 
-    def reordered(self, order: np.ndarray) -> Strokes:
-        """Return the strokes with their points in another order: (n,) numbers within each stroke."""
-        return self._take_points(order)
-
-    def _take_points(self, point: np.ndarray) -> Strokes:
-        """Return a copy with only some points. The caller has to replace `start` as well."""
+    def take_points(self, point: np.ndarray) -> Strokes:
+        """Return a copy with some points, by number. The caller replaces what is no longer true."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
     def runs_where(
@@ -161,7 +158,7 @@ class Strokes:
         outside = np.clip(ends + (-1, 1), 0, len(kept) - 1)
         is_whole = count[is_long] == np.diff(self.start)[owner]
         return replace(
-            self._take_points(point),
+            self.take_points(point),
             start=np.concatenate([[0], np.cumsum(count[is_long])]),
             family=self.family[owner],
             closed=self.closed[owner] & is_whole,
@@ -251,6 +248,45 @@ class Strokes:
         )
 
     @staticmethod
+    def on_mesh(
+        mesh: TangentMesh,
+        count: np.ndarray,
+        triangle: np.ndarray,
+        weights: np.ndarray,
+        direction: np.ndarray,
+        spacing: np.ndarray,
+        closed: bool = False,
+    ) -> Strokes:
+        """Return strokes that were traced on a mesh, in one family.
+
+        Parameters
+        ----------
+        mesh : TangentMesh
+        count : (S,) ndarray of int
+            Number of points of each stroke.
+        triangle, weights, direction : (n, ...) ndarray
+            Triangles and barycentric coordinates of the points, and unit directions of the strokes in
+            the frames of the triangles.
+        spacing : (n,) ndarray
+        closed : bool
+            Whether all of them are.
+        """
+        return Strokes(
+            points=mesh.points_at(triangle, weights),
+            start=np.concatenate([[0], np.cumsum(count)]),
+            family=np.zeros(len(count), dtype=np.int32),
+            names=("family 1",),
+            face=mesh.face[triangle],
+            triangle=triangle,
+            weights=weights,
+            normal=mesh.shading_normals_at(triangle, weights),
+            member=mesh.to_world(triangle, direction),
+            spacing=spacing,
+            width=np.ones(len(triangle)),
+            closed=np.full(len(count), closed),
+        )
+
+    @staticmethod
     def join(blocks: Sequence[Strokes]) -> Strokes:
         """Return all strokes of blocks with the same families."""
         offsets = np.cumsum([0, *(len(block.points) for block in blocks)])
@@ -269,18 +305,8 @@ class Strokes:
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
         """Return both sets. The families of the second are numbered after those of the first."""
-        free_ends = np.concatenate([first.free_end_mask, second.free_end_mask])
-        return Strokes(
-            points=np.concatenate([first.points, second.points]),
-            start=np.concatenate([first.start, second.start[1:] + first.start[-1]]),
-            family=np.concatenate([first.family, second.family + len(first.names)]),
-            names=first.names + second.names,
-            free_ends=free_ends,
-            **{
-                name: np.concatenate([getattr(first, name), getattr(second, name)])
-                for name in (*POINT_COLUMNS[1:], "closed")
-            },
-        )
+        renumbered = replace(second, family=second.family + np.int32(len(first.names)))
+        return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 
 
 def arc_lengths(points: np.ndarray, start: np.ndarray) -> np.ndarray:

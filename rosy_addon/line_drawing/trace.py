@@ -169,7 +169,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
 def collect(placer: StreamlinePlacer) -> Strokes:
     """Return the strokes of a placer. They are all in one family; see `label_families`."""
     label = "collecting strokes"
-    mesh, samples = placer.mesh, placer.samples
+    samples = placer.samples
     columns = []
     for column in zip(*placer.segments, strict=True):
         report(0.05 * len(columns), label)
@@ -209,22 +209,7 @@ def collect(placer: StreamlinePlacer) -> Strokes:
     weights = np.concatenate([weights, first_weights])[order]
     direction = np.concatenate([direction * sign, first_direction])[order]
     report(0.8, label)
-    row = np.searchsorted(stroke_ids, stroke)
-    points = mesh.points_at(triangle, weights)
-    start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(stroke_ids)))])
+    count = np.bincount(np.searchsorted(stroke_ids, stroke), minlength=len(stroke_ids))
     spacing = placer.spacing.at(triangle, weights, direction)
-    report(0.9, label)
-    return Strokes(
-        points=points,
-        start=start,
-        family=np.zeros(len(stroke_ids), dtype=np.int32),
-        names=("family 1",),
-        face=mesh.face[triangle],
-        triangle=triangle.astype(np.int32),
-        weights=weights,
-        normal=mesh.shading_normals_at(triangle, weights),
-        member=mesh.to_world(triangle, direction),
-        spacing=spacing,
-        width=np.ones(len(points)),
-        closed=np.zeros(len(stroke_ids), dtype=bool),
-    )
+    triangle = triangle.astype(np.int32)
+    return Strokes.on_mesh(placer.mesh, count, triangle, weights, direction, spacing)

@@ -165,7 +165,7 @@ def visible_runs(
         visible = find_visible(block, pixels, inside)
         order = _from_hidden_points(block, visible)
         block, pixels, inside, visible = (
-            block.reordered(order),
+            block.take_points(order),
             pixels[order],
             inside[order],
             visible[order],

@@ -53,6 +53,7 @@ from .visibility import (
     pixel_size,
     project_to_pixels,
     rasterize_depth,
+    to_clip,
 )
 
 #: Width of a tapered stroke at its end, as a fraction of the full width.
@@ -142,9 +143,9 @@ def draw_instances(
     drawn = [index for index, instance in enumerate(instances) if instance.field is not None]
     if not drawn:
         raise RosyError("no object has a field: strokes need one")
-    if clip_to_frame or not style.hidden:
-        drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
     clips = clip_to_frame or not style.hidden
+    if clips:
+        drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
     depth_buffer = None
     if drawn and not style.hidden:
         label = "finding visible strokes"
@@ -158,7 +159,7 @@ def draw_instances(
         seen = None
         if depth_buffer is not None:
             with progress(start, middle):
-                seen = seen_triangles(instances, index, camera, depth_buffer)
+                seen = seen_triangles(instances[index], index, depth_buffer)
         with progress(middle, stop):
             strokes = _trace_instance(instances[index], camera, style, lights, clips, seen, cache)
         if strokes is not None:
@@ -172,13 +173,7 @@ def draw_instances(
         raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clips:
         with progress(0.88, 0.92):
-            strokes = clip_to_visible(
-                strokes,
-                instances,
-                camera,
-                remove_hidden=not style.hidden,
-                depth_buffer=depth_buffer,
-            )
+            strokes = clip_to_visible(strokes, camera, depth_buffer)
         with progress(0.92, 0.93):
             strokes = smooth(strokes, camera)
     if style.outline:
@@ -192,7 +187,7 @@ def draw_instances(
     heads = _arrowheads(strokes, instances, instance_of_family, style) if style.arrows else None
     if style.overshoot:
         with progress(0.95, 0.98):
-            strokes = _overshoot(strokes, instances, camera, style, clip_to_frame)
+            strokes = _overshoot(strokes, camera, style, depth_buffer, clips)
     if not len(strokes):
         raise _no_visible_stroke(camera)
     if heads is not None:
@@ -320,7 +315,7 @@ def _outlines(
             lines = outline(instances[index], camera)
         if clips:
             with progress(middle, clipped):
-                lines = clip_outline(lines, index, instances, camera, depth_buffer)
+                lines = clip_outline(lines, instances[index], index, camera, depth_buffer)
             with progress(clipped, stop):
                 lines = smooth(lines, camera)
         outlines.append(lines)
@@ -329,17 +324,16 @@ def _outlines(
 
 def _overshoot(
     strokes: Strokes,
-    instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle,
-    clip_to_frame: bool,
+    depth_buffer: DepthBuffer | None,
+    clips: bool,
 ) -> Strokes:
     """Extend free ends, clip the extensions to the frame, and taper these ends."""
-    occluders = None if style.hidden else instances
     with progress(0.0, 0.8):
-        strokes = extend_free_ends(strokes, camera, style.overshoot, occluders)
+        strokes = extend_free_ends(strokes, camera, style.overshoot, depth_buffer)
     report(0.8, "extending strokes")
-    if clip_to_frame or not style.hidden:
+    if clips:
         inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
         strokes = strokes.runs_where(inside, free_at_removed=False)
     return strokes.tapered(style.taper, TIP_WIDTH, strokes.free_end_mask)
@@ -403,8 +397,7 @@ def _is_in_view(points: np.ndarray, camera: Camera) -> bool:
 
     It is not if all of them are outside one plane of the view frustum. The far plane is not tested.
     """
-    matrix = camera.projection @ camera.view
-    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    clip = to_clip(points, camera)
     outside = np.abs(clip[:, :2]) > clip[:, 3:]
     outside_sides = np.concatenate(
         [outside & (clip[:, :2] > 0), outside & (clip[:, :2] < 0)], axis=1

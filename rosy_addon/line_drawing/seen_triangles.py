@@ -7,20 +7,17 @@ tracing goes on a little beyond what is seen.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..progress import report
-from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .tangent_mesh import TangentMesh
 from .visibility import (
     BLOCK_POINTS,
     DepthBuffer,
     in_frame,
-    pixel_size,
     planes_around,
     project_to_pixels,
 )
@@ -29,18 +26,14 @@ from .visibility import (
 HIDDEN_MARGIN = 6.0
 
 
-def seen_triangles(
-    instances: Sequence[MeshInstance], index: int, camera: Camera, depth_buffer: DepthBuffer
-) -> np.ndarray:
+def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> np.ndarray:
     """Find the triangles of an instance that the camera sees.
 
     Parameters
     ----------
-    instances : sequence of MeshInstance
-        Those of the depth buffer.
+    instance : MeshInstance
     index : int
-        The number of the instance.
-    camera : Camera
+        The number of the instance among those of the depth buffer.
     depth_buffer : DepthBuffer
 
     Returns
@@ -50,31 +43,26 @@ def seen_triangles(
         the frame counts as not hidden.
     """
     label = "finding the part in view"
-    instance = instances[index]
     triangle_vertex = instance.surface.triangle_vertex
-    first = sum(len(other.surface.triangles) for other in instances[:index])
     owner = depth_buffer.triangle[depth_buffer.triangle >= 0]
     pixel_counts = np.bincount(owner, minlength=len(depth_buffer.normal))
-    seen = pixel_counts[first : first + len(triangle_vertex)] > 0
+    seen = pixel_counts[depth_buffer.start[index] : depth_buffer.start[index + 1]] > 0
     points = instance.world_points()
     hidden = np.zeros(len(points), dtype=bool)
     pending = np.unique(triangle_vertex[~seen])
-    for start in range(0, len(pending), BLOCK_POINTS):
-        report(start / len(pending), label)
-        block = pending[start : start + BLOCK_POINTS]
-        hidden[block] = _is_hidden(points[block], camera, depth_buffer)
+    for part in row_blocks(len(pending), BLOCK_POINTS):
+        report(part.start / max(len(pending), 1), label)
+        hidden[pending[part]] = _is_hidden(points[pending[part]], depth_buffer)
     return seen | ~hidden[triangle_vertex].all(axis=1)
 
 
-def _is_hidden(points: np.ndarray, camera: Camera, depth_buffer: DepthBuffer) -> np.ndarray:
+def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
     """Return (n,) bool: which points are in the frame, and behind all triangles around them."""
-    pixels, _ = project_to_pixels(points, camera)
-    hidden = in_frame(pixels, camera)
+    pixels, _ = project_to_pixels(points, depth_buffer.camera)
+    hidden = in_frame(pixels, depth_buffer.camera)
     chosen = np.flatnonzero(hidden)
-    camera_points = points[chosen] @ camera.view[:3, :3].T + camera.view[:3, 3]
-    footprint = pixel_size(points[chosen], camera)
-    for plane in planes_around(camera_points, pixels[chosen], footprint, depth_buffer, camera):
-        hidden[chosen] &= (plane.triangle >= 0) & (plane.distance > plane.bias)
+    for plane in planes_around(points[chosen], pixels[chosen], depth_buffer):
+        hidden[chosen] &= plane.hides
     return hidden
 
 

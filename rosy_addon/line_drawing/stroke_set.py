@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..field.blocks import concatenated_ranges
 from ..field.frames import dot, normalize
 from .tangent_mesh import TangentMesh
 
@@ -104,11 +105,9 @@ class Strokes:
         selection = np.asarray(selection)
         selection = np.flatnonzero(selection) if selection.dtype == bool else selection
         count = np.diff(self.start)[selection]
-        start = np.concatenate([[0], np.cumsum(count)])
-        point = np.arange(start[-1]) + np.repeat(self.start[:-1][selection] - start[:-1], count)
         return replace(
-            self.take_points(point),
-            start=start,
+            self.take_points(concatenated_ranges(self.start[:-1][selection], count)),
+            start=np.concatenate([[0], np.cumsum(count)]),
             family=self.family[selection],
             closed=self.closed[selection],
             free_ends=self.free_end_mask[selection],
@@ -314,7 +313,7 @@ def arc_lengths(points: np.ndarray, start: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    points : (n, 3) ndarray
+    points : (n, 3) or (n, 2) ndarray
     start : (S + 1,) ndarray of int
         As in `Strokes`.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import svg_text
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.trace import trace_on_mesh
+from rosy_addon.line_drawing.visibility import clip_to_visible, rasterize_depth
+from rosy_addon.projection.camera import Camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
 
@@ -34,6 +37,11 @@ def trace_strokes(
     values = np.broadcast_to(values, mesh.triangle_vertex.shape)
     strokes = trace_on_mesh(mesh, CornerSpacing(values), rules, instance.surface.name)
     return label_families(strokes, mesh)
+
+
+def visible_strokes(strokes: Strokes, instances: Sequence[MeshInstance], camera: Camera) -> Strokes:
+    """Return the parts of strokes that are in the frame and not hidden by mesh instances."""
+    return clip_to_visible(strokes, camera, rasterize_depth(instances, camera))
 
 
 def write_svg(path: Path, *drawing: object) -> None:

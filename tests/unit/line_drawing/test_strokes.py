@@ -12,7 +12,7 @@ import pytest
 from conftest import long, mainly
 from field_helpers import bumpy
 from harness.stroke_spacing import lateral_gaps
-from harness.stroke_tracing import trace_strokes
+from harness.stroke_tracing import trace_strokes, visible_strokes
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
@@ -231,7 +231,7 @@ def test_strokes_look_like_the_render():
     instance = instance_of(icosphere(4), 4, kind="smoothest")
     camera = orbit_camera(instance.surface, 20, 30, 900, 900, perspective=False)
     gbuffer = project([instance], camera)
-    visible = clip_to_visible(trace_strokes(instance, 0.1), [instance], camera)
+    visible = visible_strokes(trace_strokes(instance, 0.1), [instance], camera)
     end = np.flatnonzero(np.diff(visible.stroke, prepend=-1) == 0)
     pixels, _ = project_to_pixels((visible.points[end] + visible.points[end - 1]) / 2, camera)
     column, row = np.floor(pixels.T).astype(int)
@@ -704,13 +704,13 @@ def test_a_sphere_shows_its_near_side():
     instance = instance_of(icosphere(4), 2, kind="smoothest")
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
     strokes = trace_strokes(instance, 0.1)
-    visible = clip_to_visible(strokes, [instance], camera)
+    visible = visible_strokes(strokes, [instance], camera)
     assert visible.points[:, 1].max() < 0.06
     start, end, _ = segments_of(strokes)
     is_near_side = (start + end)[:, 1] < 0
     near_length = np.linalg.norm(end - start, axis=1)[is_near_side].sum()
     assert np.isclose(visible.length.sum(), near_length, rtol=0.02)
-    unclipped = clip_to_visible(strokes, [instance], camera, remove_hidden=False)
+    unclipped = clip_to_visible(strokes, camera, None)
     assert np.isclose(unclipped.length.sum(), strokes.length.sum())
 
 
@@ -719,12 +719,12 @@ def test_strokes_are_clipped_by_occluders_and_by_the_frame():
     instance = instance_of(plane(), 2)
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 200, scale=1.0)
     strokes = trace_strokes(instance, 0.05)
-    in_frame = clip_to_visible(strokes, [instance], camera)
+    in_frame = visible_strokes(strokes, [instance], camera)
     assert np.abs(in_frame.points[:, :2]).max() <= 0.5 + 1e-9
     matrix = np.eye(4)
     matrix[:3, 3] = (1.0, 0, 1.0)
     occluder = MeshInstance(plane(), matrix)
-    visible = clip_to_visible(strokes, [instance, occluder], camera)
+    visible = visible_strokes(strokes, [instance, occluder], camera)
     assert visible.points[:, 0].max() < 0.02
     assert len(visible) >= 15
 
@@ -752,7 +752,7 @@ def svg_camera():
 def svg_of(**pen_options):
     """Return the root element of an SVG file, and its strokes."""
     instance = instance_of(plane(), 4)
-    strokes = clip_to_visible(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
+    strokes = visible_strokes(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
     return ElementTree.fromstring(svg_text(strokes, svg_camera(), Pen(**pen_options))), strokes
 
 
@@ -791,7 +791,7 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
 def test_closed_strokes_are_closed_paths():
     instance = MeshInstance(icosphere(4), IDENTITY, axis_field(icosphere(4), 4, (0, 0, 1)))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
-    strokes = clip_to_visible(trace_strokes(instance, 0.15), [instance], camera)
+    strokes = visible_strokes(trace_strokes(instance, 0.15), [instance], camera)
     assert strokes.closed.any() and not strokes.closed.all()
 
     def path_data(selected, plotter):

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import long
-from harness.stroke_tracing import trace_strokes, write_svg
+from harness.stroke_tracing import trace_strokes, visible_strokes, write_svg
 from PIL import Image
 from scipy.ndimage import binary_erosion, gaussian_filter, sobel
 from shapes import torus
@@ -24,7 +24,7 @@ from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
-from rosy_addon.line_drawing.visibility import clip_to_visible, pixel_size
+from rosy_addon.line_drawing.visibility import pixel_size
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -145,7 +145,7 @@ def strokes(scene):
     lines = trace_strokes(crossed, 9.0 * pixel_size(crossed.world_points(), camera)).tapered(
         0.8, 0.15
     )
-    return clip_to_visible(
+    return visible_strokes(
         Strokes.concatenate(lines, outline(instance, camera)), [instance], camera
     )
 
@@ -170,11 +170,11 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
     """Open paths end at their first point, so they look the same."""
     instance, camera = scene
     crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
-    lines = clip_to_visible(
+    lines = visible_strokes(
         trace_strokes(crossed, 10.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
     )
     lines = Strokes.concatenate(
-        lines, clip_to_visible(outline(instance, camera), [instance], camera)
+        lines, visible_strokes(outline(instance, camera), [instance], camera)
     )
     assert lines.closed.sum() >= 3
     pictures = []
@@ -216,7 +216,7 @@ def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
 @needs_browser
 def test_strokes_have_the_directions_of_the_render(scene, tmp_path):
     instance, camera = scene
-    lines = clip_to_visible(
+    lines = visible_strokes(
         trace_strokes(instance, 5.0 * pixel_size(instance.world_points(), camera)),
         [instance],
         camera,

@@ -41,10 +41,7 @@ def surface_points(strokes: Strokes, height: np.ndarray, instance: MeshInstance)
         The instance that all strokes are on.
     """
     surface = instance.surface
-    # A point of an outline may have a face only; it lies on an edge of it.
-    first = np.searchsorted(surface.triangle_face, strokes.face)
-    triangle = np.where(strokes.triangle < 0, first, strokes.triangle)
-    corners = surface.triangle_vertex[triangle]
+    corners = surface.triangle_vertex[strokes.triangle]
     a, b, c = instance.world_points()[corners].transpose(1, 0, 2)
     u, v, offset = b - a, c - a, strokes.points - a
     # Least squares: the nearest point of the plane.

@@ -198,11 +198,10 @@ def _trace_loops(
 
 def _particles_at_start(mesh: TangentMesh, strokes: Strokes, first: np.ndarray) -> SurfaceParticles:
     """Return particles at the first points of strokes that move along the strokes."""
-    triangle, world_member = strokes.triangle[first], strokes.member[first]
-    reference = dot(world_member, mesh.x[triangle]) + 1j * dot(world_member, mesh.y[triangle])
-    weights = strokes.weights[first].copy()
+    triangle, weights = strokes.triangle[first], strokes.weights[first]
+    reference = mesh.to_frame(triangle, strokes.member[first])
     member = mesh.members_at(triangle, weights, reference)
-    return SurfaceParticles(triangle.copy(), weights, member, np.ones(len(first)))
+    return SurfaceParticles(triangle, weights, member, np.ones(len(first)))
 
 
 def _loop_strokes(

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
 from ..field.frames import dot
 from ..projection.camera import Camera
-from .tangent_mesh import TangentMesh
+from .tangent_mesh import TangentMesh, unit
 from .visibility import pixel_size
 
 #: Smallest cosine between the normal and the direction to the camera for which the density is kept.
@@ -59,11 +58,8 @@ class CornerSpacing:
 
     def take(self, kept: np.ndarray) -> CornerSpacing:
         """Return the spacing on some triangles; `kept` is (T,) bool."""
-        if self.is_directional is None:
-            return CornerSpacing(self.values[kept])
-        return CornerSpacing(
-            self.values[kept], self.mean[kept], self.double[kept], self.is_directional[kept]
-        )
+        columns = vars(self).values()
+        return CornerSpacing(*(None if column is None else column[kept] for column in columns))
 
     def at(self, triangle: np.ndarray, weights: np.ndarray, direction: np.ndarray) -> np.ndarray:
         """Return (n,) float64: the spacing at barycentric coordinates, for unit directions."""
@@ -99,13 +95,7 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
     pixels : float
         Spacing for a surface that faces the camera.
 
-    Raises
-    ------
-    RosyError
-        If `pixels` is not finite or not above 0.
     """
-    if not (np.isfinite(pixels) and pixels > 0):
-        raise RosyError(f"the spacing must be above 0 pixels, not {pixels:g}")
     to_eye = camera.view_directions(mesh.points)
     cosine = np.abs(dot(mesh.corner_normal, to_eye))
     factor = foreshortening_factor(np.maximum(cosine, MIN_FACING_COSINE))
@@ -117,8 +107,7 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
         1 / np.maximum(cosine, np.clip(np.sqrt(band), *MIN_COSINES)) ** 2 - 1
     )
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
-    norm = np.abs(tangent)
-    tangent = np.divide(tangent, norm, out=np.zeros_like(tangent), where=norm > 0)
+    tangent = unit(tangent, np.zeros_like(tangent))
     mean = relative**2 + steepness / 2
     return CornerSpacing(
         facing_values * factor,

@@ -251,13 +251,12 @@ class _Pieces:
             name: getattr(mesh, name)[self.triangle]
             for name in ("x", "y", "normal", "face", "triangle_vertex")
         }
-        family_z = None if mesh.family_z is None else mesh.family_z[self.triangle]
         part = replace(
             mesh,
             corner_normal=normalize(at_corners(mesh.corner_normal)),
             z=at_corners(mesh.z),
             harmonics=tuple((j, at_corners(values)) for j, values in mesh.harmonics),
-            family_z=family_z,
+            family_z=None if mesh.family_z is None else mesh.family_z[self.triangle],
             neighbor=self.neighbor,
             neighbor_edge=self.neighbor_edge,
             edge_transport=self.edge_transport,

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import RosyError
+from ..field.frames import transport
 from .column_table import ColumnTable
 from .directional_spacing import CornerSpacing
 from .point_grid import PointGrid
@@ -220,14 +221,10 @@ class StrokeSamples(ColumnTable):
         direction = mesh.directions_at(triangle, weights, member)
         position = mesh.points_at(triangle, weights)
         normal = mesh.limited_normals_at(triangle, weights)
-        world_direction = mesh.transport_to_normal(
-            triangle, mesh.to_world(triangle, direction), normal
-        )
-        world_member = world_direction
+        flat = mesh.normal[triangle]
+        world_member = world_direction = transport(mesh.to_world(triangle, direction), flat, normal)
         if direction is not member:
-            world_member = mesh.transport_to_normal(
-                triangle, mesh.to_world(triangle, member), normal
-            )
+            world_member = transport(mesh.to_world(triangle, member), flat, normal)
         return self.append(
             frame=np.stack([position, normal, world_direction, world_member], axis=1),
             spacing=self.spacing_at(particles),

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..field.frames import dot, normalize
+from ..field.frames import dot, normalize, transport
 from ..progress import progress, report
 from .point_grid import PointGrid
 from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
@@ -255,12 +255,12 @@ def _pairs_of_one_family(
     same_family &= dot(delta, normal_sum) ** 2 <= MAX_SLOPE**2 * dot(delta, delta) * dot(
         normal_sum, normal_sum
     )
-    member_a = mesh.transport_to_normal(refined.triangle[point], refined.member[point], normal_a)
-    member_b = mesh.transport_to_normal(refined.triangle[other], refined.member[other], normal_b)
+    members = refined.member[point], refined.member[other]
+    member_a = transport(members[0], mesh.normal[refined.triangle[point]], normal_a)
+    member_b = transport(members[1], mesh.normal[refined.triangle[other]], normal_b)
     # At sharp bends, the result depends on how directions are compared. Accept a match by transport
     # or by projection along the mean normal.
     mean_normal = normalize(normal_sum)
-    members = refined.member[point], refined.member[other]
     projected = [
         normalize(member - dot(member, mean_normal)[:, None] * mean_normal) for member in members
     ]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..field.frames import dot
 from .point_grid import PointGrid
 from .surface_particles import SurfaceParticles, trace_geodesics
 from .tangent_mesh import TangentMesh
@@ -80,7 +79,7 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     particles = SurfaceParticles(triangle, weights, 1j * ray, np.ones(len(ray)))
     arrived, _, walked = trace_geodesics(mesh, particles, ray, distance)
     radial = mesh.points_at(arrived.triangle, arrived.weights) - mesh.points_at(triangle, weights)
-    tangential = 1j * dot(radial, mesh.x[arrived.triangle]) - dot(radial, mesh.y[arrived.triangle])
+    tangential = 1j * mesh.to_frame(arrived.triangle, radial)
     tangential /= np.maximum(np.abs(tangential), 1e-300)
     arrived.member = mesh.members_at(arrived.triangle, arrived.weights, tangential)
     deviation = np.angle(arrived.member * tangential.conj())

@@ -44,7 +44,7 @@ class Strokes:
     face : (n,) int32 ndarray
         Face of the segment that ends at each point; for a first point, of the segment after it.
     triangle : (n,) int32 ndarray
-        Triangle of the surface in which the same segment lies; -1 if there is none.
+        Triangle of the surface in which the same segment lies.
     weights : (n, 3) float64 ndarray
         Barycentric coordinates in this triangle; NaN at points that were added later.
     normal : (n, 3) float64 ndarray

@@ -736,9 +736,9 @@ def test_outlines_of_simple_shapes():
     assert len(lines) == 1 and lines.closed[0] and lines.names[lines.family[0]] == "silhouettes"
     assert np.abs(lines.points[:, 1]).max() < 0.01
     assert np.isclose(lines.length[0], 2 * np.pi, rtol=0.01)
-    box = outline(MeshInstance(sharp_cube(), IDENTITY))
+    box = outline(MeshInstance(sharp_cube(), IDENTITY), camera)
     assert np.isclose(box.length.sum(), 12) and set(box.family.tolist()) == {1}
-    edge = outline(MeshInstance(plane(), IDENTITY))
+    edge = outline(MeshInstance(plane(), IDENTITY), camera)
     assert np.isclose(edge.length.sum(), 8) and set(edge.family.tolist()) == {2}
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..field.frames import dot, normalize
 from ..progress import progress, report
-from .directional_spacing import CornerSpacing
+from .spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh

@@ -106,32 +106,17 @@ class GrowingStrokes(ColumnTable):
         Whether the ends have stopped growing.
     """
 
-    alive: np.ndarray
-    spacing: np.ndarray
-    parent_side: np.ndarray
-    active_children: np.ndarray
-    seed_sample: np.ndarray
-    tip_count: np.ndarray
-    min_arc: np.ndarray
-    max_arc: np.ndarray
-    end_sample: np.ndarray
-    end_yielded: np.ndarray
-    end_done: np.ndarray
-
-    def __init__(self) -> None:
-        super().__init__(
-            alive=((), bool),
-            spacing=((), float),
-            parent_side=((), np.int64),
-            active_children=((2,), np.int32),
-            seed_sample=((), np.int32),
-            tip_count=((), np.int32),
-            min_arc=((), float),
-            max_arc=((), float),
-            end_sample=((2,), np.int32),
-            end_yielded=((2,), bool),
-            end_done=((2,), bool),
-        )
+    alive = np.empty(0, bool)
+    spacing = np.empty(0)
+    parent_side = np.empty(0, np.int64)
+    active_children = np.empty((0, 2), np.int32)
+    seed_sample = np.empty(0, np.int32)
+    tip_count = np.empty(0, np.int32)
+    min_arc = np.empty(0)
+    max_arc = np.empty(0)
+    end_sample = np.empty((0, 2), np.int32)
+    end_yielded = np.empty((0, 2), bool)
+    end_done = np.empty((0, 2), bool)
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
         """Add n strokes with two tips each, and return their numbers."""

@@ -21,22 +21,22 @@ from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads
 from .attachment import SurfacePoints, surface_points
 from .crossings import with_crossing_gaps
-from .directional_spacing import CornerSpacing, spacing_in_picture
 from .families import label_families
 from .head_on_ends import head_on_ends
-from .mesh_in_view import mesh_in_view, whole_mesh
+from .mesh_in_view import mesh_in_view, seen_triangles, triangles_near, whole_mesh
 from .outline import OUTLINE_KINDS, outline
 from .outline_visibility import clip_outline
 from .overshoot import extend_free_ends, mark_free_boundary_ends
-from .seen_triangles import seen_triangles, triangles_near
 from .smoothing import smooth
 from .spacing import (
     MAX_SPACING_RATIO,
+    CornerSpacing,
     LightSource,
     fan_vertices,
     lit_tone,
     spacing_by_curvature,
     spacing_by_tone,
+    spacing_in_picture,
     values_at_points,
     weight_by_tone,
     with_vertices_of_fans,

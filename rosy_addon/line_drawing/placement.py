@@ -21,13 +21,13 @@ import numpy as np
 
 from ..field.frames import dot
 from ..progress import report
-from .directional_spacing import CornerSpacing
 from .growing_strokes import NO_TIPS, GrowingStrokes, StrokeSegments, Tips
 from .lateral_neighbors import LateralNeighbors, find_lateral_neighbors
 from .path_samples import PathSamples, SampledPath
 from .samples import SAMPLE_STEP, StrokeSamples
 from .seeding import lateral_seeds, longest_open_runs
 from .separation_rules import SeparationRules
+from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
 

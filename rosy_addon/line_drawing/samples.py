@@ -15,8 +15,8 @@ import numpy as np
 from ..errors import RosyError
 from ..field.frames import transport
 from .column_table import ColumnTable
-from .directional_spacing import CornerSpacing
 from .point_grid import PointGrid
+from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh
 
@@ -96,34 +96,21 @@ class StrokeSamples(ColumnTable):
         Unit member and direction in the frame of the triangle.
     """
 
-    frame: np.ndarray
-    spacing: np.ndarray
-    stroke: np.ndarray
-    arc: np.ndarray
-    step: np.ndarray
-    alive: np.ndarray
-    covered: np.ndarray
-    side_neighbor: np.ndarray
-    triangle: np.ndarray
-    weights: np.ndarray
-    local_member: np.ndarray
-    local_direction: np.ndarray
+    frame = np.empty((0, 4, 3))
+    spacing = np.empty(0)
+    stroke = np.empty(0, np.int32)
+    arc = np.empty(0)
+    step = np.empty(0, np.int32)
+    alive = np.empty(0, bool)
+    covered = np.empty((0, 2), bool)
+    side_neighbor = np.empty((0, 2), np.int32)
+    triangle = np.empty(0, np.int32)
+    weights = np.empty((0, 3))
+    local_member = np.empty(0, complex)
+    local_direction = np.empty(0, complex)
 
     def __init__(self, mesh: TangentMesh, spacing: CornerSpacing) -> None:
-        super().__init__(
-            frame=((4, 3), float),
-            spacing=((), float),
-            stroke=((), np.int32),
-            arc=((), float),
-            step=((), np.int32),
-            alive=((), bool),
-            covered=((2,), bool),
-            side_neighbor=((2,), np.int32),
-            triangle=((), np.int32),
-            weights=((3,), float),
-            local_member=((), complex),
-            local_direction=((), complex),
-        )
+        super().__init__()
         self.mesh, self.required_spacing = mesh, spacing
         mean_spacing = np.einsum("tk->t", spacing.values) / 3
         self.expected_count = (

@@ -9,13 +9,17 @@ import numpy as np
 from ..errors import RosyError
 from ..progress import progress, report
 from .closed_strokes import close_loops
-from .directional_spacing import CornerSpacing
 from .growing_strokes import StrokeSegments
 from .placement import StreamlinePlacer
-from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds
+from .seeding import (
+    candidate_seeds,
+    seeds_around_singularities,
+    thinned_seeds,
+    uncovered_seeds,
+)
 from .separation import enforce_separation
 from .separation_rules import SeparationRules
-from .singularity_seeds import seeds_around_singularities
+from .spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh
@@ -169,19 +173,17 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
 def collect(placer: StreamlinePlacer) -> Strokes:
     """Return the strokes of a placer. They are all in one family; see `label_families`."""
     label = "collecting strokes"
+    report(0.0, label)
     samples = placer.samples
-    columns = []
-    for column in zip(*placer.segments, strict=True):
-        report(0.05 * len(columns), label)
-        columns.append(np.concatenate(column))
-    segments = StrokeSegments(*columns)
+    segments = StrokeSegments(
+        *(np.concatenate(column) for column in zip(*placer.segments, strict=True))
+    )
     placer.segments.clear()
-    del columns
     keep = np.flatnonzero(placer.strokes.alive[segments.stroke])
     stroke, sign, triangle, begin_weights, weights, direction = (
         column[keep] for column in segments
     )
-    report(0.4, label)
+    report(0.5, label)
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.
     backward = np.flatnonzero(sign < 0)

@@ -9,12 +9,12 @@ from harness.stroke_tracing import visible_strokes
 from shapes import icosphere, plane, torus
 
 from rosy_addon.field.generate import generate
-from rosy_addon.line_drawing.pipeline import draw_instances
-from rosy_addon.line_drawing.seen_triangles import (
+from rosy_addon.line_drawing.mesh_in_view import (
     HIDDEN_MARGIN,
     seen_triangles,
     triangles_near,
 )
+from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.visibility import (

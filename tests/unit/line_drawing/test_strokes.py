@@ -26,16 +26,16 @@ from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
-from rosy_addon.line_drawing.directional_spacing import spacing_in_picture
 from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.head_on_ends import head_on_ends
 from rosy_addon.line_drawing.outline import outline
+from rosy_addon.line_drawing.seeding import singularities
 from rosy_addon.line_drawing.separation import enforce_separation
-from rosy_addon.line_drawing.singularity_seeds import singularities
 from rosy_addon.line_drawing.spacing import (
     headlight_tone,
     spacing_by_curvature,
     spacing_by_tone,
+    spacing_in_picture,
     values_at_points,
     weight_by_tone,
 )

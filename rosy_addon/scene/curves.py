@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..color import from_hex, to_linear
-from ..line_drawing.pipeline import StrokeGeometry
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from .compat import has_nodes_by_default
 from .surface_strokes import attribute_values
 

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 
 from ..color import from_hex, to_linear
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
-from ..line_drawing.pipeline import StrokeGeometry
 from .compat import has_grease_pencil_drawings
 from .curves import RegisterDatablock
 

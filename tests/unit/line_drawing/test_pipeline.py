@@ -15,12 +15,9 @@ from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
-from rosy_addon.line_drawing.pipeline import (
-    draw_instances,
-    offset_toward_camera,
-    simplify_strokes,
-    stroke_geometry,
-)
+from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.polyline_files import simplify_strokes
 from rosy_addon.line_drawing.spacing import lit_tone
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen

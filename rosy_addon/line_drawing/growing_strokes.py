@@ -7,7 +7,6 @@ numbered 2 * stroke + side, where side is 0 for left and 1 for right.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -52,29 +51,6 @@ class Tips(SurfaceParticles):
 
 #: No tips.
 NO_TIPS = Tips.at(SurfaceParticles.empty(), np.empty(0), np.empty(0))
-
-
-class StrokeSegments(NamedTuple):
-    """m segments of growing strokes, each in one triangle, in the order in which they were traced.
-
-    Attributes
-    ----------
-    stroke : (m,) int32 ndarray
-    sign : (m,) int8 ndarray
-        1 for segments of the forward half of a stroke, -1 for the backward half.
-    triangle : (m,) int32 ndarray
-    begin_weights, end_weights : (m, 3) float64 ndarray
-        Barycentric coordinates of the ends, in the order of tracing.
-    direction : (m,) complex128 ndarray
-        Unit direction of tracing in the frame of the triangle.
-    """
-
-    stroke: np.ndarray
-    sign: np.ndarray
-    triangle: np.ndarray
-    begin_weights: np.ndarray
-    end_weights: np.ndarray
-    direction: np.ndarray
 
 
 class GrowingStrokes(ColumnTable):

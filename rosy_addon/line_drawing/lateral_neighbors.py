@@ -5,6 +5,7 @@ Only samples of the same family are compared. Distances are measured on the surf
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,7 +13,6 @@ import numpy as np
 
 from ..field.frames import dot
 from .samples import SAMPLE_STEP, SEARCH_RADIUS, CoveringPairs, StrokeSamples
-from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 
 #: Largest gap for which a side counts as covered, in spacings.
 MAX_COVERED_GAP = 1.5
@@ -23,8 +23,39 @@ LATERAL_WINDOW = 0.36
 #: Separation of strokes that meet head on, in spacings.
 HEAD_ON_DISTANCE = 0.35
 
+#: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
+MIN_SELF_ARC = 2.5
+
+#: Points are on different parts of a fold if the cosine between their normals is below the first
+#: value, or the slope between them relative to the mean normal (height over distance) is above the
+#: second.
+MIN_NORMAL_COSINE, MAX_SLOPE = 0.1, 0.6
+
 #: Pairs of samples that are compared at once. Surfaces that lie on each other have very many.
 PAIR_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class SeparationRules:
+    """Limits on the separation and the length of strokes, in spacings.
+
+    Attributes
+    ----------
+    min_separation : float
+        Strokes end before they come nearer than this to another stroke of their family.
+    max_gap : float
+        Strokes end where a gap beside them is wider than this but too narrow for another stroke
+        (see `MAX_COVERED_GAP`).
+    min_length : float
+        Shorter strokes are removed.
+    max_length : float
+        Strokes end when they are longer than this.
+    """
+
+    min_separation: float = 0.75
+    max_gap: float = 1.24
+    min_length: float = 1.5
+    max_length: float = np.inf
 
 
 class LateralNeighbors(NamedTuple):

@@ -104,14 +104,12 @@ def outline(instance: MeshInstance, camera: Camera) -> Strokes:
     )
     angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
     salience = _pixel_salience(creases, angle, camera)
-    families = [_chains(silhouettes), _chains(creases, salience, MIN_CREASE_PX)]
+    families = [
+        _strokes(silhouettes, 0, surface),
+        _strokes(creases, 1, surface, salience),
+    ]
     report(0.9, label)
-    families.append(_chains(_edge_segments(corners, borders)))
-    return _to_strokes(families, surface)
-
-
-#: A polyline: (p, 3) points and normals, (p,) triangles, and whether the last point is the first.
-_Chain = tuple[np.ndarray, np.ndarray, np.ndarray, bool]
+    return Strokes.join([*families, _strokes(_edge_segments(corners, borders), 2, surface)])
 
 
 def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
@@ -213,33 +211,43 @@ def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np
 # --- strokes -----------------------------------------------------------------------------------------
 
 
-def _chains(
-    segments: Segments, salience: np.ndarray | None = None, min_salience: float = 0.0
-) -> list[_Chain]:
-    """Return the polylines that segments form, without those with a small sum of (k,) saliences."""
+def _strokes(
+    segments: Segments, family: int, surface: Surface, salience: np.ndarray | None = None
+) -> Strokes:
+    """Return the polylines that segments form, as strokes of a family.
+
+    With (k,) saliences, polylines with a sum of less than `MIN_CREASE_PX` are left out.
+    """
     keys = _point_keys(segments.ends)
-    salience = np.zeros(len(keys)) if salience is None else salience
     # Where a silhouette passes through a vertex, it has segments without a length in some triangles.
     has_length = keys[:, 0] != keys[:, 1]
     segments = Segments(*(column[has_length] for column in segments))
-    salience = salience[has_length]
-    return [
-        _polyline(segments, chain, closed)
-        for chain, closed in _chain_segments(keys[has_length], segments.ends)
-        if salience[chain[::2] >> 1].sum() >= min_salience
-    ]
-
-
-def _polyline(segments: Segments, chain: np.ndarray, closed: bool) -> _Chain:
-    """Return a chain of `_chain_segments` as a polyline."""
-    # Each end of a segment, but the second of two that meet.
-    point = np.append(chain[::2], chain[-1])
-    segment = np.append(chain[:1] >> 1, chain[::2] >> 1)
-    return (
-        segments.ends.reshape(-1, 3)[point],
-        segments.normals.reshape(-1, 3)[point],
-        segments.triangle[segment],
-        closed,
+    chains = _chain_segments(keys[has_length], segments.ends)
+    if salience is not None:
+        salience = salience[has_length]
+        chains = [
+            (chain, closed)
+            for chain, closed in chains
+            if salience[chain[::2] >> 1].sum() >= MIN_CREASE_PX
+        ]
+    # Each end of a segment, but the second of two that meet; and the segment that ends there.
+    none = np.empty(0, dtype=np.int64)
+    point = np.concatenate([none, *(np.append(chain[::2], chain[-1]) for chain, _ in chains)])
+    segment = np.concatenate([none, *(np.append(chain[0], chain[::2]) for chain, _ in chains)]) >> 1
+    triangle = segments.triangle[segment]
+    return Strokes(
+        points=segments.ends.reshape(-1, 3)[point],
+        start=np.cumsum([0, *(len(chain) // 2 + 1 for chain, _ in chains)]),
+        family=np.full(len(chains), family, dtype=np.int32),
+        names=OUTLINE_KINDS,
+        face=surface.triangle_face[triangle],
+        triangle=triangle.astype(np.int32),
+        weights=np.full((len(point), 3), np.nan),
+        normal=segments.normals.reshape(-1, 3)[point],
+        member=np.zeros((len(point), 3)),
+        spacing=np.zeros(len(point)),
+        width=np.ones(len(point)),
+        closed=np.array([closed for _, closed in chains], dtype=bool),
     )
 
 
@@ -308,32 +316,3 @@ def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarra
         a, b = junction[row[pair]], junction[column[pair]]
         if turn[row[pair], column[pair]] < MAX_JUNCTION_TURN and mate[a] < 0 and mate[b] < 0:
             mate[a], mate[b] = b, a
-
-
-def _to_strokes(families: list[list[_Chain]], surface: Surface) -> Strokes:
-    """Return polylines as strokes, one list for each family."""
-    chains = [chain for family in families for chain in family]
-    family_index = np.repeat(np.arange(len(families)), [len(family) for family in families])
-    counts = [len(points) for points, _, _, _ in chains]
-    start = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-    columns = [np.concatenate(column) for column in list(zip(*chains, strict=True))[:3]] or [
-        np.empty((0, 3)),
-        np.empty((0, 3)),
-        np.empty(0, dtype=np.int64),
-    ]
-    points, normal, triangle = columns
-    total = len(points)
-    return Strokes(
-        points=points,
-        start=start,
-        family=family_index.astype(np.int32),
-        names=OUTLINE_KINDS,
-        face=surface.triangle_face[triangle],
-        triangle=triangle.astype(np.int32),
-        weights=np.full((total, 3), np.nan),
-        normal=normal,
-        member=np.zeros((total, 3)),
-        spacing=np.zeros(total),
-        width=np.ones(total),
-        closed=np.array([closed for _, _, _, closed in chains], dtype=bool),
-    )

@@ -17,16 +17,18 @@ if their members match there. Their members elsewhere do not matter.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..progress import report
-from .growing_strokes import NO_TIPS, GrowingStrokes, StrokeSegments, Tips
-from .lateral_neighbors import LateralNeighbors, find_lateral_neighbors
+from .growing_strokes import NO_TIPS, GrowingStrokes, Tips
+from .lateral_neighbors import LateralNeighbors, SeparationRules, find_lateral_neighbors
 from .path_samples import PathSamples, SampledPath
 from .samples import SAMPLE_STEP, StrokeSamples
 from .seeding import lateral_seeds, longest_open_runs
-from .separation_rules import SeparationRules
 from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
@@ -71,8 +73,10 @@ class StreamlinePlacer:
     strokes : GrowingStrokes
     tips : Tips
         The growing ends.
-    segments : list of StrokeSegments
-        The segments of all strokes, one entry for each step.
+    segments : list of tuple of ndarray
+        The segments of all strokes in the order in which they were traced, m for each step: (m,) strokes,
+        (m,) signs of their halves, and `triangle`, `begin_weights`, `end_weights` and `direction` as in
+        `TracedPath`.
 
     Raises
     ------
@@ -89,7 +93,7 @@ class StreamlinePlacer:
         self.samples = StrokeSamples(mesh, spacing)
         self.strokes = GrowingStrokes()
         self.tips = NO_TIPS
-        self.segments: list[StrokeSegments] = []
+        self.segments: list[tuple[np.ndarray, ...]] = []
 
     # --- growing ----------------------------------------------------------------------------------
 
@@ -120,17 +124,9 @@ class StreamlinePlacer:
         moved = np.flatnonzero(last >= 0)
         walked = np.zeros(tip_count)
         walked[moved] = traced.arc[last[moved]]
-        walked_path = path.cut(walked)
-        self.segments.append(
-            StrokeSegments(
-                tips.stroke[walked_path.particle],
-                tips.sign[walked_path.particle].astype(np.int8),
-                walked_path.triangle,
-                walked_path.begin_weights,
-                walked_path.end_weights,
-                walked_path.direction,
-            )
-        )
+        particle, *segments, _, _ = path.cut(walked)
+        sign = tips.sign[particle].astype(np.int8)
+        self.segments.append((tips.stroke[particle], sign, *segments))
         tips.particles.assign(moved, traced.position.take(last[moved]))
         tips.arc += tips.sign * walked
         tips.step_scale[rejected] /= 2
@@ -205,20 +201,13 @@ class StreamlinePlacer:
         strokes = self.strokes
         finished = strokes.finish_ends(tips.stroke, tips.end)
         min_length = self.rules.min_length * strokes.spacing[finished]
-        self._drop_strokes(finished[strokes.length(finished) < min_length])
-
-    def _drop_strokes(self, dropped: np.ndarray) -> None:
-        """Remove strokes.
-
-        The sides that they covered stay covered until `rescan`. Otherwise the same strokes would be
-        seeded again.
-        """
-        if not len(dropped):
-            return
-        self.strokes.alive[dropped] = False
-        self.samples.remove_strokes(
-            self.strokes.alive, first=int(self.strokes.seed_sample[dropped].min())
-        )
+        dropped = finished[strokes.length(finished) < min_length]
+        if len(dropped):
+            # The sides that they covered stay covered until `rescan`. Otherwise the same strokes would
+            # be seeded again.
+            strokes.alive[dropped] = False
+            first = int(strokes.seed_sample[dropped].min())
+            self.samples.remove_strokes(strokes.alive, first)
 
     def resume_yielded(self, rules: SeparationRules) -> None:
         """Change the rules, and let strokes that have yielded grow again."""
@@ -241,18 +230,16 @@ class StreamlinePlacer:
         self.rules = rules
         samples = self.samples
         sample = samples.reset_coverage()
-        for start in range(0, len(sample), RESCAN_BATCH_SIZE):
+        for batch in row_blocks(len(sample), RESCAN_BATCH_SIZE):
             report(samples.coverage, "looking for gaps")
-            batch = sample[start : start + RESCAN_BATCH_SIZE]
-            samples.mark_covered(find_lateral_neighbors(samples, batch, 0.0, np.inf).covering)
+            neighbors = find_lateral_neighbors(samples, sample[batch], 0.0, np.inf)
+            samples.mark_covered(neighbors.covering)
         samples.add_open_sides(sample)
 
     # --- seeds ------------------------------------------------------------------------------------
 
-    def add_seeds(
-        self, particles: SurfaceParticles, parent_side: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Start strokes at the seeds that are far enough from other strokes.
+    def add_seeds(self, particles: SurfaceParticles, parent_side: np.ndarray | None = None) -> int:
+        """Start strokes at the seeds that are far enough from other strokes, and return how many.
 
         Parameters
         ----------
@@ -261,15 +248,8 @@ class StreamlinePlacer:
         parent_side : (n,) ndarray of int, optional
             The side of a stroke that a seed is beside: 2 * stroke, plus 1 for the right side; -1 if
             there is none.
-
-        Returns
-        -------
-        (n,) bool ndarray
-            Which seeds were accepted.
         """
         count = len(particles)
-        if not count:
-            return np.zeros(0, dtype=bool)
         parent_side = np.full(count, -1) if parent_side is None else parent_side
         samples, strokes = self.samples, self.strokes
         stroke = strokes.add(parent_side, samples.spacing_at(particles))
@@ -280,12 +260,11 @@ class StreamlinePlacer:
         strokes.alive[stroke] = is_accepted
         accepted = np.flatnonzero(is_accepted)
         strokes.add_active_children(parent_side[accepted], 1)
+        particles, zeros = particles.take(accepted), np.zeros(len(accepted))
         for sign in (1.0, -1.0):
-            tip_particles = particles.take(accepted)
-            tip_particles.sign = np.full(len(accepted), sign)
-            new_tips = Tips.at(tip_particles, stroke[accepted], np.zeros(len(accepted)))
-            self.tips = self.tips.join(new_tips)
-        return is_accepted
+            half = replace(particles, sign=zeros + sign)
+            self.tips = self.tips.join(Tips.at(half, stroke[accepted], zeros))
+        return len(accepted)
 
     def seed_neighbors(self) -> int:
         """Start strokes beside existing ones, and return how many.
@@ -311,5 +290,4 @@ class StreamlinePlacer:
         samples.close_sides(nearby, nearby_side)
         particles, has_room = lateral_seeds(samples, sample, side)
         parent_side = 2 * samples.stroke[sample].astype(np.int64) + side
-        accepted = self.add_seeds(particles.take(np.flatnonzero(has_room)), parent_side[has_room])
-        return int(accepted.sum())
+        return self.add_seeds(particles.take(np.flatnonzero(has_room)), parent_side[has_room])

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..progress import report
 from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
@@ -184,9 +185,8 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
 def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceParticles:
     """Return the seeds that are not near a stroke of their family."""
     is_uncovered = np.zeros(len(seeds), dtype=bool)
-    for start in range(0, len(seeds), SEED_BATCH_SIZE):
+    for batch in row_blocks(len(seeds), SEED_BATCH_SIZE):
         report(samples.coverage, "looking for gaps")
-        batch = np.arange(start, min(start + SEED_BATCH_SIZE, len(seeds)))
         with samples.probes(seeds.take(batch)) as probes:
             neighbors = find_lateral_neighbors(samples, probes, MAX_COVERED_GAP, np.inf)
         is_uncovered[batch] = ~neighbors.rejected

@@ -17,10 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize, transport
 from ..progress import progress, report
+from .lateral_neighbors import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .point_grid import PointGrid
-from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh
 
@@ -110,9 +111,8 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
     surface_turn = np.empty(len(strokes.points))
     suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
-    for start in range(0, len(suspect), BLOCK_POINTS):
-        report(start / len(suspect), "separating strokes")
-        block = slice(start, start + BLOCK_POINTS)
+    for block in row_blocks(len(suspect), BLOCK_POINTS):
+        report(block.start / max(len(suspect), 1), "separating strokes")
         surface_turn[block] = _surface_turn_per_spacing(mesh, strokes, block)
         suspect[block] |= _field_turn_per_spacing(mesh, strokes, block) > MAX_TURN
     suspect |= surface_turn > FOLD_ANGLE
@@ -225,9 +225,9 @@ def _too_close(
     end_distance = np.minimum(arc, length[stroke] - arc)
     queries = np.flatnonzero(suspect)
     rejected = np.zeros(len(stroke), dtype=bool)
-    for start in range(0, len(queries), BLOCK_POINTS):
-        report(start / len(queries), "separating strokes")
-        query = queries[start : start + BLOCK_POINTS]
+    for block in row_blocks(len(queries), BLOCK_POINTS):
+        report(block.start / max(len(queries), 1), "separating strokes")
+        query = queries[block]
         point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
         point = query[point]
         arc_gap = np.abs(arc[point] - arc[other])

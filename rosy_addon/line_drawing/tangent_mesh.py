@@ -288,9 +288,7 @@ def build_tangent_mesh(
         corner_field = cached_corner_field(surface, instance.matrix, field, display, cache)
     label = "preparing the surface"
     report(0.3, label)
-    matrix = np.asarray(instance.matrix, dtype=np.float64)
-    vertices = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    points = vertices[surface.triangle_vertex]
+    points = instance.world_points()[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
     report(0.4, label)
     corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
@@ -391,13 +389,8 @@ def _barycentric_gradients(
     points: np.ndarray, x: np.ndarray, y: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
     """Return the (T, 3) complex gradients of barycentric coordinates; 0 if there is no area."""
-    planar = np.stack(
-        [
-            dot(points[:, k] - points[:, 0], x) + 1j * dot(points[:, k] - points[:, 0], y)
-            for k in range(3)
-        ],
-        axis=1,
-    )
+    delta = points - points[:, :1]
+    planar = dot(delta, x[:, None]) + 1j * dot(delta, y[:, None])
     # The edge opposite to corner k, rotated inward by 90 degrees, over twice the area.
     edge = planar[:, [2, 0, 1]] - planar[:, [1, 2, 0]]
     double_area = 2 * area[:, None]

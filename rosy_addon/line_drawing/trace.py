@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import RosyError
 from ..progress import progress, report
 from .closed_strokes import close_loops
-from .growing_strokes import StrokeSegments
+from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
 from .seeding import (
     candidate_seeds,
@@ -18,7 +18,6 @@ from .seeding import (
     uncovered_seeds,
 )
 from .separation import enforce_separation
-from .separation_rules import SeparationRules
 from .spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles
@@ -175,14 +174,11 @@ def collect(placer: StreamlinePlacer) -> Strokes:
     label = "collecting strokes"
     report(0.0, label)
     samples = placer.samples
-    segments = StrokeSegments(
-        *(np.concatenate(column) for column in zip(*placer.segments, strict=True))
-    )
+    columns = [np.concatenate(column) for column in zip(*placer.segments, strict=True)]
     placer.segments.clear()
-    keep = np.flatnonzero(placer.strokes.alive[segments.stroke])
-    stroke, sign, triangle, begin_weights, weights, direction = (
-        column[keep] for column in segments
-    )
+    keep = np.flatnonzero(placer.strokes.alive[columns[0]])
+    stroke, sign, triangle, begin_weights, weights, direction = (column[keep] for column in columns)
+    del columns
     report(0.5, label)
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.

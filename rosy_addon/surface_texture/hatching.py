@@ -249,10 +249,8 @@ def _even_lines(
             cache,
             max_triangles,
         )
-    sides = on.mesh.points[:, 1:] - on.mesh.points[:, :1]
-    sides = np.einsum("tkj,tj->kt", sides, on.mesh.x) + 1j * np.einsum(
-        "tkj,tj->kt", sides, on.mesh.y
-    )
+    triangles, corners = np.arange(len(on.mesh.points)), on.mesh.points
+    sides = [on.mesh.to_frame(triangles, corners[:, k] - corners[:, 0]) for k in (1, 2)]
     members = all_members(field, look.guiding_angle)
     streaks, period = np.empty((2, field.line_count, len(texels)), dtype=np.float32)
     jacobian = field.screen_jacobian

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rosy_addon.line_drawing.families import label_families
-from rosy_addon.line_drawing.separation_rules import SeparationRules
+from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.spacing import CornerSpacing
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.svg import svg_text

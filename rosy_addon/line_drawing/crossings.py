@@ -11,7 +11,7 @@ import numpy as np
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..field.frames import normalize
 from ..progress import progress, report
-from .stroke_set import POINT_COLUMNS, Strokes
+from .stroke_set import Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.
 PAIR_BATCH_SIZE = 1 << 20
@@ -233,10 +233,8 @@ def _alternating_under(crossings: Crossings) -> np.ndarray:
     """
     order = np.lexsort((crossings.arc[:, 0], crossings.stroke[:, 0]))
     stroke = crossings.stroke[order, 0]
-    group_start = np.flatnonzero(np.diff(stroke, prepend=-1))
-    rank = np.arange(len(order)) - np.repeat(
-        group_start, np.diff(np.append(group_start, len(order)))
-    )
+    count = np.unique(stroke, return_counts=True)[1]
+    rank = concatenated_ranges(np.zeros_like(count), count)
     under = np.empty(len(order), dtype=np.int64)
     under[order] = (rank + stroke) % 2
     return under
@@ -295,26 +293,17 @@ def cut_intervals(
         order
     ]
 
-    def interpolate(values: np.ndarray) -> np.ndarray:
-        weight = fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-        result = values[after - 1] + weight * (values[after] - values[after - 1])
-        result[is_original] = values[source[is_original]]
-        return result
-
-    columns = {}
-    for name in POINT_COLUMNS:
+    cut = strokes.take_points(np.where(is_original, source, after))
+    new = np.flatnonzero(~is_original)
+    before, after = after[new] - 1, after[new]
+    for name in ("points", "normal", "spacing", "width"):
         values = getattr(strokes, name)
-        if name in ("points", "normal", "spacing", "width"):
-            columns[name] = interpolate(values)
-        else:
-            columns[name] = values[np.where(is_original, source, after)]
-    columns["normal"] = normalize(columns["normal"])
-    columns["weights"] = np.where(is_original[:, None], columns["weights"], np.nan)
+        weight = fraction[new].reshape((-1,) + (1,) * (values.ndim - 1))
+        getattr(cut, name)[new] = values[before] + weight * (values[after] - values[before])
+    cut.weights[new] = np.nan
     counts = np.bincount(owner, minlength=len(strokes))
     with_cuts = replace(
-        strokes,
-        **columns,
-        start=np.concatenate([[0], np.cumsum(counts)]),
+        cut, normal=normalize(cut.normal), start=np.concatenate([[0], np.cumsum(counts)])
     )
     # Split at each interval, also where no point lies inside it.
     return with_cuts.runs_where(kept, split_labels=np.cumsum(event == -1), free_at_removed=False)

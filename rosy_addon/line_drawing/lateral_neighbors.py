@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 from .samples import SAMPLE_STEP, SEARCH_RADIUS, CoveringPairs, StrokeSamples
 
@@ -176,7 +177,7 @@ def _judge(
     Parameters
     ----------
     step, previous : (n,) ndarray of int
-        Ascending, and as for `find_lateral_neighbors`.
+        The steps, which ascend, and the samples before; see `find_lateral_neighbors`.
     near : tuple of (k,) ndarray
         Samples and their older neighbors that are too near; -1 for a neighbor that is not among the
         samples.
@@ -224,9 +225,10 @@ def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
         SEARCH_RADIUS * samples.spacing[sample],
         samples.direction[sample],
     )
-    starts = range(0, max(len(query), 1), PAIR_BLOCK)
-    parts = [slice(start, start + PAIR_BLOCK) for start in starts]
-    blocks = [_comparable_block(samples, sample, query[part], neighbor[part]) for part in parts]
+    blocks = [
+        _comparable_block(samples, sample, query[part], neighbor[part])
+        for part in row_blocks(len(query), PAIR_BLOCK)
+    ]
     if len(blocks) == 1:
         return blocks[0]
     return _Pairs(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))

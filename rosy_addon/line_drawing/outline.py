@@ -46,11 +46,6 @@ class Segments(NamedTuple):
     normals: np.ndarray
     triangle: np.ndarray
 
-    @staticmethod
-    def concatenate(first: Segments, second: Segments) -> Segments:
-        """Return both sets, one after the other."""
-        return Segments(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
-
 
 class _Corners(NamedTuple):
     """The (T, 3, 3) corners of triangles, the shading normals there and the normals of triangles."""
@@ -98,10 +93,9 @@ def outline(instance: MeshInstance, camera: Camera) -> Strokes:
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
     is_blunt = is_sharp_edge(surface, a, b) & ~is_crease
-    silhouettes = Segments.concatenate(
-        _smooth_silhouettes(corners, camera),
-        _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera),
-    )
+    smooth = _smooth_silhouettes(corners, camera)
+    sharp = _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera)
+    silhouettes = Segments(*(np.concatenate(pair) for pair in zip(smooth, sharp, strict=True)))
     angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
     salience = _pixel_salience(creases, angle, camera)
     families = [

@@ -219,31 +219,22 @@ class Strokes:
         point = row + start[0]
         before = np.maximum(point - 1, 0)
 
-        def interpolate(values: np.ndarray) -> np.ndarray:
-            previous, result = values[before], values[point]
-            result -= previous
-            result *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-            result += previous
-            return result
-
+        divided = self.take_points(point)
+        for name in ("points", "normal", "spacing", "width"):
+            values, previous = getattr(divided, name), getattr(self, name)[before]
+            values -= previous
+            values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
+            values += previous
         # The weights of the previous point may be in another triangle, so they are not
         # interpolated.
-        weights = self.weights[point]
-        weights[fraction < 1] = np.nan
-        interpolated = {
-            name: interpolate(getattr(self, name)) for name in ("points", "spacing", "width")
-        }
-        repeated = {name: getattr(self, name)[point] for name in ("face", "triangle", "member")}
+        divided.weights[fraction < 1] = np.nan
         return replace(
-            self,
-            **interpolated,
-            **repeated,
+            divided,
             start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),
             family=self.family[first:stop],
             closed=self.closed[first:stop],
             free_ends=self.free_end_mask[first:stop],
-            normal=normalize(interpolate(self.normal)),
-            weights=weights,
+            normal=normalize(divided.normal),
         )
 
     @staticmethod

@@ -23,6 +23,9 @@ from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh
 
+#: Label of the progress.
+TRACING = "tracing strokes"
+
 #: Samples by which tips grow between two attempts to seed beside strokes.
 SAMPLES_PER_SEEDING = 8
 
@@ -93,14 +96,13 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     4. Let strokes that yielded at wide gaps continue, with a smaller separation.
     5. Fill the remaining gaps, with the minimum length of the rules.
     """
-    label = "tracing strokes"
     rules = placer.rules
     placer.rules = replace(
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
     )
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
     for index, sample_count in enumerate(FIRST_WARMUP + SECOND_WARMUP):
-        report(0.0, label)
+        report(0.0, TRACING)
         if index == len(FIRST_WARMUP):
             placer.rules = replace(rules, max_gap=np.inf)
         if len(placer.tips):
@@ -110,20 +112,20 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     candidates = candidate_seeds(placer.mesh, placer.spacing.values)
     for seed_spacing in SEED_SPACINGS:
         _add_uncovered_seeds(placer, candidates, seed_spacing)
-        _grow_until(placer, label, STRAGGLER_RATIO)
+        _grow_until(placer, STRAGGLER_RATIO)
     placer.rescan(replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
     _add_uncovered_seeds(placer, candidates, SEED_SPACINGS[-1])
-    _grow_until(placer, label, STRAGGLER_RATIO)
+    _grow_until(placer, STRAGGLER_RATIO)
     fill_rules = replace(
         rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
     )
     placer.resume_yielded(replace(fill_rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
-    _grow_until(placer, label, STRAGGLER_RATIO)
+    _grow_until(placer, STRAGGLER_RATIO)
     placer.rescan(fill_rules)
-    _grow_until(placer, label)
+    _grow_until(placer)
     # There may be gaps that are not beside a stroke, where all were too short for the phases before.
     _add_uncovered_seeds(placer, candidates)
-    _grow_until(placer, label)
+    _grow_until(placer)
 
 
 def _add_uncovered_seeds(
@@ -144,7 +146,7 @@ def _add_uncovered_seeds(
     placer.add_seeds(seeds)
 
 
-def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0.0) -> None:
+def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
     """Alternate between steps and seeding beside strokes.
 
     It ends when fewer tips are left than `straggler_ratio` times their largest number, or when
@@ -152,7 +154,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     """
     max_tips = 0
     while True:
-        report(placer.samples.coverage, label)
+        report(placer.samples.coverage, TRACING)
         seeded = placer.seed_neighbors()
         if not seeded and not len(placer.tips):
             if not placer.samples.has_open_sides:
@@ -160,7 +162,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
             # Each call closes the sides that it tried. Try others twice more.
             if not placer.seed_neighbors() and not placer.seed_neighbors():
                 return
-        report(placer.samples.coverage, label)
+        report(placer.samples.coverage, TRACING)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:

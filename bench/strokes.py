@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 from harness.stroke_spacing import lateral_gaps
+from harness.stroke_tracing import trace_strokes
 
 from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.pipeline import draw_instances
-from rosy_addon.line_drawing.separation_rules import SeparationRules
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 

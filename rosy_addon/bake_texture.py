@@ -19,8 +19,11 @@ from .scene.picture_state import bakes_light, read_texture_state
 from .scene.pictures import OutputSettings, check_targets, read_output_settings
 from .scene.read_view import scene_depsgraph
 from .scene.textures import Hatching, apply_texture, read_texture_input, uv_map_name
-from .surface_texture.draw import texture_colors_values
-from .surface_texture.texture_images import TextureSettings, draw_texture_images
+from .surface_texture.draw import (
+    TextureSettings,
+    draw_texture_images,
+    texture_colors_values,
+)
 from .worker.job import Call, Step, Steps, job
 
 

@@ -127,12 +127,14 @@ def draw_strokes(
         return StrokeResult(view.name, drawing, path=path, notes=scene_data.warnings)
     drawing, curves = yield Call(drawing_curves, (*inputs, followed), 0.0, 0.97)
     yield Step(0.97, "storing the strokes")
+    # The strokes move with the drawn object, if there is only one.
+    parent = scene_data.objects[0] if len(scene_data.objects) == 1 else None
     obj = store_strokes(
         scene,
         kind,
         curves,
         view.name,
-        _parent_object(scene_data),
+        parent,
         collection,
         0 if followed is None else len(followed.surface.vertices),
     )
@@ -172,11 +174,6 @@ def _followed_instance(scene_data: SceneData) -> MeshInstance:
             "strokes can follow the surface of one object only: select one, and switch on Selected Only"
         )
     return instances[0]
-
-
-def _parent_object(scene_data: SceneData) -> bpy.types.Object | None:
-    """Return the object that the strokes move with: the drawn one, if there is only one."""
-    return scene_data.objects[0] if len(scene_data.objects) == 1 else None
 
 
 def _notes(scene: bpy.types.Scene, obj: bpy.types.Object, style: StrokeStyle) -> list[str]:

@@ -65,7 +65,7 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
     side = np.sin(BARB_ANGLE) * barb * across
     point = np.repeat(after, 3)
     return replace(
-        strokes.reordered(point),
+        strokes.take_points(point),
         points=np.stack([back + side, tip, back - side], axis=1).reshape(-1, 3),
         start=np.arange(len(stroke) + 1) * 3,
         family=strokes.family[stroke],

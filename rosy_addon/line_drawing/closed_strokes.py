@@ -7,14 +7,13 @@ chosen such that the stroke arrives exactly at its first point.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..field.frames import dot, normalize
 from ..progress import progress, report
-from .directional_spacing import CornerSpacing
+from .spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
@@ -70,13 +69,13 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
+        Strokes before `label_families`: all are in one family.
     spacing : CornerSpacing
 
     Returns
     -------
     Strokes
-        The open strokes, then the loops. If there are loops, all families are 0: call this before
-        `label_families`.
+        The open strokes, then the loops.
     """
     candidates = _candidates(strokes)
     if not len(candidates):
@@ -118,8 +117,7 @@ def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> 
     is_open = np.ones(len(strokes), dtype=bool)
     is_open[candidates[closes]] = False
     loops = _loop_strokes(mesh, strokes.select(candidates), trace, closes, spacing)
-    result = Strokes.concatenate(strokes.select(is_open), loops)
-    return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
+    return Strokes.join([strokes.select(is_open), loops])
 
 
 def _left_offset(strokes: Strokes, first: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -200,11 +198,10 @@ def _trace_loops(
 
 def _particles_at_start(mesh: TangentMesh, strokes: Strokes, first: np.ndarray) -> SurfaceParticles:
     """Return particles at the first points of strokes that move along the strokes."""
-    triangle, world_member = strokes.triangle[first], strokes.member[first]
-    reference = dot(world_member, mesh.x[triangle]) + 1j * dot(world_member, mesh.y[triangle])
-    weights = strokes.weights[first].copy()
+    triangle, weights = strokes.triangle[first], strokes.weights[first]
+    reference = mesh.to_frame(triangle, strokes.member[first])
     member = mesh.members_at(triangle, weights, reference)
-    return SurfaceParticles(triangle.copy(), weights, member, np.ones(len(first)))
+    return SurfaceParticles(triangle, weights, member, np.ones(len(first)))
 
 
 def _loop_strokes(
@@ -225,18 +222,5 @@ def _loop_strokes(
     weights = np.concatenate([start.weights, trace.weights[keep]])[order]
     direction = np.concatenate([start.member, trace.direction[keep]])[order]
     count = np.bincount(particle, minlength=len(strokes))[loop_index]
-    return Strokes(
-        points=mesh.points_at(triangle, weights),
-        start=np.concatenate([[0], np.cumsum(count)]),
-        family=np.zeros(len(loop_index), dtype=np.int32),
-        names=strokes.names,
-        face=mesh.face[triangle],
-        triangle=triangle,
-        weights=weights,
-        normal=mesh.shading_normals_at(triangle, weights),
-        member=mesh.to_world(triangle, direction),
-        spacing=spacing.at(triangle, weights, direction),
-        width=np.ones(len(triangle)),
-        opacity=np.ones(len(triangle)),
-        closed=np.ones(len(loop_index), dtype=bool),
-    )
+    spacings = spacing.at(triangle, weights, direction)
+    return Strokes.on_mesh(mesh, count, triangle, weights, direction, spacings, closed=True)

@@ -11,13 +11,10 @@ INITIAL_CAPACITY = 1024
 class ColumnTable:
     """A table of growing columns with equal row counts; each column is an attribute.
 
+    A subclass declares each column as a class attribute: an array without rows, of its shape and dtype.
+
     Columns are longer than `count`; their remaining rows are reserve. When a column grows, it is
     replaced by a new array, so do not keep references to columns across `append`.
-
-    Parameters
-    ----------
-    **columns : (tuple of int, type)
-        Shape of a row and dtype of each column.
 
     Attributes
     ----------
@@ -25,11 +22,13 @@ class ColumnTable:
         Number of rows.
     """
 
-    def __init__(self, **columns: tuple[tuple[int, ...], type]) -> None:
+    def __init__(self) -> None:
         self.count = 0
-        self._column_names = tuple(columns)
-        for name, (shape, dtype) in columns.items():
-            setattr(self, name, np.zeros((INITIAL_CAPACITY, *shape), dtype=dtype))
+        columns = vars(type(self)).items()
+        self._column_names = [name for name, column in columns if isinstance(column, np.ndarray)]
+        for name in self._column_names:
+            column = getattr(self, name)
+            setattr(self, name, np.zeros((INITIAL_CAPACITY, *column.shape[1:]), column.dtype))
 
     def append(self, **values: np.ndarray) -> np.ndarray:
         """Append rows and return their numbers. Columns that are not given are 0 in new rows."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..field.frames import normalize
 from ..progress import progress, report
-from .stroke_set import POINT_COLUMNS, Strokes
+from .stroke_set import Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.
 PAIR_BATCH_SIZE = 1 << 20
@@ -202,8 +202,8 @@ def _intersect_segments(
     return first[crosses], second[crosses], t[crosses], u[crosses]
 
 
-def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Strokes:
-    """Cut a gap into one of the two strokes at each crossing.
+def with_crossing_gaps(strokes: Strokes, gap: float) -> Strokes:
+    """Cut a gap into one of the two strokes at each crossing: strokes pass over and under in turn.
 
     Parameters
     ----------
@@ -211,22 +211,13 @@ def with_crossing_gaps(strokes: Strokes, gap: float, weave: bool = False) -> Str
         As they were traced, before `clip_to_visible`.
     gap : float
         Length of the gap in spacings.
-    weave : bool
-        If true, strokes pass over and under in turn. Otherwise the stroke of the family with the
-        lower number passes over.
     """
     with progress(0.0, 0.6):
         crossings = find_crossings(strokes)
     report(0.6, "cutting gaps")
     if not len(crossings.stroke):
         return strokes
-    if weave:
-        under = _alternating_under(crossings)
-    else:
-        family = strokes.family[crossings.stroke]
-        under = np.where(family[:, 0] > family[:, 1], 0, 1)
-        same_family = family[:, 0] == family[:, 1]
-        under[same_family] = np.argmax(crossings.stroke[same_family], axis=1)
+    under = _alternating_under(crossings)
     row = np.arange(len(under))
     stroke, arc = crossings.stroke[row, under], crossings.arc[row, under]
     # The gaps of a stroke are measured in the spacing at its start.
@@ -242,10 +233,8 @@ def _alternating_under(crossings: Crossings) -> np.ndarray:
     """
     order = np.lexsort((crossings.arc[:, 0], crossings.stroke[:, 0]))
     stroke = crossings.stroke[order, 0]
-    group_start = np.flatnonzero(np.diff(stroke, prepend=-1))
-    rank = np.arange(len(order)) - np.repeat(
-        group_start, np.diff(np.append(group_start, len(order)))
-    )
+    count = np.unique(stroke, return_counts=True)[1]
+    rank = concatenated_ranges(np.zeros_like(count), count)
     under = np.empty(len(order), dtype=np.int64)
     under[order] = (rank + stroke) % 2
     return under
@@ -304,26 +293,17 @@ def cut_intervals(
         order
     ]
 
-    def interpolate(values: np.ndarray) -> np.ndarray:
-        weight = fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-        result = values[after - 1] + weight * (values[after] - values[after - 1])
-        result[is_original] = values[source[is_original]]
-        return result
-
-    columns = {}
-    for name in POINT_COLUMNS:
+    cut = strokes.take_points(np.where(is_original, source, after))
+    new = np.flatnonzero(~is_original)
+    before, after = after[new] - 1, after[new]
+    for name in ("points", "normal", "spacing", "width"):
         values = getattr(strokes, name)
-        if name in ("points", "normal", "spacing", "width", "opacity"):
-            columns[name] = interpolate(values)
-        else:
-            columns[name] = values[np.where(is_original, source, after)]
-    columns["normal"] = normalize(columns["normal"])
-    columns["weights"] = np.where(is_original[:, None], columns["weights"], np.nan)
+        weight = fraction[new].reshape((-1,) + (1,) * (values.ndim - 1))
+        getattr(cut, name)[new] = values[before] + weight * (values[after] - values[before])
+    cut.weights[new] = np.nan
     counts = np.bincount(owner, minlength=len(strokes))
     with_cuts = replace(
-        strokes,
-        **columns,
-        start=np.concatenate([[0], np.cumsum(counts)]),
+        cut, normal=normalize(cut.normal), start=np.concatenate([[0], np.cumsum(counts)])
     )
     # Split at each interval, also where no point lies inside it.
     return with_cuts.runs_where(kept, split_labels=np.cumsum(event == -1), free_at_removed=False)

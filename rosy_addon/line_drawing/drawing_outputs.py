@@ -1,30 +1,81 @@
-"""Drawings in strokes as files and as curves, in one function each."""
+"""Drawings in strokes as files and as curves in world space, in one function each."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
 
 from ..cache import BAKE_CACHE
-from ..progress import progress
+from ..field.frames import dot
+from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
-from .pipeline import (
-    LightSource,
-    StrokeDrawing,
-    StrokeGeometry,
-    draw_instances,
-    stroke_geometry,
-)
-from .polyline_files import polyline_file
+from .pipeline import LightSource, StrokeDrawing, draw_instances
+from .polyline_files import polyline_file, simplify_strokes
+from .stroke_set import Strokes
 from .style import StrokeStyle
 from .svg import Pen, svg_text
+from .visibility import pixel_size
 
 #: Share of the time after which all strokes are drawn.
 OUTPUT_START = 0.95
 
 #: Label of what comes then.
 OUTPUT_LABEL = "storing the strokes"
+
+#: Largest tangent of the angle between the normal and the direction to the camera for which the
+#: offset toward the camera grows.
+MAX_OFFSET_STEEPNESS = 12.0
+
+
+class SurfacePoints(NamedTuple):
+    """Points at a height above the triangles of a mesh.
+
+    Attributes
+    ----------
+    vertices : (n, 3) int32 ndarray
+        Vertices of the triangles.
+    weights : (n, 3) float64 ndarray
+        Barycentric coordinates.
+    height : (n,) float64 ndarray
+        Along the normals of the vertices, in world space.
+    """
+
+    vertices: np.ndarray
+    weights: np.ndarray
+    height: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class StrokeGeometry:
+    """Strokes as curves in world space with radii and colors, ready for a Blender object.
+
+    Attributes
+    ----------
+    strokes : Strokes
+        Simplified strokes; n points in all.
+    instance_index : (S,) int32 ndarray
+        As in `StrokeDrawing`.
+    points : (n, 3) float64 ndarray
+        Points of the curves in world space, offset from the surface.
+    radius : (n,) float64 ndarray
+        Radii in world space.
+    colors : list of str
+        The color of each family.
+    places : SurfacePoints or None
+        Where the points are on their surface, if they are to follow it.
+    """
+
+    strokes: Strokes
+    instance_index: np.ndarray
+    points: np.ndarray
+    radius: np.ndarray
+    colors: list[str]
+    places: SurfacePoints | None = None
 
 
 def drawing_file(
@@ -83,3 +134,88 @@ def _draw(
         )
     BAKE_CACHE.evict_over_limit()
     return drawing
+
+
+def stroke_geometry(
+    drawing: StrokeDrawing, camera: Camera, pen: Pen, follows: MeshInstance | None = None
+) -> StrokeGeometry:
+    """Return the curves of a drawing.
+
+    Parameters
+    ----------
+    drawing : StrokeDrawing
+    camera : Camera
+    pen : Pen
+        Its width is in pixels of the camera.
+    follows : MeshInstance, optional
+        The instance that all strokes are on, if they are to follow its surface.
+    """
+    label = "simplifying strokes"
+    with progress(0.0, 0.8, label):
+        strokes = simplify_strokes(drawing.strokes, camera)
+    report(0.8, label)
+    # Hidden strokes may face away from the camera. An offset toward it would move them into the
+    # surface.
+    places = None
+    if drawing.hidden or follows is not None:
+        height = pen.width * pixel_size(strokes.points, camera)
+        points = strokes.points + height[:, None] * strokes.normal
+        if follows is not None:
+            places = surface_points(strokes, height, follows)
+    else:
+        points = offset_toward_camera(strokes, camera, pen.width)
+    radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
+    colors = pen.family_colors(strokes.names)
+    return StrokeGeometry(strokes, drawing.instance_index, points, radius, colors, places)
+
+
+def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
+    """Return the points of strokes, offset toward the camera that sees them.
+
+    Their positions in the picture do not change. Ribbons of the given width that face the camera
+    are then in front of the surface. The offset grows with the angle between the surface and the
+    image plane, but the height above the surface hardly does.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    camera : Camera
+    width : float
+        Width of the ribbons in pixels at the depth of each point.
+
+    Returns
+    -------
+    (n, 3) float64 ndarray
+        World space.
+    """
+    to_camera = camera.view_directions(strokes.points)
+    facing = np.abs(dot(strokes.normal, to_camera))
+    steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / MAX_OFFSET_STEEPNESS)
+    offset = width * (1 + steepness) * pixel_size(strokes.points, camera)
+    return strokes.points + offset[:, None] * to_camera
+
+
+def surface_points(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> SurfacePoints:
+    """Return the places of the points of strokes.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    height : (n,) float64 ndarray
+        Heights of the points above the surface, in world space.
+    instance : MeshInstance
+        The instance that all strokes are on.
+    """
+    surface = instance.surface
+    corners = surface.triangle_vertex[strokes.triangle]
+    a, b, c = instance.world_points()[corners].transpose(1, 0, 2)
+    u, v, offset = b - a, c - a, strokes.points - a
+    # Least squares: the nearest point of the plane.
+    uu, uv, vv, pu, pv = dot(u, u), dot(u, v), dot(v, v), dot(offset, u), dot(offset, v)
+    determinant = uu * vv - uv * uv
+    is_flat = determinant <= 0
+    determinant = np.where(is_flat, 1.0, determinant)
+    along_u, along_v = (vv * pu - uv * pv) / determinant, (uu * pv - uv * pu) / determinant
+    weights = np.stack([1 - along_u - along_v, along_u, along_v], axis=1)
+    weights[is_flat] = 1 / 3
+    return SurfacePoints(corners.astype(np.int32), weights, height)

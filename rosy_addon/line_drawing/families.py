@@ -16,7 +16,7 @@ from ..field.frames import dot, normalize
 from ..field.surface import connected_components
 from ..progress import progress, report
 from .stroke_set import Strokes
-from .tangent_mesh import TangentMesh, nearest_member
+from .tangent_mesh import TangentMesh, nearest_member, shared_edges, unit
 
 #: Guide directions in world space, in order of preference, if no camera gives one.
 GUIDE_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
@@ -53,9 +53,7 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     report(0.9, "matching families")
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
     triangle = strokes.triangle[middle]
-    member = dot(strokes.member[middle], mesh.x[triangle]) + 1j * dot(
-        strokes.member[middle], mesh.y[triangle]
-    )
+    member = mesh.to_frame(triangle, strokes.member[middle])
     family_slot = member_offset(member, reference[triangle], mesh.degree) % family_count
     family = labels[triangle, family_slot].astype(np.int32)
     return replace(strokes, family=family, names=names)
@@ -67,13 +65,20 @@ def reference_members(mesh: TangentMesh) -> np.ndarray:
     It is the member nearest to the x axis of the frame. If the field labels one line consistently
     (`TangentMesh.family_z`), it is a member on that line.
     """
-    z = mesh.z.sum(axis=1)
-    x_axis = np.ones(len(z), dtype=np.complex128)
+    near = np.ones(len(mesh.z), dtype=np.complex128)
     if mesh.family_z is not None and (mesh.family_z != 0).any():
         # The stored member is on the same line everywhere. Count from that line.
-        labeled_member = np.exp(1j * np.angle(mesh.family_z) * mesh.family_count / mesh.degree)
-        return nearest_member(labeled_member, np.where(z != 0, z, 1), mesh.degree)
-    return nearest_member(x_axis, np.where(z != 0, z, 1), mesh.degree)
+        near = np.exp(1j * np.angle(mesh.family_z) * mesh.family_count / mesh.degree)
+    return _members_at_centers(mesh, near)
+
+
+def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
+    """Return (T,) complex128: the members at the centers of triangles that are nearest to others.
+
+    The member where the field is zero is any.
+    """
+    z = mesh.z.sum(axis=1)
+    return nearest_member(near, np.where(z != 0, z, 1), mesh.degree)
 
 
 def member_offset(member: np.ndarray, reference: np.ndarray, degree: int) -> np.ndarray:
@@ -94,10 +99,7 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
     if mesh.family_z is not None and (mesh.family_z != 0).any():
         return np.broadcast_to(np.arange(family_count), (count, family_count))
     reference = reference_members(mesh)
-    triangle, edge = np.nonzero(mesh.neighbor >= 0)
-    other = mesh.neighbor[triangle, edge]
-    is_first = triangle < other
-    triangle, edge, other = triangle[is_first], edge[is_first], other[is_first]
+    triangle, other, edge, _ = shared_edges(mesh)
     report(0.2, label)
     transported = reference[triangle] * mesh.edge_transport[triangle, edge]
     shift = member_offset(
@@ -165,8 +167,4 @@ def _members_near_guide(
         is_usable = dot(projected, projected) > 0.1
         guide[is_usable] = normalize(projected[is_usable])
     guide_tangent = dot(guide, mesh.x) + 1j * dot(guide, mesh.y)
-    guide_tangent = np.where(guide_tangent != 0, guide_tangent, 1)
-    z = mesh.z.sum(axis=1)
-    return nearest_member(
-        guide_tangent / np.abs(guide_tangent), np.where(z != 0, z, 1), mesh.degree
-    )
+    return _members_at_centers(mesh, unit(guide_tangent, np.ones_like(guide_tangent)))

@@ -7,22 +7,21 @@ numbered 2 * stroke + side, where side is 0 for left and 1 for right.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from .column_table import ColumnTable
-from .surface_particles import SurfaceParticles, TracedPath
+from .surface_particles import SurfaceParticles
 
 
 @dataclass(eq=False)
-class Tips:
+class Tips(SurfaceParticles):
     """The growing ends of strokes, n of them.
+
+    The sign is that of the half of the stroke.
 
     Attributes
     ----------
-    particles : SurfaceParticles
-        Their positions. The sign is that of the half of the stroke.
     stroke : (n,) int32 ndarray
     arc : (n,) float64 ndarray
         Signed arc length from the seed, in world space.
@@ -30,77 +29,28 @@ class Tips:
         Fraction of a full step to try next.
     """
 
-    particles: SurfaceParticles
     stroke: np.ndarray
     arc: np.ndarray
     step_scale: np.ndarray
 
     @staticmethod
-    def empty() -> Tips:
-        """Return no tips."""
-        return Tips(SurfaceParticles.empty(), np.empty(0, np.int32), np.empty(0), np.empty(0))
+    def at(particles: SurfaceParticles, stroke: np.ndarray, arc: np.ndarray) -> Tips:
+        """Return tips at particles that try full steps."""
+        return Tips(*particles.columns, stroke.astype(np.int32), arc, np.ones(len(stroke)))
 
-    def __len__(self) -> int:
-        return len(self.stroke)
+    @property
+    def particles(self) -> SurfaceParticles:
+        """Their positions: the same arrays."""
+        return SurfaceParticles(self.triangle, self.weights, self.member, self.sign)
 
     @property
     def end(self) -> np.ndarray:
         """(n,) int64: the end of its stroke that each tip is, 0 or 1."""
-        return np.where(self.particles.sign > 0, 1, 0)
-
-    def take(self, indices: np.ndarray) -> Tips:
-        """Return a copy of some tips."""
-        return Tips(
-            self.particles.take(indices),
-            self.stroke[indices],
-            self.arc[indices],
-            self.step_scale[indices],
-        )
-
-    @staticmethod
-    def concatenate(first: Tips, second: Tips) -> Tips:
-        """Return both sets, one after the other."""
-        return Tips(
-            SurfaceParticles.concatenate(first.particles, second.particles),
-            np.concatenate([first.stroke, second.stroke]),
-            np.concatenate([first.arc, second.arc]),
-            np.concatenate([first.step_scale, second.step_scale]),
-        )
+        return np.where(self.sign > 0, 1, 0)
 
 
-class StrokeSegments(NamedTuple):
-    """m segments of growing strokes, each in one triangle, in the order in which they were traced.
-
-    Attributes
-    ----------
-    stroke : (m,) int32 ndarray
-    sign : (m,) int8 ndarray
-        1 for segments of the forward half of a stroke, -1 for the backward half.
-    triangle : (m,) int32 ndarray
-    begin_weights, end_weights : (m, 3) float64 ndarray
-        Barycentric coordinates of the ends, in the order of tracing.
-    direction : (m,) complex128 ndarray
-        Unit direction of tracing in the frame of the triangle.
-    """
-
-    stroke: np.ndarray
-    sign: np.ndarray
-    triangle: np.ndarray
-    begin_weights: np.ndarray
-    end_weights: np.ndarray
-    direction: np.ndarray
-
-    @staticmethod
-    def of_tips(tips: Tips, path: TracedPath) -> StrokeSegments:
-        """Return the segments that tips have traced."""
-        return StrokeSegments(
-            tips.stroke[path.particle],
-            tips.particles.sign[path.particle].astype(np.int8),
-            path.triangle,
-            path.begin_weights,
-            path.end_weights,
-            path.direction,
-        )
+#: No tips.
+NO_TIPS = Tips.at(SurfaceParticles.empty(), np.empty(0), np.empty(0))
 
 
 class GrowingStrokes(ColumnTable):
@@ -132,32 +82,17 @@ class GrowingStrokes(ColumnTable):
         Whether the ends have stopped growing.
     """
 
-    alive: np.ndarray
-    spacing: np.ndarray
-    parent_side: np.ndarray
-    active_children: np.ndarray
-    seed_sample: np.ndarray
-    tip_count: np.ndarray
-    min_arc: np.ndarray
-    max_arc: np.ndarray
-    end_sample: np.ndarray
-    end_yielded: np.ndarray
-    end_done: np.ndarray
-
-    def __init__(self) -> None:
-        super().__init__(
-            alive=((), bool),
-            spacing=((), float),
-            parent_side=((), np.int64),
-            active_children=((2,), np.int32),
-            seed_sample=((), np.int32),
-            tip_count=((), np.int32),
-            min_arc=((), float),
-            max_arc=((), float),
-            end_sample=((2,), np.int32),
-            end_yielded=((2,), bool),
-            end_done=((2,), bool),
-        )
+    alive = np.empty(0, bool)
+    spacing = np.empty(0)
+    parent_side = np.empty(0, np.int64)
+    active_children = np.empty((0, 2), np.int32)
+    seed_sample = np.empty(0, np.int32)
+    tip_count = np.empty(0, np.int32)
+    min_arc = np.empty(0)
+    max_arc = np.empty(0)
+    end_sample = np.empty((0, 2), np.int32)
+    end_yielded = np.empty((0, 2), bool)
+    end_done = np.empty((0, 2), bool)
 
     def add(self, parent_side: np.ndarray, spacing: np.ndarray) -> np.ndarray:
         """Add n strokes with two tips each, and return their numbers."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
 from ..progress import report
 from .point_grid import PointGrid
@@ -47,11 +48,10 @@ def head_on_ends(strokes: Strokes) -> np.ndarray:
     grid = PointGrid(MAX_FORWARD * float(np.median(spacing)), len(ends))
     grid.add(position, MAX_FORWARD * spacing)
     radius = float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing
-    for start in range(0, len(ends), BLOCK_ENDS):
-        report(start / len(ends), "shaping ends")
-        block = slice(start, start + BLOCK_ENDS)
+    for block in row_blocks(len(ends), BLOCK_ENDS):
+        report(block.start / len(ends), "shaping ends")
         query, other = grid.pairs_within(position[block], radius[block])
-        query = query + start
+        query = query + block.start
         delta = position[other] - position[query]
         forward = dot(delta, outward[query])
         lateral = np.sqrt(np.maximum(dot(delta, delta) - forward**2, 0))

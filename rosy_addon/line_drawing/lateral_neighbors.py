@@ -5,15 +5,15 @@ Only samples of the same family are compared. Distances are measured on the surf
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
-from .point_grid import QueryBand
 from .samples import SAMPLE_STEP, SEARCH_RADIUS, CoveringPairs, StrokeSamples
-from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 
 #: Largest gap for which a side counts as covered, in spacings.
 MAX_COVERED_GAP = 1.5
@@ -24,8 +24,39 @@ LATERAL_WINDOW = 0.36
 #: Separation of strokes that meet head on, in spacings.
 HEAD_ON_DISTANCE = 0.35
 
+#: Points of one stroke are compared only if they are farther apart along it than this, in spacings.
+MIN_SELF_ARC = 2.5
+
+#: Points are on different parts of a fold if the cosine between their normals is below the first
+#: value, or the slope between them relative to the mean normal (height over distance) is above the
+#: second.
+MIN_NORMAL_COSINE, MAX_SLOPE = 0.1, 0.6
+
 #: Pairs of samples that are compared at once. Surfaces that lie on each other have very many.
 PAIR_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class SeparationRules:
+    """Limits on the separation and the length of strokes, in spacings.
+
+    Attributes
+    ----------
+    min_separation : float
+        Strokes end before they come nearer than this to another stroke of their family.
+    max_gap : float
+        Strokes end where a gap beside them is wider than this but too narrow for another stroke
+        (see `MAX_COVERED_GAP`).
+    min_length : float
+        Shorter strokes are removed.
+    max_length : float
+        Strokes end when they are longer than this.
+    """
+
+    min_separation: float = 0.75
+    max_gap: float = 1.24
+    min_length: float = 1.5
+    max_length: float = np.inf
 
 
 class LateralNeighbors(NamedTuple):
@@ -112,22 +143,19 @@ def find_lateral_neighbors(
     side = (_left_component(pairs.offset, pairs.sample_frame) > 0).astype(np.intp)
     neighbor_side = (_left_component(pairs.offset, pairs.neighbor_frame) < 0).astype(np.intp)
     covers = lateral_gap < MAX_COVERED_GAP
-    if previous is None:
-        gap, yielded, rejected = _judge(
-            len(sample), near_query, pairs.query, side, lateral_gap, max_gap
-        )
-    else:
-        # Indices of neighbors into `sample`, or -1.
-        first = int(sample[0]) if len(sample) else 0
-        index = np.maximum(pairs.neighbor - first, -1)
-        gap, yielded, rejected = _judge_in_order(
-            samples.step[sample],
-            previous,
-            (near_query, np.maximum(near_neighbor - first, -1)),
-            (pairs.query, index, side, lateral_gap),
-            max_gap,
-        )
-        covers &= ~np.append(rejected, False)[index]
+    # Indices of neighbors into `sample`, or -1: all are if the samples are compared one by one.
+    first = samples.count
+    if previous is not None:
+        first = sample.min(initial=first)
+    index = np.maximum(pairs.neighbor - first, -1)
+    gap, yielded, rejected = _judge(
+        np.zeros(len(sample), dtype=int) if previous is None else samples.step[sample],
+        np.full(len(sample), -1) if previous is None else previous,
+        (near_query, np.maximum(near_neighbor - first, -1)),
+        (pairs.query, index, side, lateral_gap),
+        max_gap,
+    )
+    covers &= ~np.append(rejected, False)[index]
     covers &= ~rejected[pairs.query]
     covering = CoveringPairs(
         *(column[covers] for column in (pairs.sample, pairs.neighbor, side, neighbor_side))
@@ -136,47 +164,20 @@ def find_lateral_neighbors(
 
 
 def _judge(
-    count: int,
-    near_query: np.ndarray,
-    query: np.ndarray,
-    side: np.ndarray,
-    lateral_gap: np.ndarray,
-    max_gap: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `gap`, `yielded` and `rejected` of `LateralNeighbors` for `count` samples.
-
-    Parameters
-    ----------
-    count : int
-    near_query : (k,) ndarray of int
-        Samples that are too near to an older one.
-    query, side, lateral_gap : (m,) ndarray
-        Samples beside another, the side of the other, and its distance in spacings.
-    max_gap : float
-    """
-    gap = np.full((count, 2), np.inf)
-    np.minimum.at(gap, (query, side), lateral_gap)
-    rejected = np.zeros(count, dtype=bool)
-    rejected[near_query] = True
-    yielded = ~rejected & ((gap > max_gap) & (gap < MAX_COVERED_GAP)).any(axis=1)
-    return gap, yielded, rejected | yielded
-
-
-def _judge_in_order(
     step: np.ndarray,
     previous: np.ndarray,
     near: tuple[np.ndarray, np.ndarray],
     beside: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     max_gap: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Do the same as `_judge` for samples that were added together, one step after another.
+    """Return `gap`, `yielded` and `rejected` of `LateralNeighbors`, one step after another.
 
     Samples that follow a rejected one are rejected too, and others are not compared with them.
 
     Parameters
     ----------
     step, previous : (n,) ndarray of int
-        See `find_lateral_neighbors`.
+        The steps, which ascend, and the samples before; see `find_lateral_neighbors`.
     near : tuple of (k,) ndarray
         Samples and their older neighbors that are too near; -1 for a neighbor that is not among the
         samples.
@@ -196,16 +197,12 @@ def _judge_in_order(
         query, neighbor, side, lateral_gap = _rows_of(beside, first, end)
         is_near = exists[near_neighbor]
         is_beside = (neighbor < end) & exists[neighbor]
-        gap[rows], yielded[rows], rejected = _judge(
-            end - first,
-            near_query[is_near] - first,
-            query[is_beside] - first,
-            side[is_beside],
-            lateral_gap[is_beside],
-            max_gap,
-        )
-        yielded[rows] &= exists[rows]
-        exists[rows] &= ~rejected
+        np.minimum.at(gap, (query[is_beside], side[is_beside]), lateral_gap[is_beside])
+        is_accepted = np.ones(end - first, dtype=bool)
+        is_accepted[near_query[is_near] - first] = False
+        is_wide = (gap[rows] > max_gap) & (gap[rows] < MAX_COVERED_GAP)
+        yielded[rows] = exists[rows] & is_accepted & is_wide.any(axis=1)
+        exists[rows] &= is_accepted & ~yielded[rows]
     return gap, yielded, ~exists[:-1]
 
 
@@ -226,11 +223,12 @@ def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
     query, neighbor = samples.grid.pairs_within(
         samples.position[sample],
         SEARCH_RADIUS * samples.spacing[sample],
-        QueryBand(samples.direction[sample]),
+        samples.direction[sample],
     )
-    starts = range(0, max(len(query), 1), PAIR_BLOCK)
-    parts = [slice(start, start + PAIR_BLOCK) for start in starts]
-    blocks = [_comparable_block(samples, sample, query[part], neighbor[part]) for part in parts]
+    blocks = [
+        _comparable_block(samples, sample, query[part], neighbor[part])
+        for part in row_blocks(len(query), PAIR_BLOCK)
+    ]
     if len(blocks) == 1:
         return blocks[0]
     return _Pairs(*(np.concatenate(columns) for columns in zip(*blocks, strict=True)))

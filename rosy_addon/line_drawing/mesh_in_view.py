@@ -1,7 +1,11 @@
-"""The part of a tangent mesh that can be in the picture.
+"""The part of a tangent mesh that can be in the picture, and in it the triangles that matter.
 
 Strokes are traced only there. Beyond the frame and behind the camera, the size of a pixel has no lower
 limit, so strokes there could be without number.
+
+Strokes that nobody sees need not be traced either: on most models, that is half of them. Strokes keep their
+distances only from those beside them, so those in view are as if the hidden part had strokes, too, if
+tracing goes on a little beyond what is seen.
 """
 
 from __future__ import annotations
@@ -10,11 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..field.frames import normalize
+from ..field.blocks import row_blocks
+from ..field.frames import dot, normalize
 from ..progress import report
 from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, take_triangles, with_corners
+from .visibility import BLOCK_POINTS, DepthBuffer, in_frame, planes_around, project_to_pixels
 
 #: Distance from the frame up to which strokes are traced, in pixels and as a fraction of the frame; the
 #: lesser of both counts. Strokes then reach the frame as if the mesh went on.
@@ -24,32 +31,45 @@ MARGIN_PIXELS, MARGIN_RATIO = 64.0, 0.125
 #: one of them has a larger ratio of depths than `MAX_DEPTH_RATIO`: spacings are interpolated in triangles.
 DEPTH_STEP, MAX_DEPTH_RATIO = 2.0, 4.0
 
+#: Distance from triangles that are seen up to which strokes are traced, in spacings.
+HIDDEN_MARGIN = 6.0
+
 
 @dataclass(frozen=True, eq=False)
-class MeshInView:
-    """A part of a tangent mesh, of T' triangles that are parts of its T triangles.
+class Parts:
+    """T' triangles that are parts of T triangles.
 
     Attributes
     ----------
-    mesh : TangentMesh
-        The part. `triangle_vertex` is that of the whole triangles.
     triangle : (T',) int32 ndarray
         The whole triangle of each part.
     weights : (T', 3, 3) float64 ndarray
         Barycentric coordinates of each corner in that triangle.
     """
 
-    mesh: TangentMesh
     triangle: np.ndarray
     weights: np.ndarray
 
     def corner_values(self, values: np.ndarray) -> np.ndarray:
-        """Return (T', 3) values at the corners, interpolated from those of the (T, 3) whole ones."""
-        return np.einsum("tkj,tj->tk", self.weights, values[self.triangle])
+        """Return (T', 3, ...) values at the corners, given those of the (T, 3, ...) whole ones."""
+        return np.einsum("tkj,tj...->tk...", self.weights, values[self.triangle])
+
+
+@dataclass(frozen=True, eq=False)
+class MeshInView(Parts):
+    """A part of a tangent mesh.
+
+    Attributes
+    ----------
+    mesh : TangentMesh
+        The part. `triangle_vertex` is that of the whole triangles.
+    """
+
+    mesh: TangentMesh
 
     def take(self, kept: np.ndarray) -> MeshInView:
         """Return some of the parts; `kept` is (T',) bool."""
-        return MeshInView(take_triangles(self.mesh, kept), self.triangle[kept], self.weights[kept])
+        return MeshInView(self.triangle[kept], self.weights[kept], take_triangles(self.mesh, kept))
 
     def on_whole_mesh(self, strokes: Strokes) -> Strokes:
         """Return strokes that were traced on the part as strokes on the whole mesh."""
@@ -101,7 +121,7 @@ def whole_mesh(mesh: TangentMesh) -> MeshInView:
     """Return all of a mesh as a `MeshInView`."""
     count = len(mesh.points)
     return MeshInView(
-        mesh, np.arange(count, dtype=np.int32), np.broadcast_to(np.eye(3), (count, 3, 3))
+        np.arange(count, dtype=np.int32), np.broadcast_to(np.eye(3), (count, 3, 3)), mesh
     )
 
 
@@ -122,21 +142,15 @@ def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pieces:
+class _Pieces(Parts):
     """Parts of triangles, and the parts that are beside them.
 
-    The attributes are those of `MeshInView` and `TangentMesh` with the same names.
+    The attributes are those of `TangentMesh` with the same names.
     """
 
-    triangle: np.ndarray
-    weights: np.ndarray
     neighbor: np.ndarray
     neighbor_edge: np.ndarray
     edge_transport: np.ndarray
-
-    def corner_values(self, values: np.ndarray) -> np.ndarray:
-        """As `MeshInView.corner_values`."""
-        return np.einsum("tkj,tj->tk", self.weights, values[self.triangle])
 
     def cut(self, distance: np.ndarray, keeps_both: bool) -> _Pieces:
         """Cut along a plane.
@@ -243,24 +257,123 @@ class _Pieces:
 
     def apply(self, mesh: TangentMesh) -> MeshInView:
         """Return the pieces as a mesh."""
-
-        def at_corners(values: np.ndarray) -> np.ndarray:
-            return np.einsum("tkj,tj...->tk...", self.weights, values[self.triangle])
-
         per_triangle = {
             name: getattr(mesh, name)[self.triangle]
             for name in ("x", "y", "normal", "face", "triangle_vertex")
         }
-        family_z = None if mesh.family_z is None else mesh.family_z[self.triangle]
         part = replace(
             mesh,
-            corner_normal=normalize(at_corners(mesh.corner_normal)),
-            z=at_corners(mesh.z),
-            harmonics=tuple((j, at_corners(values)) for j, values in mesh.harmonics),
-            family_z=family_z,
+            corner_normal=normalize(self.corner_values(mesh.corner_normal)),
+            z=self.corner_values(mesh.z),
+            harmonics=tuple((j, self.corner_values(values)) for j, values in mesh.harmonics),
+            family_z=None if mesh.family_z is None else mesh.family_z[self.triangle],
             neighbor=self.neighbor,
             neighbor_edge=self.neighbor_edge,
             edge_transport=self.edge_transport,
             **per_triangle,
         )
-        return MeshInView(with_corners(part, at_corners(mesh.points)), self.triangle, self.weights)
+        part = with_corners(part, self.corner_values(mesh.points))
+        return MeshInView(self.triangle, self.weights, part)
+
+
+# --- triangles that are seen -------------------------------------------------------------------------
+
+
+def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> np.ndarray:
+    """Find the triangles of an instance that the camera sees.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    index : int
+        The number of the instance among those of the depth buffer.
+    depth_buffer : DepthBuffer
+
+    Returns
+    -------
+    (T,) bool ndarray
+        Triangles that are nearest at a pixel, or have a corner that is not hidden. A corner out of
+        the frame counts as not hidden.
+    """
+    label = "finding the part in view"
+    triangle_vertex = instance.surface.triangle_vertex
+    owner = depth_buffer.triangle[depth_buffer.triangle >= 0]
+    pixel_counts = np.bincount(owner, minlength=len(depth_buffer.normal))
+    seen = pixel_counts[depth_buffer.start[index] : depth_buffer.start[index + 1]] > 0
+    points = instance.world_points()
+    hidden = np.zeros(len(points), dtype=bool)
+    pending = np.unique(triangle_vertex[~seen])
+    for part in row_blocks(len(pending), BLOCK_POINTS):
+        report(part.start / max(len(pending), 1), label)
+        hidden[pending[part]] = _is_hidden(points[pending[part]], depth_buffer)
+    return seen | ~hidden[triangle_vertex].all(axis=1)
+
+
+def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
+    """Return (n,) bool: which points are in the frame, and behind all triangles around them."""
+    pixels, _ = project_to_pixels(points, depth_buffer.camera)
+    hidden = in_frame(pixels, depth_buffer.camera)
+    chosen = np.flatnonzero(hidden)
+    for plane in planes_around(points[chosen], pixels[chosen], depth_buffer):
+        hidden[chosen] &= plane.hides
+    return hidden
+
+
+def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> np.ndarray:
+    """Return the triangles that are within `HIDDEN_MARGIN` spacings of those that are seen.
+
+    The distance of a triangle is that of the edge at which it is entered from the nearest edge of one
+    that is seen, in a straight line.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    seen : (T,) bool ndarray
+    spacing : (T, 3) float64 ndarray
+        Spacing at the corners, in world space.
+
+    Returns
+    -------
+    (T,) bool ndarray
+        Includes those that are seen.
+    """
+    spacing = spacing.mean(axis=1)
+    distance = np.where(seen, 0.0, np.inf)
+    # The edge of a triangle that is seen from which each triangle was reached.
+    origin = np.zeros((len(seen), 2, 3))
+    front = np.flatnonzero(seen)
+    while len(front):
+        source, edge = np.nonzero(mesh.neighbor[front] >= 0)
+        source = front[source]
+        target = mesh.neighbor[source, edge]
+        beyond = ~seen[target]
+        source, edge, target = source[beyond], edge[beyond], target[beyond]
+        entered = np.stack(
+            [mesh.points[source, (edge + 1) % 3], mesh.points[source, (edge + 2) % 3]], axis=1
+        )
+        start = np.where(seen[source, None, None], entered, origin[source])
+        reached = _edge_distance(start, entered) / spacing[target]
+        nearer = np.flatnonzero((reached < distance[target]) & (reached <= HIDDEN_MARGIN))
+        # Of several ways to one triangle, the shortest is written last.
+        nearer = nearer[np.argsort(-reached[nearer], kind="stable")]
+        distance[target[nearer]], origin[target[nearer]] = reached[nearer], start[nearer]
+        front = np.unique(target[nearer])
+    return np.isfinite(distance)
+
+
+def _edge_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the (n,) distances between (n, 2, 3) edges in one plane that do not cross."""
+    distances = [
+        _distance_to_edge(point, edge)
+        for one, edge in ((first, second), (second, first))
+        for point in (one[:, 0], one[:, 1])
+    ]
+    return np.min(distances, axis=0)
+
+
+def _distance_to_edge(point: np.ndarray, edge: np.ndarray) -> np.ndarray:
+    """Return the (n,) distances of (n, 3) points from (n, 2, 3) edges."""
+    along, offset = edge[:, 1] - edge[:, 0], point - edge[:, 0]
+    length_squared = np.maximum(dot(along, along), 1e-300)
+    fraction = np.clip(dot(offset, along) / length_squared, 0, 1)
+    return np.linalg.norm(offset - fraction[:, None] * along, axis=1)

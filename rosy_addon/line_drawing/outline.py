@@ -13,7 +13,6 @@ from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
-from .polyline_chains import chain_segments, point_keys
 from .stroke_set import Strokes
 from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
 from .visibility import pixel_size
@@ -24,6 +23,12 @@ OUTLINE_KINDS = ("silhouettes", "creases", "borders")
 #: Shortest crease in pixels if it is as sharp as the angle, in radians. Sharper ones may be shorter, but
 #: count as at most a right angle; blunter ones have to be longer.
 MIN_CREASE_PX, REFERENCE_ANGLE = 12.0, np.radians(60)
+
+#: End points are the same if they differ by less than about this fraction of the extent of all.
+SAME_POINT_RATIO = 1e-7
+
+#: Where more than two segments meet, two are joined if they turn by less than this, in radians.
+MAX_JUNCTION_TURN = np.radians(50)
 
 
 class Segments(NamedTuple):
@@ -41,11 +46,6 @@ class Segments(NamedTuple):
     normals: np.ndarray
     triangle: np.ndarray
 
-    @staticmethod
-    def concatenate(first: Segments, second: Segments) -> Segments:
-        """Return both sets, one after the other."""
-        return Segments(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))
-
 
 class _Corners(NamedTuple):
     """The (T, 3, 3) corners of triangles, the shading normals there and the normals of triangles."""
@@ -55,9 +55,7 @@ class _Corners(NamedTuple):
     flat: np.ndarray
 
 
-def outline(
-    instance: MeshInstance, camera: Camera | None = None, *, crease_angle: float = CREASE_ANGLE
-) -> Strokes:
+def outline(instance: MeshInstance, camera: Camera) -> Strokes:
     """Extract the silhouettes, creases and borders of a mesh instance.
 
     Silhouettes are the curves on which the interpolated normal is perpendicular to the direction to
@@ -67,12 +65,8 @@ def outline(
     Parameters
     ----------
     instance : MeshInstance
-    camera : Camera, optional
-        Camera of the silhouettes. With a camera, creases are left out that are too short and blunt in
-        pixels. Without a camera there are no silhouettes.
-    crease_angle : float
-        Smallest angle in radians between the normals of the two faces at a crease; see
-        `field.creases.find_creases`.
+    camera : Camera
+        Camera of the silhouettes. Creases are left out that are too short and blunt in its pixels.
 
     Returns
     -------
@@ -91,32 +85,25 @@ def outline(
         edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     with progress(0.3, 0.7, label):
-        is_crease = _are_pairs(vertex, a, find_creases(surface, crease_angle).ends)
+        is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])
     report(0.8, label)
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
-    if camera is None:
-        silhouettes = _edge_segments(corners, a[:0])
-        families = [_chains(silhouettes), _chains(creases)]
-    else:
-        is_blunt = is_sharp_edge(surface, a, b) & ~is_crease
-        silhouettes = Segments.concatenate(
-            _smooth_silhouettes(corners, camera),
-            _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera),
-        )
-        angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
-        salience = _pixel_salience(creases, angle, camera)
-        families = [_chains(silhouettes), _chains(creases, salience, MIN_CREASE_PX)]
+    is_blunt = is_sharp_edge(surface, a, b) & ~is_crease
+    smooth = _smooth_silhouettes(corners, camera)
+    sharp = _sharp_silhouettes(corners, a[is_blunt], b[is_blunt], camera)
+    silhouettes = Segments(*(np.concatenate(pair) for pair in zip(smooth, sharp, strict=True)))
+    angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
+    salience = _pixel_salience(creases, angle, camera)
+    families = [
+        _strokes(silhouettes, 0, surface),
+        _strokes(creases, 1, surface, salience),
+    ]
     report(0.9, label)
-    families.append(_chains(_edge_segments(corners, borders)))
-    return _to_strokes(families, surface)
-
-
-#: A polyline: (p, 3) points and normals, (p,) triangles, and whether the last point is the first.
-_Chain = tuple[np.ndarray, np.ndarray, np.ndarray, bool]
+    return Strokes.join([*families, _strokes(_edge_segments(corners, borders), 2, surface)])
 
 
 def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
@@ -218,61 +205,108 @@ def _pixel_salience(segments: Segments, angle: np.ndarray, camera: Camera) -> np
 # --- strokes -----------------------------------------------------------------------------------------
 
 
-def _chains(
-    segments: Segments, salience: np.ndarray | None = None, min_salience: float = 0.0
-) -> list[_Chain]:
-    """Return the polylines that segments form, without those with a small sum of (k,) saliences."""
-    keys = point_keys(segments.ends)
-    salience = np.zeros(len(keys)) if salience is None else salience
+def _strokes(
+    segments: Segments, family: int, surface: Surface, salience: np.ndarray | None = None
+) -> Strokes:
+    """Return the polylines that segments form, as strokes of a family.
+
+    With (k,) saliences, polylines with a sum of less than `MIN_CREASE_PX` are left out.
+    """
+    keys = _point_keys(segments.ends)
     # Where a silhouette passes through a vertex, it has segments without a length in some triangles.
     has_length = keys[:, 0] != keys[:, 1]
     segments = Segments(*(column[has_length] for column in segments))
-    salience = salience[has_length]
-    return [
-        _polyline(segments, chain, closed)
-        for chain, closed in chain_segments(keys[has_length], segments.ends)
-        if salience[chain[::2] >> 1].sum() >= min_salience
-    ]
-
-
-def _polyline(segments: Segments, chain: np.ndarray, closed: bool) -> _Chain:
-    """Return a chain of `chain_segments` as a polyline."""
-    # Each end of a segment, but the second of two that meet.
-    point = np.append(chain[::2], chain[-1])
-    segment = np.append(chain[:1] >> 1, chain[::2] >> 1)
-    return (
-        segments.ends.reshape(-1, 3)[point],
-        segments.normals.reshape(-1, 3)[point],
-        segments.triangle[segment],
-        closed,
-    )
-
-
-def _to_strokes(families: list[list[_Chain]], surface: Surface) -> Strokes:
-    """Return polylines as strokes, one list for each family."""
-    chains = [chain for family in families for chain in family]
-    family_index = np.repeat(np.arange(len(families)), [len(family) for family in families])
-    counts = [len(points) for points, _, _, _ in chains]
-    start = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
-    columns = [np.concatenate(column) for column in list(zip(*chains, strict=True))[:3]] or [
-        np.empty((0, 3)),
-        np.empty((0, 3)),
-        np.empty(0, dtype=np.int64),
-    ]
-    points, normal, triangle = columns
-    total = len(points)
+    chains = _chain_segments(keys[has_length], segments.ends)
+    if salience is not None:
+        salience = salience[has_length]
+        chains = [
+            (chain, closed)
+            for chain, closed in chains
+            if salience[chain[::2] >> 1].sum() >= MIN_CREASE_PX
+        ]
+    # Each end of a segment, but the second of two that meet; and the segment that ends there.
+    none = np.empty(0, dtype=np.int64)
+    point = np.concatenate([none, *(np.append(chain[::2], chain[-1]) for chain, _ in chains)])
+    segment = np.concatenate([none, *(np.append(chain[0], chain[::2]) for chain, _ in chains)]) >> 1
+    triangle = segments.triangle[segment]
     return Strokes(
-        points=points,
-        start=start,
-        family=family_index.astype(np.int32),
+        points=segments.ends.reshape(-1, 3)[point],
+        start=np.cumsum([0, *(len(chain) // 2 + 1 for chain, _ in chains)]),
+        family=np.full(len(chains), family, dtype=np.int32),
         names=OUTLINE_KINDS,
         face=surface.triangle_face[triangle],
         triangle=triangle.astype(np.int32),
-        weights=np.full((total, 3), np.nan),
-        normal=normal,
-        member=np.zeros((total, 3)),
-        spacing=np.zeros(total),
-        width=np.ones(total),
-        opacity=np.ones(total),
-        closed=np.array([closed for _, _, _, closed in chains], dtype=bool),
+        weights=np.full((len(point), 3), np.nan),
+        normal=segments.normals.reshape(-1, 3)[point],
+        member=np.zeros((len(point), 3)),
+        spacing=np.zeros(len(point)),
+        width=np.ones(len(point)),
+        closed=np.array([closed for _, closed in chains], dtype=bool),
     )
+
+
+def _point_keys(ends: np.ndarray) -> np.ndarray:
+    """Return (k, 2) int64 keys of the (k, 2, 3) end points: the same for the same points."""
+    if not len(ends):
+        return np.empty((0, 2), dtype=np.int64)
+    points = ends.reshape(-1, 3)
+    low = points.min(axis=0)
+    cell = SAME_POINT_RATIO * max(float((points.max(axis=0) - low).max()), 1e-300)
+    # Columns of whole numbers up to 1e7 fit into one key of 64 bits in two steps.
+    x, y, z = np.rint((points - low) / cell).astype(np.int64).T
+    _, keys = np.unique(x * (1 << 25) + y, return_inverse=True)
+    _, keys = np.unique(keys.astype(np.int64) * (1 << 25) + z, return_inverse=True)
+    return keys.reshape(-1, 2).astype(np.int64)
+
+
+def _chain_segments(keys: np.ndarray, ends: np.ndarray) -> list[tuple[np.ndarray, bool]]:
+    """Join segments into chains.
+
+    Two segments are joined where no others meet. Where others do, the straightest pairs are joined.
+
+    Parameters
+    ----------
+    keys : (k, 2) int64 ndarray
+        From `_point_keys`.
+    ends : (k, 2, 3) ndarray
+        End points of the segments.
+
+    Returns
+    -------
+    list of (chain, closed)
+        The chain is an array of ends (2 * segment + side) in the order in which they are passed, two
+        for each segment. Closed chains end where they start.
+    """
+    count = len(keys)
+    flat = keys.ravel()
+    order = np.argsort(flat, kind="stable")
+    _, first, uses = np.unique(flat[order], return_index=True, return_counts=True)
+    mate = np.full(2 * count, -1, dtype=np.int64)
+    pairs = first[uses == 2]
+    mate[order[pairs]], mate[order[pairs + 1]] = order[pairs + 1], order[pairs]
+    outward = normalize(ends[:, ::-1] - ends).reshape(-1, 3)
+    for begin, use in zip(first[uses > 2].tolist(), uses[uses > 2].tolist(), strict=True):
+        _join_at_junction(order[begin : begin + use], outward, mate)
+    mate_of, unused = mate.tolist(), np.ones(count, dtype=bool).tolist()
+    starts = np.flatnonzero(mate < 0).tolist() + list(range(0, 2 * count, 2))
+    chains = []
+    for start in starts:
+        if not unused[start // 2]:
+            continue
+        chain, end = [], start
+        while end >= 0 and unused[end // 2]:
+            unused[end // 2] = False
+            chain += [end, end ^ 1]
+            end = mate_of[end ^ 1]
+        chains.append((np.array(chain), end >= 0))
+    return chains
+
+
+def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarray) -> None:
+    """Set the mates of the ends at a point where three or more segments meet."""
+    turn = np.arccos(np.clip(-outward[junction] @ outward[junction].T, -1, 1))
+    row, column = np.triu_indices(len(junction), 1)
+    for pair in np.argsort(turn[row, column], kind="stable").tolist():
+        a, b = junction[row[pair]], junction[column[pair]]
+        if turn[row[pair], column[pair]] < MAX_JUNCTION_TURN and mate[a] < 0 and mate[b] < 0:
+            mate[a], mate[b] = b, a

@@ -5,17 +5,15 @@ This imitates quick drawings by hand, in which lines continue a little too far.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
+from ..field.blocks import concatenated_ranges
 from ..field.frames import normalize
-from ..progress import progress, report
+from ..progress import report
 from ..projection.camera import Camera
-from ..projection.gbuffer import MeshInstance
-from .stroke_set import POINT_COLUMNS, Strokes, arc_lengths
+from .stroke_set import Strokes, arc_lengths
 from .tangent_mesh import TangentMesh
 from .visibility import (
     MAX_BIAS_STEEPNESS,
@@ -24,7 +22,6 @@ from .visibility import (
     pixel_counts,
     pixel_size,
     project_to_pixels,
-    rasterize_depth,
 )
 
 #: Shortest extension of an end, as a fraction of the longest.
@@ -60,10 +57,7 @@ def mark_free_boundary_ends(strokes: Strokes, mesh: TangentMesh) -> Strokes:
 
 
 def extend_free_ends(
-    strokes: Strokes,
-    camera: Camera,
-    max_pixels: float,
-    instances: Sequence[MeshInstance] | None = None,
+    strokes: Strokes, camera: Camera, max_pixels: float, depth_buffer: DepthBuffer | None
 ) -> Strokes:
     """Extend free ends in a straight line, by pseudorandom lengths.
 
@@ -76,9 +70,9 @@ def extend_free_ends(
     camera : Camera
     max_pixels : float
         Longest extension in pixels. The shortest is `MIN_EXTENSION_RATIO` of it.
-    instances : sequence of MeshInstance, optional
+    depth_buffer : DepthBuffer or None
         If given, extensions are straight in the picture. They are at the depth of the end, or on
-        the visible surface of these instances where it is nearer or continues at about that depth.
+        the visible surface where it is nearer or continues at about that depth.
         If not given, extensions are straight in world space.
 
     Returns
@@ -94,17 +88,17 @@ def extend_free_ends(
     """
     label = "extending strokes"
     report(0.0, label)
-    if instances is None:
+    if depth_buffer is None:
         strokes = strokes.subdivided(pixel_counts(strokes, camera))
         report(0.2, label)
     screen = np.nan_to_num(project_to_pixels(strokes.points, camera)[0])
-    arc = arc_lengths(np.column_stack([screen, np.zeros(len(screen))]), strokes.start)
+    arc = arc_lengths(screen, strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
     report(0.3, label)
-    extend = _extension_in_space if instances is None else _extension_in_picture
+    extend = _extension_in_space if depth_buffer is None else _extension_in_picture
     start_point, origin, step = extend(
         strokes, arc, end, np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total), camera
     )
@@ -113,15 +107,13 @@ def extend_free_ends(
     )
     length = length + np.abs(arc[end] - arc[start_point])
     is_valid = step.any(axis=1) & np.isfinite(step).all(axis=1)
-    extensions = _Extensions(
-        *(column[is_valid] for column in (start_point, side, origin, step, length))
-    )
     report(0.5, label)
-    extended, distance = _append_extensions(strokes, extensions)
-    if instances is None:
+    extended, distance = _append_extensions(
+        strokes, *(column[is_valid] for column in (start_point, side, origin, step, length))
+    )
+    report(0.9, label)
+    if depth_buffer is None:
         return extended
-    with progress(0.6, 0.9):
-        depth_buffer = rasterize_depth(instances, camera)
     return _drop_onto_surfaces(extended, distance, depth_buffer, camera)
 
 
@@ -224,11 +216,19 @@ def _extension_ratios(count: int) -> np.ndarray:
     return (MIN_EXTENSION_RATIO + (1 - MIN_EXTENSION_RATIO) * ratio).reshape(count, 2)
 
 
-class _Extensions(NamedTuple):
-    """k straight lines that replace ends of strokes.
+def _append_extensions(
+    strokes: Strokes,
+    start_point: np.ndarray,
+    side: np.ndarray,
+    origin: np.ndarray,
+    step: np.ndarray,
+    length: np.ndarray,
+) -> tuple[Strokes, np.ndarray]:
+    """Replace the ends of strokes by k straight lines.
 
-    Attributes
+    Parameters
     ----------
+    strokes : Strokes
     start_point : (k,) int64 ndarray
         Numbers of the points at which they leave the strokes.
     side : (k,) int64 ndarray
@@ -239,17 +239,6 @@ class _Extensions(NamedTuple):
         Step of one pixel, in world space.
     length : (k,) float64 ndarray
         Length in pixels.
-    """
-
-    start_point: np.ndarray
-    side: np.ndarray
-    origin: np.ndarray
-    step: np.ndarray
-    length: np.ndarray
-
-
-def _append_extensions(strokes: Strokes, extensions: _Extensions) -> tuple[Strokes, np.ndarray]:
-    """Replace the ends of strokes by extensions.
 
     Returns
     -------
@@ -258,40 +247,31 @@ def _append_extensions(strokes: Strokes, extensions: _Extensions) -> tuple[Strok
         Distance in pixels of each point from the origin of its extension; 0 for original points.
     """
     low, high = strokes.start[:-1].copy(), strokes.start[1:] - 1
-    owner, at_start = strokes.stroke[extensions.start_point], extensions.side == 0
-    low[owner[at_start]], high[owner[~at_start]] = (
-        extensions.start_point[at_start],
-        extensions.start_point[~at_start],
-    )
-    kept_points = np.arange(len(strokes.points))
-    kept_points = kept_points[
-        (kept_points >= low[strokes.stroke]) & (kept_points <= high[strokes.stroke])
-    ]
-    count = np.ceil(extensions.length / SAMPLE_STEP_PX).astype(np.int64)
-    extension = np.repeat(np.arange(len(count)), count)
-    step = np.arange(len(extension)) - np.repeat(np.cumsum(count) - count, count) + 1
-    sort_key = np.concatenate(
-        [
-            kept_points,
-            extensions.start_point[extension] + np.where(at_start[extension], -step, step),
-        ]
-    )
-    point = np.concatenate([kept_points, extensions.start_point[extension]])
-    extension_distance = (extensions.length / count)[extension] * step
-    distance = np.concatenate([np.zeros(len(kept_points)), extension_distance])
-    points = np.concatenate(
-        [
-            strokes.points[kept_points],
-            extensions.origin[extension] + extension_distance[:, None] * extensions.step[extension],
-        ]
-    )
+    owner, at_start = strokes.stroke[start_point], side == 0
+    low[owner[at_start]], high[owner[~at_start]] = start_point[at_start], start_point[~at_start]
+    kept = np.arange(len(strokes.points))
+    kept = kept[(kept >= low[strokes.stroke]) & (kept <= high[strokes.stroke])]
+    count = np.ceil(length / SAMPLE_STEP_PX).astype(np.int64)
+    line = np.repeat(np.arange(len(count)), count)
+    number = concatenated_ranges(np.ones_like(count), count)
+    sort_key = start_point[line] + np.where(at_start[line], -number, number)
+    sort_key = np.concatenate([kept, sort_key])
+    point = np.concatenate([kept, start_point[line]])
+    line_distance = (length / count)[line] * number
+    distance = np.concatenate([np.zeros(len(kept)), line_distance])
+    line_points = origin[line] + line_distance[:, None] * step[line]
+    points = np.concatenate([strokes.points[kept], line_points])
     order = np.lexsort((sort_key, strokes.stroke[point]))
     point, distance = point[order], distance[order]
-    columns = {name: getattr(strokes, name)[point] for name in POINT_COLUMNS}
-    columns["points"] = points[order]
-    columns["weights"] = np.where(distance[:, None] > 0, np.nan, columns["weights"])
+    extended = strokes.take_points(point)
     counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
-    return replace(strokes, **columns, start=np.concatenate([[0], np.cumsum(counts)])), distance
+    extended = replace(
+        extended,
+        points=points[order],
+        weights=np.where(distance[:, None] > 0, np.nan, extended.weights),
+        start=np.concatenate([[0], np.cumsum(counts)]),
+    )
+    return extended, distance
 
 
 def _drop_onto_surfaces(

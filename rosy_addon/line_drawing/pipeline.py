@@ -13,37 +13,34 @@ from ..annotation.singularity_settings import shows_singularities
 from ..cache import Cache
 from ..errors import RosyError
 from ..field.directional_field import field_symmetry
-from ..field.frames import dot
 from ..memory import check_memory
 from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads
-from .attachment import SurfacePoints, surface_points
 from .crossings import with_crossing_gaps
-from .directional_spacing import CornerSpacing, spacing_in_picture
 from .families import label_families
 from .head_on_ends import head_on_ends
-from .mesh_in_view import mesh_in_view, whole_mesh
+from .mesh_in_view import mesh_in_view, seen_triangles, triangles_near, whole_mesh
 from .outline import OUTLINE_KINDS, outline
 from .outline_visibility import clip_outline
 from .overshoot import extend_free_ends, mark_free_boundary_ends
-from .seen_triangles import seen_triangles, triangles_near
 from .smoothing import smooth
 from .spacing import (
     MAX_SPACING_RATIO,
+    CornerSpacing,
     LightSource,
     fan_vertices,
     lit_tone,
     spacing_by_curvature,
     spacing_by_tone,
+    spacing_in_picture,
     values_at_points,
     weight_by_tone,
     with_vertices_of_fans,
 )
-from .stroke_set import POINT_COLUMNS, Strokes
+from .stroke_set import Strokes
 from .style import StrokeStyle
-from .svg import Pen, simplify_mask
 from .tangent_mesh import TangentMesh, build_tangent_mesh
 from .trace import trace_on_mesh
 from .visibility import (
@@ -53,6 +50,7 @@ from .visibility import (
     pixel_size,
     project_to_pixels,
     rasterize_depth,
+    to_clip,
 )
 
 #: Width of a tapered stroke at its end, as a fraction of the full width.
@@ -69,14 +67,6 @@ MIN_SPACING_PIXELS = 0.5
 #: Bytes that tracing takes at least, and of a square of the surface as wide as the spacing, for each family:
 #: the piece of a stroke that crosses it has about 12 points of 16 float64 numbers.
 TRACING_BYTES, SQUARE_BYTES = 40_000_000, 1500
-
-#: Largest distance in pixels between a removed point and the simplified stroke, and the number of
-#: pixels that a difference of the full width counts as.
-SIMPLIFY_TOLERANCE_PX, WIDTH_WEIGHT_PX = 0.08, 2.0
-
-#: Largest tangent of the angle between the normal and the direction to the camera for which the
-#: offset toward the camera grows.
-MAX_OFFSET_STEEPNESS = 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +94,7 @@ class StrokeDrawing:
 def draw_instances(
     instances: Sequence[MeshInstance],
     camera: Camera,
-    style: StrokeStyle | None = None,
+    style: StrokeStyle,
     *,
     lights: Sequence[LightSource] = (),
     clip_to_frame: bool = True,
@@ -118,7 +108,7 @@ def draw_instances(
         Strokes are drawn on those with a field. All of them occlude.
     camera : Camera
         Its resolution also sets the length of a pixel.
-    style : StrokeStyle, optional
+    style : StrokeStyle
     lights : sequence of LightSource
         Lights of the tone, in camera space. Without lights, the light is at the camera.
     clip_to_frame : bool
@@ -137,14 +127,13 @@ def draw_instances(
         If no instance has a field, a spacing is not valid, no stroke is visible, or strokes need
         more memory than there is.
     """
-    style = style or StrokeStyle()
     cache = Cache() if cache is None else cache
     drawn = [index for index, instance in enumerate(instances) if instance.field is not None]
     if not drawn:
         raise RosyError("no object has a field: strokes need one")
-    if clip_to_frame or not style.hidden:
-        drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
     clips = clip_to_frame or not style.hidden
+    if clips:
+        drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
     depth_buffer = None
     if drawn and not style.hidden:
         label = "finding visible strokes"
@@ -152,15 +141,11 @@ def draw_instances(
             depth_buffer = rasterize_depth(instances, camera)
     traced = {}
     for rank, index in enumerate(drawn):
-        start, middle, stop = (
-            0.05 + 0.83 * (rank + done) / len(drawn) for done in (0.0, 0.05, 1.0)
-        )
-        seen = None
-        if depth_buffer is not None:
-            with progress(start, middle):
-                seen = seen_triangles(instances, index, camera, depth_buffer)
-        with progress(middle, stop):
-            strokes = _trace_instance(instances[index], camera, style, lights, clips, seen, cache)
+        start, stop = (0.05 + 0.83 * (rank + done) / len(drawn) for done in (0, 1))
+        with progress(start, stop):
+            strokes = _trace_instance(
+                instances[index], index, camera, style, lights, clips, depth_buffer, cache
+            )
         if strokes is not None:
             traced[index] = strokes
     if not traced:
@@ -172,13 +157,7 @@ def draw_instances(
         raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clips:
         with progress(0.88, 0.92):
-            strokes = clip_to_visible(
-                strokes,
-                instances,
-                camera,
-                remove_hidden=not style.hidden,
-                depth_buffer=depth_buffer,
-            )
+            strokes = clip_to_visible(strokes, camera, depth_buffer)
         with progress(0.92, 0.93):
             strokes = smooth(strokes, camera)
     if style.outline:
@@ -192,7 +171,7 @@ def draw_instances(
     heads = _arrowheads(strokes, instances, instance_of_family, style) if style.arrows else None
     if style.overshoot:
         with progress(0.95, 0.98):
-            strokes = _overshoot(strokes, instances, camera, style, clip_to_frame)
+            strokes = _overshoot(strokes, camera, style, depth_buffer, clips)
     if not len(strokes):
         raise _no_visible_stroke(camera)
     if heads is not None:
@@ -208,16 +187,18 @@ def draw_instances(
 
 def _trace_instance(
     instance: MeshInstance,
+    index: int,
     camera: Camera,
     style: StrokeStyle,
     lights: Sequence[LightSource],
     clipped: bool,
-    seen: np.ndarray | None,
+    depth_buffer: DepthBuffer | None,
     cache: Cache,
 ) -> Strokes | None:
     """Return the strokes of a mesh instance, before they are clipped; None if none can be in view.
 
-    If `seen`, (T,) bool, is given, strokes are traced only on these triangles and near them.
+    With a depth buffer, in which the instance has the number `index`, strokes are traced only on triangles
+    that are seen and near them.
     """
     label = "computing the spacing"
     report(0.0, label)
@@ -247,7 +228,9 @@ def _trace_instance(
     spacing = _corner_spacing(part.mesh, camera, style, clipped)
     values = spacing.values * part.corner_values(factor[by_fan.surface.triangle_vertex])
     spacing = replace(spacing, values=values)
-    if seen is not None:
+    if depth_buffer is not None:
+        with progress(0.09, 0.1):
+            seen = seen_triangles(instance, index, depth_buffer)
         kept = triangles_near(part.mesh, seen[part.triangle], values)
         if not part.mesh.z[kept].any():
             return None
@@ -273,7 +256,7 @@ def _trace_instance(
         strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
     if style.gaps:
         with progress(0.95, 0.98):
-            strokes = with_crossing_gaps(strokes, style.gaps, weave=True)
+            strokes = with_crossing_gaps(strokes, style.gaps)
     if style.taper:
         with progress(0.98, 0.99):
             ends = ~head_on_ends(strokes)
@@ -282,8 +265,6 @@ def _trace_instance(
         # extended are tapered after the extension.
         ends &= ~strokes.free_end_mask
         strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
-    if not style.overshoot:
-        strokes = replace(strokes, free_ends=None)
     return strokes
 
 
@@ -320,7 +301,7 @@ def _outlines(
             lines = outline(instances[index], camera)
         if clips:
             with progress(middle, clipped):
-                lines = clip_outline(lines, index, instances, camera, depth_buffer)
+                lines = clip_outline(lines, instances[index], index, camera, depth_buffer)
             with progress(clipped, stop):
                 lines = smooth(lines, camera)
         outlines.append(lines)
@@ -329,17 +310,16 @@ def _outlines(
 
 def _overshoot(
     strokes: Strokes,
-    instances: Sequence[MeshInstance],
     camera: Camera,
     style: StrokeStyle,
-    clip_to_frame: bool,
+    depth_buffer: DepthBuffer | None,
+    clips: bool,
 ) -> Strokes:
     """Extend free ends, clip the extensions to the frame, and taper these ends."""
-    occluders = None if style.hidden else instances
     with progress(0.0, 0.8):
-        strokes = extend_free_ends(strokes, camera, style.overshoot, occluders)
+        strokes = extend_free_ends(strokes, camera, style.overshoot, depth_buffer)
     report(0.8, "extending strokes")
-    if clip_to_frame or not style.hidden:
+    if clips:
         inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
         strokes = strokes.runs_where(inside, free_at_removed=False)
     return strokes.tapered(style.taper, TIP_WIDTH, strokes.free_end_mask)
@@ -403,8 +383,7 @@ def _is_in_view(points: np.ndarray, camera: Camera) -> bool:
 
     It is not if all of them are outside one plane of the view frustum. The far plane is not tested.
     """
-    matrix = camera.projection @ camera.view
-    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    clip = to_clip(points, camera)
     outside = np.abs(clip[:, :2]) > clip[:, 3:]
     outside_sides = np.concatenate(
         [outside & (clip[:, :2] > 0), outside & (clip[:, :2] < 0)], axis=1
@@ -426,113 +405,3 @@ def _merge_families_by_name(strokes: Strokes) -> Strokes:
     )
     new_family = np.array([names.index(name) for name in strokes.names], dtype=np.int32)
     return replace(strokes, family=new_family[strokes.family], names=tuple(names))
-
-
-@dataclass(frozen=True, eq=False)
-class StrokeGeometry:
-    """Strokes as curves in world space with radii and colors, ready for a Blender object.
-
-    Attributes
-    ----------
-    strokes : Strokes
-        Simplified strokes; n points in all.
-    instance_index : (S,) int32 ndarray
-        As in `StrokeDrawing`.
-    points : (n, 3) float64 ndarray
-        Points of the curves in world space, offset from the surface.
-    radius : (n,) float64 ndarray
-        Radii in world space.
-    colors : list of str
-        The color of each family.
-    places : SurfacePoints or None
-        Where the points are on their surface, if they are to follow it.
-    """
-
-    strokes: Strokes
-    instance_index: np.ndarray
-    points: np.ndarray
-    radius: np.ndarray
-    colors: list[str]
-    places: SurfacePoints | None = None
-
-
-def stroke_geometry(
-    drawing: StrokeDrawing, camera: Camera, pen: Pen, follows: MeshInstance | None = None
-) -> StrokeGeometry:
-    """Return the curves of a drawing.
-
-    Parameters
-    ----------
-    drawing : StrokeDrawing
-    camera : Camera
-    pen : Pen
-        Its width is in pixels of the camera.
-    follows : MeshInstance, optional
-        The instance that all strokes are on, if they are to follow its surface.
-    """
-    label = "simplifying strokes"
-    with progress(0.0, 0.8, label):
-        strokes = simplify_strokes(drawing.strokes, camera)
-    report(0.8, label)
-    # Hidden strokes may face away from the camera. An offset toward it would move them into the
-    # surface.
-    places = None
-    if drawing.hidden or follows is not None:
-        height = pen.width * pixel_size(strokes.points, camera)
-        points = strokes.points + height[:, None] * strokes.normal
-        if follows is not None:
-            places = surface_points(strokes, height, follows)
-    else:
-        points = offset_toward_camera(strokes, camera, pen.width)
-    radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
-    colors = pen.family_colors(strokes.names)
-    return StrokeGeometry(strokes, drawing.instance_index, points, radius, colors, places)
-
-
-def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
-    """Remove points without which strokes change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
-
-    Parameters
-    ----------
-    strokes : Strokes
-    camera : Camera
-        Camera that sets the length of a pixel.
-    """
-    pixel_length = pixel_size(strokes.points, camera)
-    min_pixel_length = np.minimum.reduceat(pixel_length, strokes.start[:-1])
-    min_pixel_length = np.maximum(min_pixel_length, 1e-3 * pixel_length.max())[strokes.stroke]
-    features = np.column_stack(
-        [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
-    )
-    kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
-    return replace(
-        strokes,
-        start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),
-        **{name: getattr(strokes, name)[kept] for name in POINT_COLUMNS},
-    )
-
-
-def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
-    """Return the points of strokes, offset toward the camera that sees them.
-
-    Their positions in the picture do not change. Ribbons of the given width that face the camera
-    are then in front of the surface. The offset grows with the angle between the surface and the
-    image plane, but the height above the surface hardly does.
-
-    Parameters
-    ----------
-    strokes : Strokes
-    camera : Camera
-    width : float
-        Width of the ribbons in pixels at the depth of each point.
-
-    Returns
-    -------
-    (n, 3) float64 ndarray
-        World space.
-    """
-    to_camera = camera.view_directions(strokes.points)
-    facing = np.abs(dot(strokes.normal, to_camera))
-    steepness = np.sqrt(np.maximum(1 - facing**2, 0)) / np.maximum(facing, 1 / MAX_OFFSET_STEEPNESS)
-    offset = width * (1 + steepness) * pixel_size(strokes.points, camera)
-    return strokes.points + offset[:, None] * to_camera

@@ -17,17 +17,19 @@ if their members match there. Their members elsewhere do not matter.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..progress import report
-from .directional_spacing import CornerSpacing
-from .growing_strokes import GrowingStrokes, StrokeSegments, Tips
-from .lateral_neighbors import find_lateral_neighbors
+from .growing_strokes import NO_TIPS, GrowingStrokes, Tips
+from .lateral_neighbors import LateralNeighbors, SeparationRules, find_lateral_neighbors
 from .path_samples import PathSamples, SampledPath
 from .samples import SAMPLE_STEP, StrokeSamples
 from .seeding import lateral_seeds, longest_open_runs
-from .separation_rules import SeparationRules
+from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles, advance
 from .tangent_mesh import TangentMesh
 
@@ -71,8 +73,10 @@ class StreamlinePlacer:
     strokes : GrowingStrokes
     tips : Tips
         The growing ends.
-    segments : list of StrokeSegments
-        The segments of all strokes, one entry for each step.
+    segments : list of tuple of ndarray
+        The segments of all strokes in the order in which they were traced, m for each step: (m,) strokes,
+        (m,) signs of their halves, and `triangle`, `begin_weights`, `end_weights` and `direction` as in
+        `TracedPath`.
 
     Raises
     ------
@@ -88,8 +92,8 @@ class StreamlinePlacer:
         self.mesh, self.spacing, self.rules = mesh, spacing, rules
         self.samples = StrokeSamples(mesh, spacing)
         self.strokes = GrowingStrokes()
-        self.tips = Tips.empty()
-        self.segments: list[StrokeSegments] = []
+        self.tips = NO_TIPS
+        self.segments: list[tuple[np.ndarray, ...]] = []
 
     # --- growing ----------------------------------------------------------------------------------
 
@@ -104,13 +108,8 @@ class StreamlinePlacer:
         tip, tip_count = traced.particle, len(tips)
         stroke, arc = tips.stroke[tip], tips.arc[tip] + traced.position.sign * traced.arc
         sample = samples.add(traced.position, stroke, arc, samples.next_steps(traced.rank))
-        neighbors = find_lateral_neighbors(
-            samples, sample, self.rules.min_separation, self.rules.max_gap, traced.previous
-        )
-        samples.remove(sample[neighbors.rejected])
-        samples.mark_covered(neighbors.covering)
+        neighbors = self._compare(sample, traced.previous)
         accepted = np.flatnonzero(~neighbors.rejected)
-        samples.add_open_sides(sample[accepted])
         strokes.extend(stroke[accepted], tips.end[tip[accepted]], arc[accepted], sample[accepted])
         traced_count = np.bincount(tip, minlength=tip_count)
         strokes.end_yielded[tips.stroke, tips.end] &= traced_count == 0
@@ -125,15 +124,27 @@ class StreamlinePlacer:
         moved = np.flatnonzero(last >= 0)
         walked = np.zeros(tip_count)
         walked[moved] = traced.arc[last[moved]]
-        self.segments.append(StrokeSegments.of_tips(tips, path.cut(walked)))
+        particle, *segments, _, _ = path.cut(walked)
+        sign = tips.sign[particle].astype(np.int8)
+        self.segments.append((tips.stroke[particle], sign, *segments))
         tips.particles.assign(moved, traced.position.take(last[moved]))
-        tips.arc += tips.particles.sign * walked
+        tips.arc += tips.sign * walked
         tips.step_scale[rejected] /= 2
         ended = np.where(rejected, tips.step_scale < MIN_STEP_SCALE, ended)
         max_length = self.rules.max_length * strokes.spacing[tips.stroke]
         ended |= strokes.length(tips.stroke) > max_length
         self._finish_tips(tips.take(np.flatnonzero(ended)))
         self.tips = tips.take(np.flatnonzero(~ended))
+
+    def _compare(self, sample: np.ndarray, previous: np.ndarray | None = None) -> LateralNeighbors:
+        """Compare new samples with others by the rules, and remove those that are rejected."""
+        neighbors = find_lateral_neighbors(
+            self.samples, sample, self.rules.min_separation, self.rules.max_gap, previous
+        )
+        self.samples.remove(sample[neighbors.rejected])
+        self.samples.mark_covered(neighbors.covering)
+        self.samples.add_open_sides(sample[~neighbors.rejected])
+        return neighbors
 
     def _trace_samples(self, sample_count: int) -> tuple[SampledPath, PathSamples, np.ndarray]:
         """Trace the next samples of all tips, without comparing them with strokes.
@@ -147,7 +158,7 @@ class StreamlinePlacer:
             Whether a tip cannot continue after its last sample.
         """
         mesh, tips, strokes = self.mesh, self.tips, self.strokes
-        step = SAMPLE_STEP * tips.step_scale * self.samples.spacing_at(tips.particles)
+        step = SAMPLE_STEP * tips.step_scale * self.samples.spacing_at(tips)
         # Both tips of a stroke may grow by all of the length that is left.
         left = self.rules.max_length * strokes.spacing[tips.stroke] - strokes.length(tips.stroke)
         count = np.where(tips.step_scale < 1, min(sample_count, MAX_RETRIED_SAMPLES), sample_count)
@@ -160,14 +171,14 @@ class StreamlinePlacer:
             max_segment_length=SAMPLES_PER_SEGMENT * step,
             max_segments=max_segments,
         )
-        path = SampledPath(path, tips.particles.sign)
+        path = SampledPath(path, tips.sign)
 
         def next_step(position: SurfaceParticles, tip: np.ndarray) -> np.ndarray:
             return SAMPLE_STEP * tips.step_scale[tip] * self.samples.spacing_at(position)
 
         traced = path.samples(step, next_step, ended)
         # In sliver triangles, a particle may walk without a change of position.
-        start = mesh.points_at(tips.particles.triangle, tips.particles.weights)
+        start = mesh.points_at(tips.triangle, tips.weights)
         points = mesh.points_at(traced.position.triangle, traced.position.weights)
         is_first = traced.previous < 0
         chord = points - np.where(
@@ -190,20 +201,13 @@ class StreamlinePlacer:
         strokes = self.strokes
         finished = strokes.finish_ends(tips.stroke, tips.end)
         min_length = self.rules.min_length * strokes.spacing[finished]
-        self._drop_strokes(finished[strokes.length(finished) < min_length])
-
-    def _drop_strokes(self, dropped: np.ndarray) -> None:
-        """Remove strokes.
-
-        The sides that they covered stay covered until `rescan`. Otherwise the same strokes would be
-        seeded again.
-        """
-        if not len(dropped):
-            return
-        self.strokes.alive[dropped] = False
-        self.samples.remove_strokes(
-            self.strokes.alive, first=int(self.strokes.seed_sample[dropped].min())
-        )
+        dropped = finished[strokes.length(finished) < min_length]
+        if len(dropped):
+            # The sides that they covered stay covered until `rescan`. Otherwise the same strokes would
+            # be seeded again.
+            strokes.alive[dropped] = False
+            first = int(strokes.seed_sample[dropped].min())
+            self.samples.remove_strokes(strokes.alive, first)
 
     def resume_yielded(self, rules: SeparationRules) -> None:
         """Change the rules, and let strokes that have yielded grow again."""
@@ -211,20 +215,12 @@ class StreamlinePlacer:
         samples = self.samples
         stroke, end = self.strokes.resume_yielded_ends()
         sample = self.strokes.end_sample[stroke, end]
-        particles = SurfaceParticles(
-            samples.triangle[sample],
-            samples.weights[sample],
-            samples.local_member[sample],
-            np.where(end > 0, 1.0, -1.0),
-        )
-        new_tips = Tips(
-            particles, stroke.astype(np.int32), samples.arc[sample], np.ones(len(stroke))
-        )
-        self.tips = Tips.concatenate(self.tips, new_tips)
+        particles = samples.particles(sample, np.where(end > 0, 1.0, -1.0))
+        self.tips = self.tips.join(Tips.at(particles, stroke, samples.arc[sample]))
 
     def suspend(self) -> None:
         """End all tips as if they had yielded. No stroke is seeded beside them before `rescan`."""
-        tips, self.tips = self.tips, Tips.empty()
+        tips, self.tips = self.tips, NO_TIPS
         self.strokes.end_yielded[tips.stroke, tips.end] = True
         self._finish_tips(tips)
         self.samples.close_open_sides()
@@ -234,18 +230,16 @@ class StreamlinePlacer:
         self.rules = rules
         samples = self.samples
         sample = samples.reset_coverage()
-        for start in range(0, len(sample), RESCAN_BATCH_SIZE):
+        for batch in row_blocks(len(sample), RESCAN_BATCH_SIZE):
             report(samples.coverage, "looking for gaps")
-            batch = sample[start : start + RESCAN_BATCH_SIZE]
-            samples.mark_covered(find_lateral_neighbors(samples, batch, 0.0, np.inf).covering)
+            neighbors = find_lateral_neighbors(samples, sample[batch], 0.0, np.inf)
+            samples.mark_covered(neighbors.covering)
         samples.add_open_sides(sample)
 
     # --- seeds ------------------------------------------------------------------------------------
 
-    def add_seeds(
-        self, particles: SurfaceParticles, parent_side: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Start strokes at the seeds that are far enough from other strokes.
+    def add_seeds(self, particles: SurfaceParticles, parent_side: np.ndarray | None = None) -> int:
+        """Start strokes at the seeds that are far enough from other strokes, and return how many.
 
         Parameters
         ----------
@@ -254,41 +248,23 @@ class StreamlinePlacer:
         parent_side : (n,) ndarray of int, optional
             The side of a stroke that a seed is beside: 2 * stroke, plus 1 for the right side; -1 if
             there is none.
-
-        Returns
-        -------
-        (n,) bool ndarray
-            Which seeds were accepted.
         """
         count = len(particles)
-        if not count:
-            return np.zeros(0, dtype=bool)
         parent_side = np.full(count, -1) if parent_side is None else parent_side
         samples, strokes = self.samples, self.strokes
         stroke = strokes.add(parent_side, samples.spacing_at(particles))
         step = samples.next_steps(np.zeros(count, dtype=np.int32))
         sample = samples.add(particles, stroke, np.zeros(count), step)
         strokes.set_seeds(stroke, sample)
-        neighbors = find_lateral_neighbors(
-            samples, sample, self.rules.min_separation, self.rules.max_gap
-        )
-        samples.remove(sample[neighbors.rejected])
-        strokes.alive[stroke[neighbors.rejected]] = False
-        samples.mark_covered(neighbors.covering)
-        accepted = np.flatnonzero(~neighbors.rejected)
-        samples.add_open_sides(sample[accepted])
+        is_accepted = ~self._compare(sample).rejected
+        strokes.alive[stroke] = is_accepted
+        accepted = np.flatnonzero(is_accepted)
         strokes.add_active_children(parent_side[accepted], 1)
+        particles, zeros = particles.take(accepted), np.zeros(len(accepted))
         for sign in (1.0, -1.0):
-            tip_particles = particles.take(accepted)
-            tip_particles.sign = np.full(len(accepted), sign)
-            new_tips = Tips(
-                tip_particles,
-                stroke[accepted].astype(np.int32),
-                np.zeros(len(accepted)),
-                np.ones(len(accepted)),
-            )
-            self.tips = Tips.concatenate(self.tips, new_tips)
-        return ~neighbors.rejected
+            half = replace(particles, sign=zeros + sign)
+            self.tips = self.tips.join(Tips.at(half, stroke[accepted], zeros))
+        return len(accepted)
 
     def seed_neighbors(self) -> int:
         """Start strokes beside existing ones, and return how many.
@@ -314,5 +290,4 @@ class StreamlinePlacer:
         samples.close_sides(nearby, nearby_side)
         particles, has_room = lateral_seeds(samples, sample, side)
         parent_side = 2 * samples.stroke[sample].astype(np.int64) + side
-        accepted = self.add_seeds(particles.take(np.flatnonzero(has_room)), parent_side[has_room])
-        return int(accepted.sum())
+        return self.add_seeds(particles.take(np.flatnonzero(has_room)), parent_side[has_room])

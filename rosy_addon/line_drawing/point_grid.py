@@ -7,7 +7,6 @@ and no query visits many cells.
 from __future__ import annotations
 
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,27 +25,12 @@ MAX_RINGS = 4
 #: Points in a block. The points of a cell are a linked list of blocks.
 BLOCK_SIZE = 16
 
+#: Queries with a direction find all points in a ball of this fraction of their radius, and others if their
+#: distance along the direction is at most the second fraction.
+INNER_RATIO, BAND_RATIO = 0.6, 0.25
+
 #: Queries that are answered at once, so that their data fit into the CPU caches.
 QUERY_BATCH_SIZE = 1 << 11
-
-
-class QueryBand(NamedTuple):
-    """Restricts n radius queries to a small ball and a band perpendicular to a direction.
-
-    Attributes
-    ----------
-    direction : (n, 3) ndarray
-        Unit direction of each query.
-    inner_ratio : float
-        Radius of the ball, as a fraction of that of the query. All points in it are returned.
-    band_ratio : float
-        Outside the ball, points are returned if their distance along the direction is at most this
-        fraction of the radius.
-    """
-
-    direction: np.ndarray
-    inner_ratio: float = 0.6
-    band_ratio: float = 0.25
 
 
 def grid_levels(radius: np.ndarray, cell: float) -> np.ndarray:
@@ -166,7 +150,7 @@ class PointGrid:
         self.position[block, :, slot] = np.nan
 
     def pairs_within(
-        self, points: np.ndarray, radius: np.ndarray, band: QueryBand | None = None
+        self, points: np.ndarray, radius: np.ndarray, direction: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Find all pairs of a query and a point of the grid within its radius.
 
@@ -176,8 +160,9 @@ class PointGrid:
             Centers of the queries.
         radius : (n,) ndarray
             Radii. Points farther than `MAX_RINGS` cells of their level may be missed.
-        band : QueryBand, optional
-            Restricts the queries.
+        direction : (n, 3) ndarray, optional
+            Unit directions. They restrict the queries to a small ball and a band perpendicular to them;
+            see `INNER_RATIO`.
 
         Returns
         -------
@@ -195,7 +180,7 @@ class PointGrid:
                 for start in range(0, len(queries), QUERY_BATCH_SIZE):
                     batch = queries[start : start + QUERY_BATCH_SIZE]
                     pairs += self._batch_pairs(
-                        points, radius * radius, batch, level, ring_count, band
+                        points, radius * radius, batch, level, ring_count, direction
                     )
         if not pairs:
             return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.int32)
@@ -208,7 +193,7 @@ class PointGrid:
         queries: np.ndarray,
         level: int,
         rings: int,
-        band: QueryBand | None,
+        direction: np.ndarray | None,
     ) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the pairs of some queries at a level: two arrays for each step along the lists.
 
@@ -218,9 +203,9 @@ class PointGrid:
         scaled = points.take(queries, axis=0) / cell
         corner = np.floor(scaled)
         ratio = np.sqrt(radius_squared.take(queries)) / cell
-        if band is not None:
-            band = band._replace(direction=band.direction.take(queries, axis=0))
-        is_reached = _reached_cells(scaled - corner, ratio, rings, band)
+        if direction is not None:
+            direction = direction.take(queries, axis=0)
+        is_reached = _reached_cells(scaled - corner, ratio, rings, direction)
         row, column = np.divmod(np.flatnonzero(is_reached), is_reached.shape[1])
         cells = corner.astype(np.int64).take(row, axis=0) + _ring_offsets(rings).take(
             column, axis=0
@@ -236,10 +221,10 @@ class PointGrid:
             distance = np.einsum("nij,nij->nj", delta, delta)
             limit = radius_squared.take(query)[:, None]
             within = distance <= limit
-            if band is not None:
-                along = np.einsum("nij,ni->nj", delta, band.direction.take(row, axis=0))
-                within &= (distance <= band.inner_ratio**2 * limit) | (
-                    along * along <= band.band_ratio**2 * limit
+            if direction is not None:
+                along = np.einsum("nij,ni->nj", delta, direction.take(row, axis=0))
+                within &= (distance <= INNER_RATIO**2 * limit) | (
+                    along * along <= BAND_RATIO**2 * limit
                 )
             hit = np.flatnonzero(within)
             hit_row, slot = np.divmod(hit, BLOCK_SIZE)
@@ -268,7 +253,7 @@ def _ring_offsets(rings: int) -> np.ndarray:
 
 
 def _reached_cells(
-    position: np.ndarray, radius: np.ndarray, rings: int, band: QueryBand | None
+    position: np.ndarray, radius: np.ndarray, rings: int, direction: np.ndarray | None
 ) -> np.ndarray:
     """Return (n, cells) bool: the cells of `_ring_offsets` that queries reach.
 
@@ -279,8 +264,8 @@ def _reached_cells(
     radius : (n,) ndarray
         In cells.
     rings : int
-    band : QueryBand, optional
-        Restricts the queries.
+    direction : (n, 3) ndarray, optional
+        As for `PointGrid.pairs_within`.
     """
     side = np.arange(-rings, rings + 1)
     beyond = np.maximum(side - position[:, :, None], position[:, :, None] - (side + 1))
@@ -289,15 +274,11 @@ def _reached_cells(
     distance = (distance + squared[:, 2, None, None, :]).reshape(len(position), -1)
     limit = (radius * radius)[:, None]
     is_reached = distance <= limit
-    if band is None:
+    if direction is None:
         return is_reached
-    to_center = (
-        band.direction @ _ring_offsets(rings).T + dot(0.5 - position, band.direction)[:, None]
-    )
-    half_width = 0.5 * np.abs(band.direction).sum(axis=1) + band.band_ratio * radius
-    is_reached &= (np.abs(to_center) <= half_width[:, None]) | (
-        distance <= band.inner_ratio**2 * limit
-    )
+    to_center = direction @ _ring_offsets(rings).T + dot(0.5 - position, direction)[:, None]
+    half_width = 0.5 * np.abs(direction).sum(axis=1) + BAND_RATIO * radius
+    is_reached &= (np.abs(to_center) <= half_width[:, None]) | (distance <= INNER_RATIO**2 * limit)
     return is_reached
 
 

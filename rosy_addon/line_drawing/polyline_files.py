@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,8 @@ from ..errors import RosyError
 from ..field.blocks import row_blocks
 from ..progress import progress, report
 from ..projection.camera import Camera
-from .pipeline import simplify_strokes
-from .stroke_set import Strokes
-from .svg import Pen
+from .stroke_set import POINT_COLUMNS, Strokes
+from .svg import Pen, simplify_mask
 from .visibility import pixel_size
 
 #: Extensions of files of strokes: a picture, and polylines in space.
@@ -21,6 +21,10 @@ DRAWING_SUFFIXES = (".svg", ".ply", ".obj", ".csv")
 
 #: Points that are formatted at once.
 POINTS_PER_BLOCK = 20_000
+
+#: Largest distance in pixels between a removed point and the simplified stroke, and the number of
+#: pixels that a difference of the full width counts as.
+SIMPLIFY_TOLERANCE_PX, WIDTH_WEIGHT_PX = 0.08, 2.0
 
 #: The properties of a vertex of a .ply file. Lengths are 8 bytes, so that no position is rounded.
 _PLY_VERTEX = np.dtype(
@@ -69,6 +73,29 @@ def polyline_file(
     contents = {".csv": _csv, ".obj": _obj, ".ply": _ply}[suffix]
     with progress(0.4, 1.0, "writing strokes"):
         return contents(strokes, points, normals, width)
+
+
+def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
+    """Remove points without which strokes change by less than `SIMPLIFY_TOLERANCE_PX` pixels.
+
+    Parameters
+    ----------
+    strokes : Strokes
+    camera : Camera
+        Camera that sets the length of a pixel.
+    """
+    pixel_length = pixel_size(strokes.points, camera)
+    min_pixel_length = np.minimum.reduceat(pixel_length, strokes.start[:-1])
+    min_pixel_length = np.maximum(min_pixel_length, 1e-3 * pixel_length.max())[strokes.stroke]
+    features = np.column_stack(
+        [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
+    )
+    kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
+    return replace(
+        strokes,
+        start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),
+        **{name: getattr(strokes, name)[kept] for name in POINT_COLUMNS},
+    )
 
 
 def check_drawing_suffix(path: str | os.PathLike[str]) -> str:

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import RosyError
+from ..field.frames import transport
 from .column_table import ColumnTable
-from .directional_spacing import CornerSpacing
 from .point_grid import PointGrid
+from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles
 from .tangent_mesh import TangentMesh
 
@@ -95,34 +96,21 @@ class StrokeSamples(ColumnTable):
         Unit member and direction in the frame of the triangle.
     """
 
-    frame: np.ndarray
-    spacing: np.ndarray
-    stroke: np.ndarray
-    arc: np.ndarray
-    step: np.ndarray
-    alive: np.ndarray
-    covered: np.ndarray
-    side_neighbor: np.ndarray
-    triangle: np.ndarray
-    weights: np.ndarray
-    local_member: np.ndarray
-    local_direction: np.ndarray
+    frame = np.empty((0, 4, 3))
+    spacing = np.empty(0)
+    stroke = np.empty(0, np.int32)
+    arc = np.empty(0)
+    step = np.empty(0, np.int32)
+    alive = np.empty(0, bool)
+    covered = np.empty((0, 2), bool)
+    side_neighbor = np.empty((0, 2), np.int32)
+    triangle = np.empty(0, np.int32)
+    weights = np.empty((0, 3))
+    local_member = np.empty(0, complex)
+    local_direction = np.empty(0, complex)
 
     def __init__(self, mesh: TangentMesh, spacing: CornerSpacing) -> None:
-        super().__init__(
-            frame=((4, 3), float),
-            spacing=((), float),
-            stroke=((), np.int32),
-            arc=((), float),
-            step=((), np.int32),
-            alive=((), bool),
-            covered=((2,), bool),
-            side_neighbor=((2,), np.int32),
-            triangle=((), np.int32),
-            weights=((3,), float),
-            local_member=((), complex),
-            local_direction=((), complex),
-        )
+        super().__init__()
         self.mesh, self.required_spacing = mesh, spacing
         mean_spacing = np.einsum("tk->t", spacing.values) / 3
         self.expected_count = (
@@ -158,6 +146,11 @@ class StrokeSamples(ColumnTable):
     def spacing_at(self, particles: SurfaceParticles) -> np.ndarray:
         """Return (n,) float64: the required spacing at particles, in world space."""
         return self.required_spacing.at(particles.triangle, particles.weights, particles.member)
+
+    def particles(self, sample: np.ndarray, sign: np.ndarray) -> SurfaceParticles:
+        """Return particles with (n,) signs at samples."""
+        columns = self.triangle, self.weights, self.local_member
+        return SurfaceParticles(*(column[sample] for column in columns), sign)
 
     # --- adding and removing ----------------------------------------------------------------------
 
@@ -215,14 +208,10 @@ class StrokeSamples(ColumnTable):
         direction = mesh.directions_at(triangle, weights, member)
         position = mesh.points_at(triangle, weights)
         normal = mesh.limited_normals_at(triangle, weights)
-        world_direction = mesh.transport_to_normal(
-            triangle, mesh.to_world(triangle, direction), normal
-        )
-        world_member = world_direction
+        flat = mesh.normal[triangle]
+        world_member = world_direction = transport(mesh.to_world(triangle, direction), flat, normal)
         if direction is not member:
-            world_member = mesh.transport_to_normal(
-                triangle, mesh.to_world(triangle, member), normal
-            )
+            world_member = transport(mesh.to_world(triangle, member), flat, normal)
         return self.append(
             frame=np.stack([position, normal, world_direction, world_member], axis=1),
             spacing=self.spacing_at(particles),

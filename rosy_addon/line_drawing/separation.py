@@ -17,10 +17,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..field.frames import dot, normalize
+from ..field.blocks import row_blocks
+from ..field.frames import dot, normalize, transport
 from ..progress import progress, report
+from .lateral_neighbors import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .point_grid import PointGrid
-from .separation_rules import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh
 
@@ -58,14 +59,14 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     mesh : TangentMesh
         The mesh on which the strokes were traced.
     strokes : Strokes
-        Strokes before `label_families`: their families are not used.
+        Strokes before `label_families`: all are in one family.
     min_length : float
         Remaining parts of cut strokes that are shorter than this are removed, in spacings.
 
     Returns
     -------
     Strokes
-        Strokes that were not cut, then the remaining parts. If any were cut, all families are 0.
+        Strokes that were not cut, then the remaining parts.
     """
     label = "separating strokes"
     with progress(0.0, 0.3, label):
@@ -89,10 +90,13 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     too_close = _dilate(refined, too_close)
     report(0.8, label)
     cut = np.unique(refined.stroke[too_close])
-    remaining = refined.runs_where(~too_close, free_at_removed=False)
+    # Of the runs, those of strokes that were not cut are left out: these stay as they were.
     is_cut = np.zeros(len(candidates), dtype=bool)
     is_cut[cut] = True
-    remaining = remaining.select(is_cut[_run_owner(refined, ~too_close)])
+    numbered = replace(refined, family=np.arange(len(refined), dtype=np.int32))
+    remaining = numbered.runs_where(~too_close, free_at_removed=False)
+    remaining = remaining.select(is_cut[remaining.family])
+    remaining = replace(remaining, family=np.zeros(len(remaining), dtype=np.int32))
     remaining = replace(remaining, weights=mesh.weights_at(remaining.triangle, remaining.points))
     remaining = remaining.select(
         remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
@@ -100,19 +104,15 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     report(0.9, label)
     untouched = np.ones(len(strokes), dtype=bool)
     untouched[candidates[cut]] = False
-    kept = strokes.select(untouched)
-    report(0.95, label)
-    result = Strokes.concatenate(kept, remaining)
-    return replace(result, family=np.zeros(len(result), dtype=np.int32), names=strokes.names)
+    return Strokes.join([strokes.select(untouched), remaining])
 
 
 def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     """Return (n,) bool: the points near which strokes may be closer than the minimum separation."""
     surface_turn = np.empty(len(strokes.points))
     suspect = _stroke_turn_per_spacing(strokes) > MAX_TURN
-    for start in range(0, len(suspect), BLOCK_POINTS):
-        report(start / len(suspect), "separating strokes")
-        block = slice(start, start + BLOCK_POINTS)
+    for block in row_blocks(len(suspect), BLOCK_POINTS):
+        report(block.start / max(len(suspect), 1), "separating strokes")
         surface_turn[block] = _surface_turn_per_spacing(mesh, strokes, block)
         suspect[block] |= _field_turn_per_spacing(mesh, strokes, block) > MAX_TURN
     suspect |= surface_turn > FOLD_ANGLE
@@ -225,9 +225,9 @@ def _too_close(
     end_distance = np.minimum(arc, length[stroke] - arc)
     queries = np.flatnonzero(suspect)
     rejected = np.zeros(len(stroke), dtype=bool)
-    for start in range(0, len(queries), BLOCK_POINTS):
-        report(start / len(queries), "separating strokes")
-        query = queries[start : start + BLOCK_POINTS]
+    for block in row_blocks(len(queries), BLOCK_POINTS):
+        report(block.start / max(len(queries), 1), "separating strokes")
+        query = queries[block]
         point, other = grid.pairs_within(refined.points[query], MIN_SEPARATION * spacing[query])
         point = query[point]
         arc_gap = np.abs(arc[point] - arc[other])
@@ -255,12 +255,12 @@ def _pairs_of_one_family(
     same_family &= dot(delta, normal_sum) ** 2 <= MAX_SLOPE**2 * dot(delta, delta) * dot(
         normal_sum, normal_sum
     )
-    member_a = mesh.transport_to_normal(refined.triangle[point], refined.member[point], normal_a)
-    member_b = mesh.transport_to_normal(refined.triangle[other], refined.member[other], normal_b)
+    members = refined.member[point], refined.member[other]
+    member_a = transport(members[0], mesh.normal[refined.triangle[point]], normal_a)
+    member_b = transport(members[1], mesh.normal[refined.triangle[other]], normal_b)
     # At sharp bends, the result depends on how directions are compared. Accept a match by transport
     # or by projection along the mean normal.
     mean_normal = normalize(normal_sum)
-    members = refined.member[point], refined.member[other]
     projected = [
         normalize(member - dot(member, mean_normal)[:, None] * mean_normal) for member in members
     ]
@@ -295,12 +295,3 @@ def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
     np.add.at(coverage, low, 1)
     np.add.at(coverage, high, -1)
     return np.cumsum(coverage[:-1]) > 0
-
-
-def _run_owner(strokes: Strokes, kept: np.ndarray) -> np.ndarray:
-    """Return the stroke of each run that `Strokes.runs_where(kept)` returns."""
-    stroke = strokes.stroke
-    starts_run = kept.copy()
-    starts_run[1:] &= ~kept[:-1] | (stroke[1:] != stroke[:-1])
-    run = np.cumsum(starts_run) - 1
-    return stroke[starts_run][np.bincount(run[kept], minlength=int(starts_run.sum())) >= 2]

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..field.blocks import concatenated_ranges
 from ..field.frames import dot, normalize
+from .tangent_mesh import TangentMesh
 
 #: The attributes of `Strokes` that have a row for each point.
 POINT_COLUMNS = (
@@ -19,7 +21,6 @@ POINT_COLUMNS = (
     "member",
     "spacing",
     "width",
-    "opacity",
 )
 
 
@@ -43,7 +44,7 @@ class Strokes:
     face : (n,) int32 ndarray
         Face of the segment that ends at each point; for a first point, of the segment after it.
     triangle : (n,) int32 ndarray
-        Triangle of the surface in which the same segment lies; -1 if there is none.
+        Triangle of the surface in which the same segment lies.
     weights : (n, 3) float64 ndarray
         Barycentric coordinates in this triangle; NaN at points that were added later.
     normal : (n, 3) float64 ndarray
@@ -54,8 +55,6 @@ class Strokes:
         Required spacing, in world space.
     width : (n,) float64 ndarray
         Width as a fraction of the full width, from 0 to 1.
-    opacity : (n,) float64 ndarray
-        From 0 to 1.
     closed : (S,) bool ndarray
         Whether the last point is the same as the first.
     free_ends : (S, 2) bool ndarray or None
@@ -74,7 +73,6 @@ class Strokes:
     member: np.ndarray
     spacing: np.ndarray
     width: np.ndarray
-    opacity: np.ndarray
     closed: np.ndarray
     free_ends: np.ndarray | None = None
 
@@ -107,22 +105,16 @@ class Strokes:
         selection = np.asarray(selection)
         selection = np.flatnonzero(selection) if selection.dtype == bool else selection
         count = np.diff(self.start)[selection]
-        start = np.concatenate([[0], np.cumsum(count)])
-        point = np.arange(start[-1]) + np.repeat(self.start[:-1][selection] - start[:-1], count)
         return replace(
-            self._take_points(point),
-            start=start,
+            self.take_points(concatenated_ranges(self.start[:-1][selection], count)),
+            start=np.concatenate([[0], np.cumsum(count)]),
             family=self.family[selection],
             closed=self.closed[selection],
             free_ends=self.free_end_mask[selection],
         )
 
-    def reordered(self, order: np.ndarray) -> Strokes:
-        """Return the strokes with their points in another order: (n,) numbers within each stroke."""
-        return self._take_points(order)
-
-    def _take_points(self, point: np.ndarray) -> Strokes:
-        """Return a copy with only some points. The caller has to replace `start` as well."""
+    def take_points(self, point: np.ndarray) -> Strokes:
+        """Return a copy with some points, by number. The caller replaces what is no longer true."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
     def runs_where(
@@ -165,7 +157,7 @@ class Strokes:
         outside = np.clip(ends + (-1, 1), 0, len(kept) - 1)
         is_whole = count[is_long] == np.diff(self.start)[owner]
         return replace(
-            self._take_points(point),
+            self.take_points(point),
             start=np.concatenate([[0], np.cumsum(count[is_long])]),
             family=self.family[owner],
             closed=self.closed[owner] & is_whole,
@@ -227,32 +219,61 @@ class Strokes:
         point = row + start[0]
         before = np.maximum(point - 1, 0)
 
-        def interpolate(values: np.ndarray) -> np.ndarray:
-            previous, result = values[before], values[point]
-            result -= previous
-            result *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-            result += previous
-            return result
-
+        divided = self.take_points(point)
+        for name in ("points", "normal", "spacing", "width"):
+            values, previous = getattr(divided, name), getattr(self, name)[before]
+            values -= previous
+            values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
+            values += previous
         # The weights of the previous point may be in another triangle, so they are not
         # interpolated.
-        weights = self.weights[point]
-        weights[fraction < 1] = np.nan
-        interpolated = {
-            name: interpolate(getattr(self, name))
-            for name in ("points", "spacing", "width", "opacity")
-        }
-        repeated = {name: getattr(self, name)[point] for name in ("face", "triangle", "member")}
+        divided.weights[fraction < 1] = np.nan
         return replace(
-            self,
-            **interpolated,
-            **repeated,
+            divided,
             start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),
             family=self.family[first:stop],
             closed=self.closed[first:stop],
             free_ends=self.free_end_mask[first:stop],
-            normal=normalize(interpolate(self.normal)),
+            normal=normalize(divided.normal),
+        )
+
+    @staticmethod
+    def on_mesh(
+        mesh: TangentMesh,
+        count: np.ndarray,
+        triangle: np.ndarray,
+        weights: np.ndarray,
+        direction: np.ndarray,
+        spacing: np.ndarray,
+        closed: bool = False,
+    ) -> Strokes:
+        """Return strokes that were traced on a mesh, in one family.
+
+        Parameters
+        ----------
+        mesh : TangentMesh
+        count : (S,) ndarray of int
+            Number of points of each stroke.
+        triangle, weights, direction : (n, ...) ndarray
+            Triangles and barycentric coordinates of the points, and unit directions of the strokes in
+            the frames of the triangles.
+        spacing : (n,) ndarray
+        closed : bool
+            Whether all of them are.
+        """
+        return Strokes(
+            points=mesh.points_at(triangle, weights),
+            start=np.concatenate([[0], np.cumsum(count)]),
+            family=np.zeros(len(count), dtype=np.int32),
+            names=("family 1",),
+            face=mesh.face[triangle],
+            triangle=triangle,
             weights=weights,
+            normal=mesh.shading_normals_at(triangle, weights),
+            member=mesh.to_world(triangle, direction),
+            spacing=spacing,
+            width=np.ones(len(triangle)),
+            closed=np.full(len(count), closed),
         )
 
     @staticmethod
@@ -274,18 +295,8 @@ class Strokes:
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
         """Return both sets. The families of the second are numbered after those of the first."""
-        free_ends = np.concatenate([first.free_end_mask, second.free_end_mask])
-        return Strokes(
-            points=np.concatenate([first.points, second.points]),
-            start=np.concatenate([first.start, second.start[1:] + first.start[-1]]),
-            family=np.concatenate([first.family, second.family + len(first.names)]),
-            names=first.names + second.names,
-            free_ends=free_ends,
-            **{
-                name: np.concatenate([getattr(first, name), getattr(second, name)])
-                for name in (*POINT_COLUMNS[1:], "closed")
-            },
-        )
+        renumbered = replace(second, family=second.family + np.int32(len(first.names)))
+        return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 
 
 def arc_lengths(points: np.ndarray, start: np.ndarray) -> np.ndarray:
@@ -293,7 +304,7 @@ def arc_lengths(points: np.ndarray, start: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    points : (n, 3) ndarray
+    points : (n, 3) or (n, 2) ndarray
     start : (S + 1,) ndarray of int
         As in `Strokes`.
     """

@@ -8,7 +8,7 @@ at its midpoint (the midpoint rule) and is short enough that the field turns lit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -63,25 +63,24 @@ class SurfaceParticles:
     def __len__(self) -> int:
         return len(self.triangle)
 
-    def take(self, indices: np.ndarray) -> SurfaceParticles:
+    def take(self, indices: np.ndarray) -> Self:
         """Return a copy of some particles."""
-        return SurfaceParticles(*(column[indices] for column in self.columns))
+        return type(self)(*(column[indices] for column in self.columns))
 
     @property
     def columns(self) -> tuple[np.ndarray, ...]:
         """The arrays, in the order of the attributes."""
-        return self.triangle, self.weights, self.member, self.sign
+        return tuple(vars(self).values())
 
     def assign(self, indices: np.ndarray, source: SurfaceParticles) -> None:
         """Overwrite the particles at `indices` with those of `source`."""
         for column, values in zip(self.columns, source.columns, strict=True):
             column[indices] = values
 
-    @staticmethod
-    def concatenate(first: SurfaceParticles, second: SurfaceParticles) -> SurfaceParticles:
+    def join(self, other: Self) -> Self:
         """Return both sets, one after the other."""
-        pairs = zip(first.columns, second.columns, strict=True)
-        return SurfaceParticles(*(np.concatenate(pair) for pair in pairs))
+        pairs = zip(self.columns, other.columns, strict=True)
+        return type(self)(*(np.concatenate(pair) for pair in pairs))
 
 
 class TracedPath(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,15 +18,11 @@ from ..annotation.singularity_marks import (
     SingularityMarks,
 )
 from ..errors import RosyError
-from ..file_io import write_bytes
 from ..progress import progress, report
 from ..projection.camera import Camera
 from .outline import OUTLINE_KINDS
 from .stroke_set import Strokes
 from .visibility import project_to_pixels
-
-#: Number of steps to which opacities are rounded.
-OPACITY_LEVELS = 16
 
 #: Widths that differ by less than this fraction of the full width are drawn as constant.
 WIDTH_TOLERANCE = 0.02
@@ -119,19 +114,6 @@ class Pen:
         ]
 
 
-def write_svg(
-    path: str | os.PathLike[str], strokes: Strokes, camera: Camera, pen: Pen | None = None
-) -> None:
-    """Write strokes to an SVG file; see `svg_text`.
-
-    Raises
-    ------
-    RosyError
-        If the file cannot be written.
-    """
-    write_bytes(path, svg_text(strokes, camera, pen).encode())
-
-
 def svg_text(
     strokes: Strokes, camera: Camera, pen: Pen | None = None, marks: SingularityMarks | None = None
 ) -> str:
@@ -152,7 +134,7 @@ def svg_text(
     -------
     str
         SVG 1.1. Each family is a group that is a layer in Inkscape, and so are the paper and the
-        singularities. A stroke is one path, or several if its opacity changes.
+        singularities. Each stroke is one path.
     """
     pen = pen or Pen()
     report(0.0, "writing strokes")
@@ -258,76 +240,33 @@ def _plotter_paths(pixels: np.ndarray, strokes: Strokes) -> list[str]:
 
 
 def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str) -> list[str]:
-    """Return the paths of strokes: a line if the width is constant, otherwise a filled outline.
-
-    A stroke is split where its opacity changes. The parts have square ends, so that they do not
-    overlap.
-    """
-    opacity_level = np.rint(np.clip(strokes.opacity, 0, 1) * OPACITY_LEVELS).astype(np.int64)
-    point, start, first = _split_by_opacity(opacity_level, strokes)
-    radius = np.clip(strokes.width[point], 0, 1) * width / 2
-    features = np.column_stack([pixels[point], radius])
+    """Return one path per stroke: a line if its width is constant, otherwise a filled outline."""
+    radius = np.clip(strokes.width, 0, 1) * width / 2
     with progress(0.1, 0.5):
-        kept = simplify_mask(features, start, SIMPLIFY_TOLERANCE_PX)
-    start = np.concatenate([[0], np.cumsum(kept)])[start]
-    points, radius = pixels[point][kept], radius[kept]
+        features = np.column_stack([pixels, radius])
+        kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
+    start = np.concatenate([[0], np.cumsum(kept)])[strokes.start]
+    points, radius = pixels[kept], radius[kept]
     min_radius, max_radius = (
         extremum.reduceat(radius, start[:-1]) for extremum in (np.minimum, np.maximum)
     )
     left, right = _offset_sides(points, radius, start)
-    stroke = strokes.stroke[first]
-    is_whole = np.bincount(stroke, minlength=len(strokes))[stroke] == 1
     paths = []
-    for piece, level in enumerate(opacity_level[first].tolist()):
-        if piece % PATHS_PER_REPORT == 0:
-            report(0.5 + 0.5 * piece / len(first), "writing strokes")
-        span = slice(start[piece], start[piece + 1])
-        if not level or not max_radius[piece]:
+    for stroke, closed in enumerate(strokes.closed.tolist()):
+        if stroke % PATHS_PER_REPORT == 0:
+            report(0.5 + 0.5 * stroke / len(strokes), "writing strokes")
+        span = slice(start[stroke], start[stroke + 1])
+        if not max_radius[stroke]:
             continue
-        attributes = "" if level == OPACITY_LEVELS else f' opacity="{level / OPACITY_LEVELS:.3g}"'
-        if is_whole[piece] and max_radius[piece] - min_radius[piece] <= WIDTH_TOLERANCE * width / 2:
-            width_px = 2 * max_radius[piece]
-            attributes += (
-                ""
-                if width_px > (1 - WIDTH_TOLERANCE) * width
-                else f' stroke-width="{width_px:.3g}"'
-            )
-            closed = strokes.closed[stroke[piece]]
-            paths.append(f'<path{attributes} d="{_line_path(points[span], closed)}"/>')
+        if max_radius[stroke] - min_radius[stroke] <= WIDTH_TOLERANCE * width / 2:
+            width_px = 2 * max_radius[stroke]
+            is_full = width_px > (1 - WIDTH_TOLERANCE) * width
+            attribute = "" if is_full else f' stroke-width="{width_px:.3g}"'
+            paths.append(f'<path{attribute} d="{_line_path(points[span], closed)}"/>')
         else:
-            attributes += f' fill={quoteattr(color)} stroke="none"'
-            ends = radius[span][[0, -1]] * is_whole[piece]
-            paths.append(f'<path{attributes} d="{_outline_path(left[span], right[span], ends)}"/>')
+            outline = _outline_path(left[span], right[span], radius[span][[0, -1]])
+            paths.append(f'<path fill={quoteattr(color)} stroke="none" d="{outline}"/>')
     return paths
-
-
-def _split_by_opacity(
-    opacity_level: np.ndarray, strokes: Strokes
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Split strokes into pieces of constant opacity. The point between two pieces belongs to both.
-
-    Returns
-    -------
-    point : (m,) int64 ndarray
-        Numbers of the points of all pieces, one piece after another.
-    start : (pieces + 1,) int64 ndarray
-        Start of each piece in `point`, then m.
-    first : (pieces,) int64 ndarray
-        Number of the first point of each piece.
-    """
-    last_of_stroke = np.zeros(len(opacity_level), dtype=bool)
-    last_of_stroke[strokes.start[1:] - 1] = True
-    starts_piece = np.ones(len(opacity_level), dtype=bool)
-    starts_piece[1:] = (opacity_level[1:] != opacity_level[:-1]) | last_of_stroke[:-1]
-    # No piece starts at the last point of a stroke: it ends the previous piece.
-    starts_piece &= ~last_of_stroke
-    first = np.flatnonzero(starts_piece)
-    end = np.append(first[1:], len(opacity_level))
-    # A piece ends at the end of its stroke, or at the first point of the next piece.
-    last = np.where(last_of_stroke[end - 1], end - 1, np.minimum(end, len(opacity_level) - 1))
-    start = np.concatenate([[0], np.cumsum(last - first + 1)])
-    point = np.arange(start[-1]) + np.repeat(first - start[:-1], last - first + 1)
-    return point, start, first
 
 
 def _offset_sides(
@@ -354,10 +293,7 @@ def _offset_sides(
 
 
 def _outline_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) -> str:
-    """Return the path data of a closed outline with round caps.
-
-    `end_radii` are the radii of the caps at the start and at the end; 0 is a square end.
-    """
+    """Return the path data of a closed outline with round caps of the radii at both ends."""
     reversed_right = right[::-1]
     return (
         f"M{_format_points(left)} "

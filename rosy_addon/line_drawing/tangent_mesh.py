@@ -117,7 +117,7 @@ class TangentMesh:
         Points outside their triangle get coordinates on its boundary.
         """
         delta = points - self.points[triangle, 0]
-        planar = dot(delta, self.x[triangle]) + 1j * dot(delta, self.y[triangle])
+        planar = self.to_frame(triangle, delta)
         weights = (self.gradient[triangle] * planar.conj()[:, None]).real
         weights[:, 0] += 1
         weights = np.maximum(weights, 0)
@@ -141,11 +141,9 @@ class TangentMesh:
         """Convert (n,) complex tangents in the frames of triangles to (n, 3) vectors."""
         return tangent.real[:, None] * self.x[triangle] + tangent.imag[:, None] * self.y[triangle]
 
-    def transport_to_normal(
-        self, triangle: np.ndarray, tangent: np.ndarray, normal: np.ndarray
-    ) -> np.ndarray:
-        """Transport (n, 3) tangents from the planes of triangles to unit normals."""
-        return transport(tangent, self.normal[triangle], normal)
+    def to_frame(self, triangle: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """Return (n,) complex128: the tangential parts of (n, 3) vectors in the frames of triangles."""
+        return dot(vectors, self.x[triangle]) + 1j * dot(vectors, self.y[triangle])
 
     def members_at(
         self, triangle: np.ndarray, weights: np.ndarray, reference: np.ndarray
@@ -192,9 +190,7 @@ class TangentMesh:
         harmonics = [
             (j, np.einsum("nk,nk->n", weights, values[triangle])) for j, values in self.harmonics
         ]
-        direction = member * evaluate_harmonics(harmonics, member)
-        norm = np.abs(direction)
-        return np.divide(direction, norm, out=member.copy(), where=norm > 0)
+        return unit(member * evaluate_harmonics(harmonics, member), member.copy())
 
 
 class SharedEdges(NamedTuple):
@@ -233,6 +229,12 @@ def shared_edges(mesh: TangentMesh) -> SharedEdges:
     triangle, edge = np.nonzero(mesh.neighbor > np.arange(len(mesh.neighbor))[:, None])
     neighbor = mesh.neighbor[triangle, edge].astype(np.intp)
     return SharedEdges(triangle, neighbor, edge, mesh.neighbor_edge[triangle, edge].astype(np.intp))
+
+
+def unit(values: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """Return (n,) complex numbers with the modulus 1; `out` holds those to return for zeros."""
+    norm = np.abs(values)
+    return np.divide(values, norm, out=out, where=norm > 0)
 
 
 def nearest_member(reference: np.ndarray, z: np.ndarray, degree: int) -> np.ndarray:
@@ -286,9 +288,7 @@ def build_tangent_mesh(
         corner_field = cached_corner_field(surface, instance.matrix, field, display, cache)
     label = "preparing the surface"
     report(0.3, label)
-    matrix = np.asarray(instance.matrix, dtype=np.float64)
-    vertices = surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    points = vertices[surface.triangle_vertex]
+    points = instance.world_points()[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
     report(0.4, label)
     corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
@@ -341,21 +341,16 @@ def build_tangent_mesh(
 def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
     """Return some triangles of a mesh; `kept` is (T,) bool. Strokes stop where there is no other."""
     number = np.where(kept, np.cumsum(kept, dtype=np.int32) - np.int32(1), np.int32(-1))
-    neighbor = mesh.neighbor[kept]
-    per_triangle = {
-        name: getattr(mesh, name)[kept]
-        for name in (
-            "points", "x", "y", "normal", "corner_normal", "face", "gradient", "z",
-            "neighbor_edge", "edge_transport", "area", "triangle_vertex",
-        )
-    }  # fmt: skip
-    return replace(
+    kept_arrays = {
+        name: values[kept] for name, values in vars(mesh).items() if isinstance(values, np.ndarray)
+    }
+    taken = replace(
         mesh,
         harmonics=tuple((j, values[kept]) for j, values in mesh.harmonics),
-        family_z=None if mesh.family_z is None else mesh.family_z[kept],
-        neighbor=np.where(neighbor >= 0, number[neighbor], np.int32(-1)),
-        **per_triangle,
+        **kept_arrays,
     )
+    neighbor = np.where(taken.neighbor >= 0, number[taken.neighbor], np.int32(-1))
+    return replace(taken, neighbor=neighbor)
 
 
 def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
@@ -372,39 +367,6 @@ def with_corners(mesh: TangentMesh, points: np.ndarray) -> TangentMesh:
         gradient=_barycentric_gradients(points, mesh.x, mesh.y, area),
         z=np.where(is_flat[:, None], 0, mesh.z),
         neighbor=np.where(is_flat[:, None] | is_flat[mesh.neighbor], np.int32(-1), mesh.neighbor),
-    )
-
-
-def corner_values(mesh: TangentMesh, values: np.ndarray | float, surface_name: str) -> np.ndarray:
-    """Return (T, 3) float64: values at the corners of triangles.
-
-    Parameters
-    ----------
-    mesh : TangentMesh
-    values : float, or (V,), (F,) or (T, 3) ndarray
-        One value, or one for each vertex, face or corner of a triangle.
-    surface_name : str
-        For the error message.
-
-    Raises
-    ------
-    RosyError
-        If the number of values is that of neither the vertices, the faces nor the corners.
-    """
-    values = np.asarray(values, dtype=np.float64)
-    shape = mesh.triangle_vertex.shape
-    if values.ndim == 0:
-        return np.full(shape, float(values))
-    if values.shape == shape:
-        return values
-    face_count, vertex_count = int(mesh.face.max()) + 1, int(mesh.triangle_vertex.max()) + 1
-    if values.shape == (face_count,):
-        return np.repeat(values[mesh.face][:, None], 3, axis=1)
-    if values.ndim == 1 and len(values) >= vertex_count:
-        return values[mesh.triangle_vertex]
-    raise RosyError(
-        f"{surface_name}: expected one value per vertex ({vertex_count}) or per face ({face_count}), "
-        f"found values of shape {values.shape}"
     )
 
 
@@ -427,13 +389,8 @@ def _barycentric_gradients(
     points: np.ndarray, x: np.ndarray, y: np.ndarray, area: np.ndarray
 ) -> np.ndarray:
     """Return the (T, 3) complex gradients of barycentric coordinates; 0 if there is no area."""
-    planar = np.stack(
-        [
-            dot(points[:, k] - points[:, 0], x) + 1j * dot(points[:, k] - points[:, 0], y)
-            for k in range(3)
-        ],
-        axis=1,
-    )
+    delta = points - points[:, :1]
+    planar = dot(delta, x[:, None]) + 1j * dot(delta, y[:, None])
     # The edge opposite to corner k, rotated inward by 90 degrees, over twice the area.
     edge = planar[:, [2, 0, 1]] - planar[:, [1, 2, 0]]
     double_area = 2 * area[:, None]
@@ -463,8 +420,7 @@ def _rotations_to_planes(
         corner_axis = axis if k == 0 else transport(axis, corner_normal[:, 0], corner_normal[:, k])
         corner_axis = transport(corner_axis, corner_normal[:, k], normal)
         rotation = dot(corner_axis, x) + 1j * dot(corner_axis, y)
-        norm = np.abs(rotation)
-        rotations[:, k] = np.divide(rotation, norm, out=np.zeros_like(rotation), where=norm > 0)
+        rotations[:, k] = unit(rotation, np.zeros_like(rotation))
     return rotations
 
 
@@ -505,9 +461,7 @@ def _adjacency(
     edge_vector = points[triangle_a, (a + 1) % 3] - points[triangle_a, a % 3]
     edge_in_a = dot(edge_vector, x[triangle_a]) + 1j * dot(edge_vector, y[triangle_a])
     edge_in_b = dot(edge_vector, x[triangle_b]) + 1j * dot(edge_vector, y[triangle_b])
-    factor = edge_in_b * edge_in_a.conj()
-    norm = np.abs(factor)
-    factor = np.divide(factor, norm, out=np.ones_like(factor), where=norm > 0)
+    factor = unit(edge_in_b * edge_in_a.conj(), np.ones_like(edge_in_a))
     neighbor[triangle_a, edge_a], neighbor[triangle_b, edge_b] = triangle_b, triangle_a
     neighbor_edge[triangle_a, edge_a], neighbor_edge[triangle_b, edge_b] = edge_b, edge_a
     edge_transport[triangle_a, edge_a], edge_transport[triangle_b, edge_b] = (

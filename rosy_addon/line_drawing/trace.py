@@ -1,4 +1,4 @@
-"""Trace evenly spaced strokes on a mesh instance, from its tangent mesh to `Strokes`."""
+"""Trace evenly spaced strokes on a tangent mesh, to `Strokes`."""
 
 from __future__ import annotations
 
@@ -6,22 +6,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..cache import Cache
 from ..errors import RosyError
 from ..progress import progress, report
-from ..projection.gbuffer import MeshInstance
 from .closed_strokes import close_loops
-from .directional_spacing import CornerSpacing
-from .families import label_families
-from .growing_strokes import StrokeSegments
+from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
-from .seeding import candidate_seeds, thinned_seeds, uncovered_seeds
+from .seeding import (
+    candidate_seeds,
+    seeds_around_singularities,
+    thinned_seeds,
+    uncovered_seeds,
+)
 from .separation import enforce_separation
-from .separation_rules import SeparationRules
-from .singularity_seeds import seeds_around_singularities
+from .spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles
-from .tangent_mesh import TangentMesh, build_tangent_mesh, corner_values
+from .tangent_mesh import TangentMesh
+
+#: Label of the progress.
+TRACING = "tracing strokes"
 
 #: Samples by which tips grow between two attempts to seed beside strokes.
 SAMPLES_PER_SEEDING = 8
@@ -42,62 +45,33 @@ FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.
 FIRST_WARMUP, SECOND_WARMUP, WARMUP_SEPARATION = (3, 3), (2, 2, 2, 2, 2), 0.6
 
 
-def trace_strokes(
-    instance: MeshInstance,
-    spacing: np.ndarray | float,
-    *,
+def trace_on_mesh(
+    mesh: TangentMesh,
+    spacing: CornerSpacing,
     rules: SeparationRules | None = None,
-    display: str = "smooth",
-    cross_creases: bool = False,
-    cache: Cache | None = None,
+    surface_name: str = "mesh",
 ) -> Strokes:
-    """Cover a mesh instance with evenly spaced strokes along its field.
+    """Cover a tangent mesh with evenly spaced strokes along its field.
 
     Parameters
     ----------
-    instance : MeshInstance
-        With a field.
-    spacing : float, or (V,), (F,) or (T, 3) array_like
-        Spacing between strokes of a family in world space: one value, or one for each vertex, face
-        or corner of a triangle.
+    mesh : TangentMesh
+    spacing : CornerSpacing
+        Spacing between strokes of a family.
     rules : SeparationRules, optional
-    display : {"smooth", "flat"}
-        As in `build_tangent_mesh`.
-    cross_creases : bool
-        As in `build_tangent_mesh`.
-    cache : Cache, optional
-        Cache for corner fields.
+    surface_name : str
+        For error messages.
 
     Returns
     -------
     Strokes
-        World space, with families.
+        World space. All are in one family; see `label_families`.
 
     Raises
     ------
     RosyError
-        If there is no field, the spacing is not above 0, or it is so small that there would be too
-        many strokes.
+        If the spacing is not above 0, or it is so small that there would be too many strokes.
     """
-    with progress(0.0, 0.1):
-        mesh = build_tangent_mesh(
-            instance, display=display, cross_creases=cross_creases, cache=cache
-        )
-    with progress(0.1, 0.95):
-        strokes = trace_on_mesh(mesh, spacing, rules, instance.surface.name)
-    with progress(0.95, 1.0):
-        return label_families(strokes, mesh)
-
-
-def trace_on_mesh(
-    mesh: TangentMesh,
-    spacing: CornerSpacing | np.ndarray | float,
-    rules: SeparationRules | None = None,
-    surface_name: str = "mesh",
-) -> Strokes:
-    """Do the same as `trace_strokes` on a tangent mesh, but do not assign families."""
-    if not isinstance(spacing, CornerSpacing):
-        spacing = CornerSpacing(corner_values(mesh, spacing, surface_name))
     if not (np.isfinite(spacing.values).all() and (spacing.values > 0).all()):
         raise RosyError(f"{surface_name}: the spacing of strokes must be above 0")
     placer = StreamlinePlacer(mesh, spacing, rules or SeparationRules())
@@ -122,14 +96,13 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     4. Let strokes that yielded at wide gaps continue, with a smaller separation.
     5. Fill the remaining gaps, with the minimum length of the rules.
     """
-    label = "tracing strokes"
     rules = placer.rules
     placer.rules = replace(
         rules, min_separation=min(WARMUP_SEPARATION, rules.min_separation), max_gap=np.inf
     )
     placer.add_seeds(seeds_around_singularities(placer.mesh, placer.spacing.values))
     for index, sample_count in enumerate(FIRST_WARMUP + SECOND_WARMUP):
-        report(0.0, label)
+        report(0.0, TRACING)
         if index == len(FIRST_WARMUP):
             placer.rules = replace(rules, max_gap=np.inf)
         if len(placer.tips):
@@ -139,20 +112,20 @@ def place_streamlines(placer: StreamlinePlacer) -> None:
     candidates = candidate_seeds(placer.mesh, placer.spacing.values)
     for seed_spacing in SEED_SPACINGS:
         _add_uncovered_seeds(placer, candidates, seed_spacing)
-        _grow_until(placer, label, STRAGGLER_RATIO)
+        _grow_until(placer, STRAGGLER_RATIO)
     placer.rescan(replace(rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
     _add_uncovered_seeds(placer, candidates, SEED_SPACINGS[-1])
-    _grow_until(placer, label, STRAGGLER_RATIO)
+    _grow_until(placer, STRAGGLER_RATIO)
     fill_rules = replace(
         rules, min_separation=FILL_SEPARATION_FACTOR * rules.min_separation, max_gap=np.inf
     )
     placer.resume_yielded(replace(fill_rules, min_length=SECOND_LENGTH_FACTOR * rules.min_length))
-    _grow_until(placer, label, STRAGGLER_RATIO)
+    _grow_until(placer, STRAGGLER_RATIO)
     placer.rescan(fill_rules)
-    _grow_until(placer, label)
+    _grow_until(placer)
     # There may be gaps that are not beside a stroke, where all were too short for the phases before.
     _add_uncovered_seeds(placer, candidates)
-    _grow_until(placer, label)
+    _grow_until(placer)
 
 
 def _add_uncovered_seeds(
@@ -173,7 +146,7 @@ def _add_uncovered_seeds(
     placer.add_seeds(seeds)
 
 
-def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0.0) -> None:
+def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
     """Alternate between steps and seeding beside strokes.
 
     It ends when fewer tips are left than `straggler_ratio` times their largest number, or when
@@ -181,7 +154,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
     """
     max_tips = 0
     while True:
-        report(placer.samples.coverage, label)
+        report(placer.samples.coverage, TRACING)
         seeded = placer.seed_neighbors()
         if not seeded and not len(placer.tips):
             if not placer.samples.has_open_sides:
@@ -189,7 +162,7 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
             # Each call closes the sides that it tried. Try others twice more.
             if not placer.seed_neighbors() and not placer.seed_neighbors():
                 return
-        report(placer.samples.coverage, label)
+        report(placer.samples.coverage, TRACING)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:
@@ -201,19 +174,14 @@ def _grow_until(placer: StreamlinePlacer, label: str, straggler_ratio: float = 0
 def collect(placer: StreamlinePlacer) -> Strokes:
     """Return the strokes of a placer. They are all in one family; see `label_families`."""
     label = "collecting strokes"
-    mesh, samples = placer.mesh, placer.samples
-    columns = []
-    for column in zip(*placer.segments, strict=True):
-        report(0.05 * len(columns), label)
-        columns.append(np.concatenate(column))
-    segments = StrokeSegments(*columns)
+    report(0.0, label)
+    samples = placer.samples
+    columns = [np.concatenate(column) for column in zip(*placer.segments, strict=True)]
     placer.segments.clear()
+    keep = np.flatnonzero(placer.strokes.alive[columns[0]])
+    stroke, sign, triangle, begin_weights, weights, direction = (column[keep] for column in columns)
     del columns
-    keep = np.flatnonzero(placer.strokes.alive[segments.stroke])
-    stroke, sign, triangle, begin_weights, weights, direction = (
-        column[keep] for column in segments
-    )
-    report(0.4, label)
+    report(0.5, label)
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.
     backward = np.flatnonzero(sign < 0)
@@ -241,23 +209,7 @@ def collect(placer: StreamlinePlacer) -> Strokes:
     weights = np.concatenate([weights, first_weights])[order]
     direction = np.concatenate([direction * sign, first_direction])[order]
     report(0.8, label)
-    row = np.searchsorted(stroke_ids, stroke)
-    points = mesh.points_at(triangle, weights)
-    start = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=len(stroke_ids)))])
+    count = np.bincount(np.searchsorted(stroke_ids, stroke), minlength=len(stroke_ids))
     spacing = placer.spacing.at(triangle, weights, direction)
-    report(0.9, label)
-    return Strokes(
-        points=points,
-        start=start,
-        family=np.zeros(len(stroke_ids), dtype=np.int32),
-        names=("family 1",),
-        face=mesh.face[triangle],
-        triangle=triangle.astype(np.int32),
-        weights=weights,
-        normal=mesh.shading_normals_at(triangle, weights),
-        member=mesh.to_world(triangle, direction),
-        spacing=spacing,
-        width=np.ones(len(points)),
-        opacity=np.ones(len(points)),
-        closed=np.zeros(len(stroke_ids), dtype=bool),
-    )
+    triangle = triangle.astype(np.int32)
+    return Strokes.on_mesh(placer.mesh, count, triangle, weights, direction, spacing)

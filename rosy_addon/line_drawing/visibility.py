@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
 from ..progress import progress, report
 from ..projection.camera import Camera
@@ -55,7 +56,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
     depth : (n,) float64 ndarray
         Depth along the axis of the camera.
     """
-    clip = _to_clip(points, camera)
+    clip = to_clip(points, camera)
     with np.errstate(divide="ignore", invalid="ignore"):
         ndc = clip[:, :2] / clip[:, 3:]
     pixels = (ndc + 1) * (np.array([camera.width, camera.height]) / 2)
@@ -76,26 +77,15 @@ def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
     return np.maximum(depth, 1e-6 * np.abs(depth).max(initial=0)) / camera.pixels_per_unit
 
 
-def clip_to_visible(
-    strokes: Strokes,
-    instances: Sequence[MeshInstance],
-    camera: Camera,
-    *,
-    remove_hidden: bool = True,
-    depth_buffer: DepthBuffer | None = None,
-) -> Strokes:
+def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer | None) -> Strokes:
     """Return the parts of strokes that are in the frame and not hidden.
 
     Parameters
     ----------
     strokes : Strokes
-    instances : sequence of MeshInstance
-        All occluders, with or without a field.
     camera : Camera
-    remove_hidden : bool
-        If false, strokes are only clipped to the frame.
-    depth_buffer : DepthBuffer, optional
-        The result of `rasterize_depth` for these instances, if it is known.
+    depth_buffer : DepthBuffer or None
+        Of all occluders. If None, strokes are only clipped to the frame.
 
     Returns
     -------
@@ -111,26 +101,19 @@ def clip_to_visible(
     differs from that at the point, by the slope times up to half a pixel. A point is also hidden if
     it is behind only one of them, but one of the two faces the camera and the other faces away.
     """
-    label = "finding visible strokes"
-    if remove_hidden and depth_buffer is None:
-        with progress(0.0, 0.3, label):
-            depth_buffer = rasterize_depth(instances, camera)
+    if depth_buffer is None:
+        return visible_runs(strokes, camera, None, 0.0, 0.0)
 
-    def find_visible(block: Strokes, pixels: np.ndarray, inside: np.ndarray) -> np.ndarray:
-        visible = inside.copy()
-        if remove_hidden:
-            visible[visible] = ~_is_hidden(block, pixels, visible, depth_buffer, camera)
-        return visible
+    def is_visible(block: Strokes, point: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+        return ~_is_hidden(block, point, pixels, depth_buffer)
 
-    min_run = MIN_RUN_PX if remove_hidden else 0.0
-    with progress(0.3, 0.9, label):
-        return visible_runs(strokes, camera, find_visible, min_run, min_run)
+    return visible_runs(strokes, camera, is_visible, MIN_RUN_PX, MIN_RUN_PX)
 
 
 def visible_runs(
     strokes: Strokes,
     camera: Camera,
-    find_visible: Callable[[Strokes, np.ndarray, np.ndarray], np.ndarray],
+    is_visible: Callable[[Strokes, np.ndarray, np.ndarray], np.ndarray] | None,
     max_gap: float,
     min_run: float,
 ) -> Strokes:
@@ -142,9 +125,10 @@ def visible_runs(
     ----------
     strokes : Strokes
     camera : Camera
-    find_visible : function
-        Returns (n,) bool for the n points of a part of the strokes, given this part, with points at
-        most `SAMPLE_STEP_PX` pixels apart, their (n, 2) pixels, and whether they are in the frame.
+    is_visible : function or None
+        Returns (m,) bool for the points of a part of the strokes that are in the frame, given this part,
+        with points at most `SAMPLE_STEP_PX` pixels apart, the (m,) numbers of these points, and their
+        (m, 2) pixels. If None, all of them are visible.
     max_gap, min_run : float
         Lengths in pixels below which hidden runs are filled and visible runs are removed.
     """
@@ -162,16 +146,13 @@ def visible_runs(
         block = strokes.subdivided(counts, first, stop)
         pixels, _ = project_to_pixels(block.points, camera)
         inside = in_frame(pixels, camera)
-        visible = find_visible(block, pixels, inside)
+        visible = inside.copy()
+        if is_visible is not None:
+            visible[inside] = is_visible(block, np.flatnonzero(inside), pixels[inside])
         order = _from_hidden_points(block, visible)
-        block, pixels, inside, visible = (
-            block.reordered(order),
-            pixels[order],
-            inside[order],
-            visible[order],
-        )
-        visible = clean_runs(visible, pixels, block.start, max_gap, min_run)
-        clipped.append(block.runs_where(visible, free_at_removed=inside))
+        block = block.take_points(order)
+        visible = clean_runs(visible[order], pixels[order], block.start, max_gap, min_run)
+        clipped.append(block.runs_where(visible, free_at_removed=inside[order]))
     report(1.0, label)
     return Strokes.join(clipped)
 
@@ -216,6 +197,9 @@ class DepthBuffer:
 
     Attributes
     ----------
+    camera : Camera
+    start : tuple of int
+        Number of the first triangle of each mesh instance, then T.
     triangle : (height, width) int32 ndarray
         Visible triangle, -1 if there is none. Row 0 is at the bottom.
     depth : (height, width) float64 ndarray
@@ -226,6 +210,8 @@ class DepthBuffer:
         Distances of their planes from the origin along the normals.
     """
 
+    camera: Camera
+    start: tuple[int, ...]
     triangle: np.ndarray
     depth: np.ndarray
     normal: np.ndarray
@@ -245,56 +231,49 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
     triangle = np.full((camera.height, camera.width), -1, dtype=np.int32)
     triangle.flat[fragments.pixel] = fragments.triangle
     depth = np.full(triangle.shape, np.inf)
-    for start in range(0, len(fragments.pixel), BLOCK_PIXELS):
+    for block in row_blocks(len(fragments.pixel), BLOCK_PIXELS):
         report(0.8, label)
-        block = slice(start, start + BLOCK_PIXELS)
         corner_depth = corners[fragments.triangle[block], :, 2]
         depth.flat[fragments.pixel[block]] = -dot(fragments.barycentric[block], corner_depth)
     report(0.9, label)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return DepthBuffer(triangle, depth, normal, dot(normal, corners[:, 0]))
+    start = tuple(accumulate((len(i.surface.triangles) for i in instances), initial=0))
+    return DepthBuffer(camera, start, triangle, depth, normal, dot(normal, corners[:, 0]))
 
 
-def _to_clip(points: np.ndarray, camera: Camera) -> np.ndarray:
+def to_clip(points: np.ndarray, camera: Camera) -> np.ndarray:
     """Return (n, 4) clip coordinates of (n, 3) points in world space."""
     matrix = camera.projection @ camera.view
     return points @ matrix[:, :3].T + matrix[:, 3]
 
 
 def _is_hidden(
-    strokes: Strokes,
-    pixels: np.ndarray,
-    in_view: np.ndarray,
-    depth_buffer: DepthBuffer,
-    camera: Camera,
+    strokes: Strokes, point: np.ndarray, pixels: np.ndarray, depth_buffer: DepthBuffer
 ) -> np.ndarray:
-    """Return which of the m points in the frame are hidden; see the notes of `clip_to_visible`.
+    """Return which points of strokes are hidden; see the notes of `clip_to_visible`.
 
     Parameters
     ----------
     strokes : Strokes
-    pixels : (n, 2) float64 ndarray
-        Pixel coordinates of all points.
-    in_view : (n,) bool ndarray
-        The points in the frame.
+    point : (m,) ndarray of int
+        Numbers of points in the frame.
+    pixels : (m, 2) float64 ndarray
+        Their pixel coordinates.
     depth_buffer : DepthBuffer
-    camera : Camera
 
     Returns
     -------
     (m,) bool ndarray
     """
-    view = camera.view
-    points = strokes.points[in_view] @ view[:3, :3].T + view[:3, 3]
-    normals = strokes.normal[in_view] @ view[:3, :3].T
-    eye = _to_eye(points, camera)
-    footprint = pixel_size(strokes.points[in_view], camera)
+    camera, points = depth_buffer.camera, strokes.points[point]
+    eye = _to_eye(_to_camera_space(points, camera), camera)
+    normals = strokes.normal[point] @ camera.view[:3, :3].T
     # Outlines do not follow a member. They face neither toward the camera nor away from it.
-    facing = np.sign(dot(normals, eye)) * strokes.member[in_view].any(axis=1)
+    facing = np.sign(dot(normals, eye)) * strokes.member[point].any(axis=1)
     hidden, behind_front = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
-    for plane in planes_around(points, pixels[in_view], footprint, depth_buffer, camera):
+    for plane in planes_around(points, pixels, depth_buffer):
         faces_away = np.sign(plane.facing) * facing < 0
-        hidden &= (plane.triangle >= 0) & (plane.distance > plane.bias)
+        hidden &= plane.hides
         # A point that faces away is behind a triangle that does not, or the reverse: at a
         # silhouette, one of the four pixels is enough, without a bias.
         behind_front |= (plane.triangle >= 0) & faces_away & (plane.distance > 0)
@@ -312,36 +291,31 @@ class PlanesAround(NamedTuple):
         Positive if the triangle faces the camera, negative if it faces away.
     distance : (n,) float64 ndarray
         Distance of the points behind the planes, along the ray of the camera.
-    bias : (n,) float64 ndarray
-        Distance up to which a plane does not hide a point.
+    hides : (n,) bool ndarray
+        Whether the distance is larger than the bias up to which a plane does not hide a point.
     """
 
     triangle: np.ndarray
     facing: np.ndarray
     distance: np.ndarray
-    bias: np.ndarray
+    hides: np.ndarray
 
 
 def planes_around(
-    points: np.ndarray,
-    pixels: np.ndarray,
-    footprint: np.ndarray,
-    depth_buffer: DepthBuffer,
-    camera: Camera,
+    points: np.ndarray, pixels: np.ndarray, depth_buffer: DepthBuffer
 ) -> Iterator[PlanesAround]:
     """Yield the planes at the four pixel centers around points.
 
     Parameters
     ----------
     points : (n, 3) float64 ndarray
-        Camera space.
+        World space.
     pixels : (n, 2) float64 ndarray
         Their pixel coordinates.
-    footprint : (n,) float64 ndarray
-        `pixel_size` at the points.
     depth_buffer : DepthBuffer
-    camera : Camera
     """
+    camera = depth_buffer.camera
+    footprint, points = pixel_size(points, camera), _to_camera_space(points, camera)
     eye = _to_eye(points, camera)
     length = np.sqrt(dot(eye, eye))
     low_pixel = np.floor(pixels - 0.5).astype(np.int64)
@@ -360,7 +334,14 @@ def planes_around(
             steepness = np.minimum(
                 np.nan_to_num(steepness, posinf=MAX_BIAS_STEEPNESS), MAX_BIAS_STEEPNESS
             )
-            yield PlanesAround(triangle, facing, distance, footprint * (DEPTH_BIAS_PX + steepness))
+            bias = footprint * (DEPTH_BIAS_PX + steepness)
+            hides = (triangle >= 0) & (distance > bias)
+            yield PlanesAround(triangle, facing, distance, hides)
+
+
+def _to_camera_space(points: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return (n, 3) points of world space in camera space."""
+    return points @ camera.view[:3, :3].T + camera.view[:3, 3]
 
 
 def _to_eye(points: np.ndarray, camera: Camera) -> np.ndarray:
@@ -389,28 +370,18 @@ def clean_runs(
     max_gap, min_run : float
         Lengths in pixels below which hidden runs are filled and visible runs are removed.
     """
-    arc = arc_lengths(np.nan_to_num(np.column_stack([pixels, np.zeros(len(pixels))])), start)
-    for value, length in ((False, max_gap), (True, min_run)):
-        visible = _flip_short_runs(visible, arc, start, value, length)
+    arc = arc_lengths(np.nan_to_num(pixels), start)
+    for value, min_length in ((False, max_gap), (True, min_run)):
+        starts_run = np.ones(len(visible), dtype=bool)
+        starts_run[1:] = visible[1:] != visible[:-1]
+        starts_run[start[:-1]] = True
+        first = np.flatnonzero(starts_run)
+        last = np.append(first[1:], len(visible)) - 1
+        flip = (visible[first] == value) & (arc[last] - arc[first] < min_length)
+        if not value:
+            # Hidden runs at the ends of strokes are not gaps between visible runs.
+            ends = np.zeros(len(visible) + 1, dtype=bool)
+            ends[start] = True
+            flip &= ~ends[first] & ~ends[last + 1]
+        visible = visible ^ flip[np.cumsum(starts_run) - 1]
     return visible
-
-
-def _flip_short_runs(
-    visible: np.ndarray, arc: np.ndarray, start: np.ndarray, value: bool, min_length: float
-) -> np.ndarray:
-    """Invert runs of `value` that are shorter than `min_length` pixels.
-
-    Hidden runs at the ends of strokes are kept: they are not gaps between visible runs.
-    """
-    starts_run = np.ones(len(visible), dtype=bool)
-    starts_run[1:] = visible[1:] != visible[:-1]
-    starts_run[start[:-1]] = True
-    first = np.flatnonzero(starts_run)
-    last = np.append(first[1:], len(visible)) - 1
-    flip = (visible[first] == value) & (arc[last] - arc[first] < min_length)
-    if not value:
-        ends = np.zeros(len(visible) + 1, dtype=bool)
-        ends[start] = True
-        flip &= ~ends[first] & ~ends[last + 1]
-    run = np.cumsum(starts_run) - 1
-    return visible ^ flip[run]

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..color import from_hex, to_linear
-from ..line_drawing.pipeline import StrokeGeometry
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from .compat import has_nodes_by_default
 from .surface_strokes import attribute_values
 
@@ -60,7 +60,7 @@ def new_curves(
     _set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
     _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colors[strokes.family])
     values = {
-        "opacity": strokes.opacity,
+        "opacity": np.ones(len(geometry.points)),
         "spacing": strokes.spacing,
         "member": strokes.member,
         "surface_normal": strokes.normal,

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 
 from ..color import from_hex, to_linear
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
-from ..line_drawing.pipeline import StrokeGeometry
 from .compat import has_grease_pencil_drawings
 from .curves import RegisterDatablock
 
@@ -66,7 +66,7 @@ def new_grease_pencil(
             np.diff(strokes.start)[stroke_mask],
             geometry.points[point_mask].astype(np.float32),
             geometry.radius[point_mask].astype(np.float32),
-            strokes.opacity[point_mask].astype(np.float32),
+            np.ones(int(point_mask.sum()), dtype=np.float32),
             material_index,
         )
     return data

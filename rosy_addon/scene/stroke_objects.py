@@ -15,7 +15,7 @@ from mathutils import Matrix
 from ..color import to_hex
 from ..compositor.family_hues import PALETTE
 from ..errors import RosyError
-from ..line_drawing.pipeline import StrokeGeometry
+from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from .compat import is_editable

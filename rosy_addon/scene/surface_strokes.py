@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..line_drawing.attachment import SurfacePoints
+from ..line_drawing.drawing_outputs import SurfacePoints
 from .node_builder import NodeBuilder
 from .owned_data import OWNED_TAG, STROKES_TAG
 

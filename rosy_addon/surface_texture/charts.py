@@ -114,8 +114,11 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
     edges = _chart_edges(mesh, corner_uv)
     with progress(0.2, 0.4):
         chart = connected_components(len(corner_uv), np.stack(edges[:2], axis=1))
+    # The rotation of the polar decomposition turns this tangent to the u axis.
+    mirrored = np.abs(conjugate) > np.abs(linear)
+    direction = _unit(np.where(mirrored, conjugate, linear.conj()))
     with progress(0.4, 1.0):
-        frame = _frames(surface, mesh, linear, conjugate, edges)
+        frame = _averaged_at_corners(surface, mesh, direction, edges)
     return UvCharts(corner_uv, linear, conjugate, gradient, chart, frame)
 
 
@@ -163,20 +166,6 @@ def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.nda
     triangle = np.arange(len(charts.linear))
     direction = _unit(charts.to_surface(triangle, np.ones(len(triangle))))
     edges = _chart_edges(mesh, charts.uv)
-    return _averaged_at_corners(surface, mesh, direction, edges)
-
-
-def _frames(
-    surface: Surface,
-    mesh: TangentMesh,
-    linear: np.ndarray,
-    conjugate: np.ndarray,
-    edges: SharedEdges,
-) -> np.ndarray:
-    """(T, 3) complex128 `UvCharts.frame`; `edges` are those of `_chart_edges`."""
-    # The rotation of the polar decomposition turns this tangent to the u axis.
-    mirrored = np.abs(conjugate) > np.abs(linear)
-    direction = _unit(np.where(mirrored, conjugate, linear.conj()))
     return _averaged_at_corners(surface, mesh, direction, edges)
 
 

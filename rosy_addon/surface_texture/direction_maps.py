@@ -21,7 +21,7 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents
 from .line_order import CombedDirections, combed_directions
-from .texel_surface import TexelSurface
+from .texels import TexelSurface
 
 #: Label of the progress.
 LABEL = "drawing directions"
@@ -39,9 +39,9 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
 
     Returns
     -------
-    (P, 3) float32 ndarray
+    (P, 4) float32 ndarray
         As stored in the file, 0 to 1: the components of a unit vector, from -1 to 1, in red and green. Blue is
-        1, and 0 where the field is undefined.
+        1, and 0 where the field is undefined. Alpha is 1.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
     with progress(0.0, 0.7):
@@ -52,7 +52,7 @@ def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.nd
         with progress(0.7, 0.8):
             tangents = uv_tangents(on.instance.surface, mesh, charts)
     is_mirrored = charts.density < 0
-    values = np.empty((len(texels), 3), dtype=np.float32)
+    values = np.ones((len(texels), 4), dtype=np.float32)
     for block in pixel_blocks(len(texels)):
         report(0.8 + 0.2 * block.start / len(texels), LABEL)
         triangle, weights = texels.triangle[block], texels.barycentric[block]
@@ -87,35 +87,16 @@ def corner_tangents(surface: Surface, field: RosyField, guiding_angle: float) ->
     """
     with progress(0.0, 0.3):
         mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
-    with progress(0.3, 1.0):
-        vectors = corner_directions(mesh, guiding_angle)
-    tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
-    tangents[surface.triangles] = vectors
-    return tangents
-
-
-def corner_directions(mesh: TangentMesh, guiding_angle: float) -> np.ndarray:
-    """Compute one direction of a field at each corner of the triangles.
-
-    Parameters
-    ----------
-    mesh : TangentMesh
-    guiding_angle : float
-        Direction that it is near to; see `line_order`.
-
-    Returns
-    -------
-    (T, 3, 3) float32 ndarray
-        Unit vectors, in world space; 0 where the field is undefined.
-    """
-    with progress(0.0, 0.8):
+    with progress(0.3, 0.9):
         combed = combed_directions(mesh, guiding_angle)
-    report(0.8, LABEL)
+    report(0.9, LABEL)
     triangle = np.repeat(np.arange(len(mesh.x)), 3)
     weights = np.tile(np.eye(3, dtype=np.float32), (len(mesh.x), 1))
     direction, is_defined = _directions_at(mesh, combed, triangle, weights)
     vectors = mesh.to_world(triangle, direction) * is_defined[:, None]
-    return vectors.reshape(-1, 3, 3).astype(np.float32)
+    tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
+    tangents[surface.triangles] = vectors.reshape(-1, 3, 3)
+    return tangents
 
 
 def _directions_at(

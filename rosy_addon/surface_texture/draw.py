@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache
+from ..cache import BAKE_CACHE, Cache
 from ..compositor.color_values import (
     check_color_values,
     scaled_positions,
@@ -25,6 +25,7 @@ from ..compositor.look_units import look_on_surface
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
 from ..errors import RosyError
+from ..image_io.image_data import ImageData, image_of_pixels
 from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from ..memory import (
     PIXEL_BYTES,
@@ -40,12 +41,11 @@ from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
 from .direction_maps import direction_map
-from .hatching import hatching
+from .hatching import lit_ink, thresholds
 from .margin import fill_margin
 from .texel_field import texel_field
 from .texel_noise import texel_noise
-from .texel_surface import TexelSurface
-from .texels import Texels, TextureFrame, rasterize_charts, texture_frame
+from .texels import Texels, TexelSurface, TextureFrame, rasterize_charts, texture_frame
 
 #: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
 #: mesh fills has lines of about the same width.
@@ -98,6 +98,9 @@ DIRECTION_SETTINGS = ("display", "cross_creases", "crease_angle", "guiding_angle
 #: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
 
+#: Share of the time after which a texture is drawn.
+CONVERSION_START = 0.95
+
 
 @dataclass(frozen=True, eq=False)
 class Texture:
@@ -134,13 +137,9 @@ class Texture:
 
     def tiles(self) -> dict[int, np.ndarray]:
         """Return the (size, size, 4) picture of each tile, by its UDIM number."""
-        if not self.frame.is_udim:
-            return {self.frame.tile_names()[0]: self.rgba}
-        size = self.frame.size
-        return {
-            name: self.rgba[row * size : (row + 1) * size]
-            for row, name in enumerate(self.frame.tile_names())
-        }
+        # All tiles of a texture that is not of the kind UDIM show the picture of the first one.
+        pictures = np.split(self.rgba, len(self.rgba) // self.frame.size)
+        return dict(zip(self.frame.tile_names(), pictures, strict=False))
 
 
 def draw_texture(
@@ -212,29 +211,28 @@ def draw_texture(
     with progress(0.1, 0.15):
         texels = rasterize_charts(charts, frame, name)
     step = step_length(mesh, charts, texels)
-    crease_angle = None if look.cross_creases else look.crease_angle
-    with progress(0.15, 0.3):
-        field = texel_field(mesh, charts, texels, step, crease_angle)
     on = TexelSurface(instance, mesh, charts, texels, step)
+    with progress(0.15, 0.3):
+        field = texel_field(on, None if look.cross_creases else look.crease_angle)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
     surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"
-    if is_direction:
-        draw, is_data = partial(direction_map, on, content, look.guiding_angle), True
-    elif is_hatched(look):
-        draw = partial(hatching, on, field, surface_look, look.guiding_angle, lights, cache)
-        is_data = lights is None
-    else:
-        draw, is_data = partial(_colors, on, field, surface_look), False
-    with progress(0.3, 0.95):
-        pixels = draw()
+    is_ink = is_hatched(look) and not is_direction
+    with progress(0.3, 0.9):
+        if is_direction:
+            pixels = direction_map(on, content, look.guiding_angle)
+        elif is_ink:
+            pixels = thresholds(on, field, surface_look, look.guiding_angle, cache)
+        else:
+            pixels = _colors(on, field, surface_look)
+    is_lit = is_ink and lights is not None
+    if is_lit:
+        with progress(0.9, 0.95):
+            pixels = lit_ink(on, pixels, lights, surface_look)
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
-        image = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
-    if image.shape[2] == 4:
-        return Texture(frame, image, texels.overlap, is_data, mesh.family_count)
-    rgba = np.ones((*image.shape[:2], 4), dtype=np.float32)
-    rgba[..., :3] = image
+        rgba = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
+    is_data = is_direction or (is_ink and not is_lit)
     return Texture(frame, rgba, texels.overlap, is_data, mesh.family_count)
 
 
@@ -290,7 +288,7 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
 
 
 def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
-    """(P, 3) linear colors of the field at texels."""
+    """(P, 4) linear colors of the field at texels, and 1."""
     with progress(0.0, 0.3):
         noise = texel_noise(on, look)
     with progress(0.3, 0.95):
@@ -304,8 +302,70 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
         values = values_in_triangles(on.instance, texels.triangle, texels.barycentric)
         low, scale = value_scale(look, [value_range(on.instance.color_values)])
         field = replace(field, map_position=scaled_positions(values, low, scale))
-    color = np.empty((len(field.pixel), 3), dtype=np.float32)
+    color = np.ones((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(color)):
         report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
-        color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
+        part = field.part(block), images.part(block), layer.tone[block]
+        color[block, :3] = colorize(*part, look)
     return color
+
+
+class TextureSettings(NamedTuple):
+    """How a texture is drawn; see `draw_texture`."""
+
+    size: int = DEFAULT_SIZE
+    margin: int = DEFAULT_MARGIN
+    is_udim: bool = False
+    content: str = "look"
+
+
+class TextureImages(NamedTuple):
+    """A texture as images of Blender store it.
+
+    Attributes
+    ----------
+    tiles : dict of int to ImageData
+        By their UDIM numbers.
+    is_data, line_count
+        As for `Texture`.
+    note : str
+        See `Texture.overlap_note`.
+    """
+
+    tiles: dict[int, ImageData]
+    is_data: bool
+    line_count: int
+    note: str
+
+
+def draw_texture_images(
+    instance: MeshInstance,
+    uv: np.ndarray,
+    look: Look,
+    settings: TextureSettings,
+    lights: Sequence[Light] | None,
+    as_float: bool,
+) -> TextureImages:
+    """Draw a texture with the cache of bakes in the process that calls it.
+
+    Parameters
+    ----------
+    instance, uv, look, lights
+        As for `draw_texture`.
+    settings : TextureSettings
+    as_float : bool
+        Store linear values in single precision (.exr) instead of 8 bits (.png).
+    """
+    with progress(0.0, CONVERSION_START):
+        texture = draw_texture(
+            instance, uv, look, **settings._asdict(), lights=lights, cache=BAKE_CACHE
+        )
+    BAKE_CACHE.evict_over_limit()
+    pixels, tiles = texture.tiles(), {}
+    for index, (number, rgba) in enumerate(pixels.items()):
+        extent = (1.0 - CONVERSION_START) / len(pixels)
+        start = CONVERSION_START + extent * index
+        with progress(start, start + extent):
+            tiles[number] = image_of_pixels(rgba, as_float, is_color=not texture.is_data)
+    note = texture.overlap_note(instance.surface.name)
+    return TextureImages(tiles, texture.is_data, texture.line_count, note)

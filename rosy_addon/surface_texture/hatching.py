@@ -47,7 +47,7 @@ from ..projection.surface_lines import MAX_TRIANGLES, SurfaceLines, cached_surfa
 from .line_order import first_line_weights, line_order
 from .texel_field import frames_at
 from .texel_noise import texel_noise
-from .texel_surface import TexelSurface
+from .texels import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
 SWAP_GRAINS = 8.0
@@ -64,11 +64,7 @@ LABEL = "drawing hatching"
 
 
 def thresholds(
-    on: TexelSurface,
-    field: PixelField,
-    look: Look,
-    guiding_angle: float,
-    cache: Cache | None = None,
+    on: TexelSurface, field: PixelField, look: Look, guiding_angle: float, cache: Cache | None
 ) -> np.ndarray:
     """Compute the thresholds of hatching at texels.
 
@@ -81,7 +77,7 @@ def thresholds(
         With ink, in steps of streamlines.
     guiding_angle : float
         Direction of the lines that come first; see `line_order`.
-    cache : Cache, optional
+    cache : Cache or None
         Stores evenly spaced lines.
 
     Returns
@@ -119,36 +115,6 @@ def thresholds(
         if part.even_lines is not None:
             resolved = resolved_share(part.even_lines.period.min(axis=0))
         pixels[block] = threshold_pixels(ordered, resolved)
-    return pixels
-
-
-def hatching(
-    on: TexelSurface,
-    field: PixelField,
-    look: Look,
-    guiding_angle: float,
-    lights: Sequence[Light] | None = None,
-    cache: Cache | None = None,
-) -> np.ndarray:
-    """Draw hatching at texels: its thresholds, or its ink for some lights.
-
-    Parameters
-    ----------
-    on, field, look, guiding_angle, cache
-        As for `thresholds`.
-    lights : sequence of Light, optional
-        In world space.
-
-    Returns
-    -------
-    (P, 4) float32 ndarray
-        From `thresholds` or `lit_ink`.
-    """
-    with progress(0.0, 0.95):
-        pixels = thresholds(on, field, look, guiding_angle, cache)
-    if lights is not None:
-        with progress(0.95, 1.0):
-            pixels = lit_ink(on, pixels, lights, look)
     return pixels
 
 
@@ -283,10 +249,8 @@ def _even_lines(
             cache,
             max_triangles,
         )
-    sides = on.mesh.points[:, 1:] - on.mesh.points[:, :1]
-    sides = np.einsum("tkj,tj->kt", sides, on.mesh.x) + 1j * np.einsum(
-        "tkj,tj->kt", sides, on.mesh.y
-    )
+    triangles, corners = np.arange(len(on.mesh.points)), on.mesh.points
+    sides = [on.mesh.to_frame(triangles, corners[:, k] - corners[:, 0]) for k in (1, 2)]
     members = all_members(field, look.guiding_angle)
     streaks, period = np.empty((2, field.line_count, len(texels)), dtype=np.float32)
     jacobian = field.screen_jacobian

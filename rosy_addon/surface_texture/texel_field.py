@@ -10,15 +10,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
+from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..field.representation import power, signed_power
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
-from ..line_drawing.tangent_mesh import TangentMesh
+from ..line_drawing.tangent_mesh import unit
 from ..progress import progress, report
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import UvCharts
-from .texels import Texels
+from .texels import TexelSurface
 
 #: Neighboring texels are also neighbors on the surface if their distance there is at most this many
 #: times what the UV map stretches their distance to.
@@ -38,18 +39,12 @@ SEAM_BLOCK = 1 << 14
 LABEL = "following the surface across seams"
 
 
-def texel_field(
-    mesh: TangentMesh, charts: UvCharts, texels: Texels, step: float, crease_angle: float | None
-) -> PixelField:
+def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
     """Compute the field at texels.
 
     Parameters
     ----------
-    mesh : TangentMesh
-    charts : UvCharts
-    texels : Texels
-    step : float
-        Length of a step of streamlines, in Blender units.
+    on : TexelSurface
     crease_angle : float or None
         Streamlines end where the normals of neighboring texels differ by more than this angle, in
         radians. None if they cross creases.
@@ -60,7 +55,8 @@ def texel_field(
         Its `screen_jacobian` maps unit tangents to steps in texels, which are foreshortened where the
         UV map is coarse.
     """
-    count, size, degree = len(texels), texels.frame.size, mesh.degree
+    mesh, charts, texels = on.mesh, on.charts, on.texels
+    count, degree = len(texels), mesh.degree
     z = np.empty(count, dtype=np.complex64)
     jacobian = np.empty((2, count), dtype=np.complex64).T
     channels: dict[FieldChannel, np.ndarray] = {
@@ -69,7 +65,7 @@ def texel_field(
     family = ("family", mesh.family_count)
     if mesh.family_z is not None:
         channels[family] = np.empty(count, dtype=np.complex64)
-    to_texels = size * step
+    to_texels = texels.frame.size * on.step
     corner_z = mesh.z.astype(np.complex64)
     corner_harmonics = [(number, values.astype(np.complex64)) for number, values in mesh.harmonics]
     for block in pixel_blocks(count):
@@ -87,9 +83,9 @@ def texel_field(
             turn = signed_power(frame.conj(), rotation_order(family, degree))
             channels[family][block] = mesh.family_z[triangle] * turn
     with progress(0.3, 0.7):
-        mask = _neighbor_masks(mesh, charts, texels, z != 0, crease_angle)
+        mask = _neighbor_masks(on, z != 0, crease_angle)
     with progress(0.7, 1.0):
-        seam_steps = _find_seam_steps(mesh, charts, texels, mask, z != 0)
+        seam_steps = _find_seam_steps(on, mask, z != 0)
     return PixelField(
         degree=degree,
         width=texels.frame.width,
@@ -117,13 +113,10 @@ def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np
 
 
 def _neighbor_masks(
-    mesh: TangentMesh,
-    charts: UvCharts,
-    texels: Texels,
-    defined: np.ndarray,
-    crease_angle: float | None,
+    on: TexelSurface, defined: np.ndarray, crease_angle: float | None
 ) -> np.ndarray:
     """(P,) uint16 `PixelField.neighbor_mask`: the neighbors in the same chart, near on the surface."""
+    mesh, charts, texels = on.mesh, on.charts, on.texels
     masks = np.zeros(len(texels), dtype=np.uint16)
     # Squared length on the surface that a texel is stretched to at most.
     stretch = charts.stretch()[1] * texels.frame.size
@@ -178,10 +171,9 @@ def _neighbor_masks(
     return masks
 
 
-def _find_seam_steps(
-    mesh: TangentMesh, charts: UvCharts, texels: Texels, mask: np.ndarray, defined: np.ndarray
-) -> SeamSteps:
+def _find_seam_steps(on: TexelSurface, mask: np.ndarray, defined: np.ndarray) -> SeamSteps:
     """Trace the steps that `mask` does not have along the surface."""
+    texels = on.texels
     entry = np.full(texels.frame.width * texels.frame.height, -1, dtype=np.int32)
     entry[texels.index] = np.arange(len(texels), dtype=np.int32)
     border = np.flatnonzero(defined & (mask != 0b111_111_111))
@@ -189,31 +181,15 @@ def _find_seam_steps(
     source, bit = border[source].astype(np.int32), bit.astype(np.uint8)
     offsets = np.array([dx + 1j * dy for dx, dy in NEIGHBOR_OFFSETS])
     parts = []
-    for start in range(0, len(source), SEAM_BLOCK):
-        report(start / len(source), LABEL)
-        part = slice(start, start + SEAM_BLOCK)
-        parts.append(
-            _seam_steps(
-                mesh, charts, texels, defined, entry, source[part], bit[part], offsets[bit[part]]
-            )
-        )
-    if not parts:
-        return _no_seam_steps()
+    for part in row_blocks(len(source), SEAM_BLOCK):
+        report(part.start / max(len(source), 1), LABEL)
+        steps = source[part], bit[part], offsets[bit[part]]
+        parts.append(_seam_steps(on, defined, entry, *steps))
     return SeamSteps(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _no_seam_steps() -> SeamSteps:
-    """Return no steps: the UV map has no seam that streamlines could cross."""
-    integer, number = np.empty(0, np.int32), np.empty(0, np.complex64)
-    return SeamSteps(
-        integer, np.empty(0, np.uint8), integer, number, number, number, np.empty(0, np.float32)
-    )
-
-
 def _seam_steps(
-    mesh: TangentMesh,
-    charts: UvCharts,
-    texels: Texels,
+    on: TexelSurface,
     defined: np.ndarray,
     entry: np.ndarray,
     source: np.ndarray,
@@ -229,22 +205,22 @@ def _seam_steps(
     entry : (H W,) int32 ndarray
         The texel at each place of the frame, or -1.
     """
+    mesh, charts, texels = on.mesh, on.charts, on.texels
     size = texels.frame.size
     triangle = texels.triangle[source]
     weights = texels.barycentric[source].astype(np.float64)
     tangent = charts.to_surface(triangle, offset / size)
-    length = np.abs(tangent)
+    length, ahead = np.abs(tangent), unit(tangent, np.ones_like(tangent))
     frame = frames_at(charts, triangle, weights)
-    unit = np.divide(tangent, length, out=np.ones_like(tangent), where=length > 0)
     start = SurfaceParticles(triangle, weights, frame.copy(), np.ones(len(source)))
-    end, direction, walked = trace_geodesics(mesh, start, unit, length)
+    end, direction, walked = trace_geodesics(mesh, start, ahead, length)
     arrived = (walked >= MIN_WALKED_RATIO * length) & (length > 0)
     uv = np.einsum("nk,nk->n", end.weights, charts.uv[end.triangle]) * size
-    target, reached = _nearest_texels(charts, texels, entry, end.triangle, uv)
+    target, reached = _nearest_texels(on, entry, end.triangle, uv)
     arrived &= target >= 0
     arrived[arrived] &= defined[target[arrived]]
     # Tangents are rotated by this from the frame of the one triangle to that of the other.
-    turn = direction * unit.conj()
+    turn = direction * ahead.conj()
     back, back_conjugate = charts.inverse(triangle)
     ahead, ahead_conjugate = charts.linear[end.triangle], charts.conjugate[end.triangle]
     linear = ahead * turn * back + ahead_conjugate * (turn * back_conjugate).conj()
@@ -264,7 +240,7 @@ def _seam_steps(
 
 
 def _nearest_texels(
-    charts: UvCharts, texels: Texels, entry: np.ndarray, triangle: np.ndarray, uv: np.ndarray
+    on: TexelSurface, entry: np.ndarray, triangle: np.ndarray, uv: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Find the texel of the same chart that is nearest to each point of the UV plane.
 
@@ -283,18 +259,15 @@ def _nearest_texels(
         The point, relative to the center of that texel.
     """
     column, row = np.floor(uv.real).astype(np.intp), np.floor(uv.imag).astype(np.intp)
-    best = np.full(len(uv), np.inf)
+    chart, best = on.charts.chart, np.full(len(uv), np.inf)
     texel, offset = np.full(len(uv), -1, dtype=np.int32), np.zeros(len(uv), dtype=np.complex128)
     for dx, dy in NEIGHBOR_OFFSETS:
-        index = texels.frame.flat_indices(column + dx, row + dy)
+        index = on.texels.frame.flat_indices(column + dx, row + dy)
         candidate = np.where(index >= 0, entry.take(np.maximum(index, 0)), -1)
-        same = charts.chart.take(texels.triangle.take(candidate)) == charts.chart.take(triangle)
+        same = chart.take(on.texels.triangle.take(candidate)) == chart.take(triangle)
         delta = uv - (column + dx + 0.5 + 1j * (row + dy + 0.5))
         distance = np.where((candidate >= 0) & same, np.abs(delta), np.inf)
         nearer = distance < best
-        best[nearer], texel[nearer], offset[nearer] = (
-            distance[nearer],
-            candidate[nearer],
-            delta[nearer],
-        )
+        for values, new in ((best, distance), (texel, candidate), (offset, delta)):
+            values[nearer] = new[nearer]
     return texel, offset

@@ -13,7 +13,7 @@ from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..progress import report
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
-from .texel_surface import TexelSurface
+from .texels import TexelSurface
 
 #: Smallest side of a cell of the noise, in texels of the coarser direction.
 MIN_CELL_TEXELS = 1.0

@@ -10,12 +10,12 @@ from rosy.rosy_addon.field.surface import build_surface
 from rosy.rosy_addon.line_drawing.pipeline import draw_instances
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
 from rosy.rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy.rosy_addon.line_drawing.trace import trace_strokes
 from rosy.rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy.rosy_addon.projection.camera import orbit_camera
 from rosy.rosy_addon.projection.gbuffer import MeshInstance
 from rosy.tests.harness.outline_marks import visible_silhouettes
 from rosy.tests.harness.stroke_spacing import lateral_gaps
+from rosy.tests.harness.stroke_tracing import trace_strokes
 from scipy.spatial import cKDTree
 
 

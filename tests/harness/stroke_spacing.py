@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.frames import dot, normalize, transport
 from rosy_addon.line_drawing.point_grid import PointGrid
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
@@ -112,12 +112,16 @@ def _measure(
     same_family = np.abs(height) < 0.5 * np.sqrt(dot(delta, delta))
     sample_a, sample_b = sample[same_family], other[same_family]
     same_family[same_family] = mesh.is_same_family(
-        mesh.transport_to_normal(
-            samples.triangle[sample_a], samples.member[sample_a], samples.normal[sample_a]
+        transport(
+            samples.member[sample_a],
+            mesh.normal[samples.triangle[sample_a]],
+            samples.normal[sample_a],
         ),
         samples.normal[sample_a],
-        mesh.transport_to_normal(
-            samples.triangle[sample_b], samples.member[sample_b], samples.normal[sample_b]
+        transport(
+            samples.member[sample_b],
+            mesh.normal[samples.triangle[sample_b]],
+            samples.normal[sample_b],
         ),
         samples.normal[sample_b],
     )

@@ -6,6 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import visible_strokes
 from shapes import cube, icosphere, moved, plane
 
 from rosy_addon.field.frames import dot, normalize
@@ -16,7 +17,7 @@ from rosy_addon.line_drawing.overshoot import MIN_EXTENSION_RATIO, extend_free_e
 from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen, svg_text
-from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels, rasterize_depth
+from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
@@ -290,7 +291,11 @@ def test_extensions_of_short_strokes_and_for_plotters():
     traced = draw_instances([SQUARE], TOP_CAMERA, StrokeStyle(spacing=6, taper=0)).strokes
     short = traced.runs_where(np.abs(traced.points[:, 0]) < 0.02)
     assert short.free_end_mask.all()
-    growth = pixel_growth(short, extend_free_ends(short, TOP_CAMERA, 100.0, [SQUARE]), TOP_CAMERA)
+    growth = pixel_growth(
+        short,
+        extend_free_ends(short, TOP_CAMERA, 100.0, rasterize_depth([SQUARE], TOP_CAMERA)),
+        TOP_CAMERA,
+    )
     # Each end is extended by half the length, so strokes become twice as long.
     assert np.allclose(growth, 100 * short.length)
 
@@ -300,7 +305,7 @@ def test_ends_of_traced_strokes_are_not_free():
     traced = draw_instances([SQUARE], TOP_CAMERA, StrokeStyle(spacing=6, taper=0)).strokes
     assert (
         not traced.free_end_mask.any()
-        and not clip_to_visible(traced, [SQUARE], TOP_CAMERA).free_end_mask.any()
+        and not visible_strokes(traced, [SQUARE], TOP_CAMERA).free_end_mask.any()
     )
 
 

@@ -8,10 +8,10 @@ from shapes import icosphere, plane
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.line_drawing import placement
-from rosy_addon.line_drawing.directional_spacing import CornerSpacing
+from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.path_samples import SampledPath
 from rosy_addon.line_drawing.seeding import candidate_seeds, thinned_seeds
-from rosy_addon.line_drawing.separation_rules import SeparationRules
+from rosy_addon.line_drawing.spacing import CornerSpacing
 from rosy_addon.line_drawing.surface_particles import advance
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.projection.gbuffer import MeshInstance

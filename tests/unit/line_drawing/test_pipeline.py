@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import trace_strokes
 from listeners import cancel_at
 from shapes import from_triangles, icosphere, moved, plane
 
@@ -14,16 +15,12 @@ from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
-from rosy_addon.line_drawing.pipeline import (
-    draw_instances,
-    offset_toward_camera,
-    simplify_strokes,
-    stroke_geometry,
-)
+from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
+from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.polyline_files import simplify_strokes
 from rosy_addon.line_drawing.spacing import lit_tone
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
-from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
 from rosy_addon.progress import listening
 from rosy_addon.projection.camera import (

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import long
+from harness.stroke_tracing import visible_strokes
 from shapes import icosphere, plane, torus
 
 from rosy_addon.field.generate import generate
-from rosy_addon.line_drawing.pipeline import draw_instances
-from rosy_addon.line_drawing.seen_triangles import (
+from rosy_addon.line_drawing.mesh_in_view import (
     HIDDEN_MARGIN,
     seen_triangles,
     triangles_near,
 )
+from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.visibility import (
-    clip_to_visible,
     in_frame,
     project_to_pixels,
     rasterize_depth,
@@ -33,7 +33,7 @@ def instance(surface, location=(0, 0, 0)):
 
 
 def seen(instances, index, camera):
-    return seen_triangles(instances, index, camera, rasterize_depth(instances, camera))
+    return seen_triangles(instances[index], index, rasterize_depth(instances, camera))
 
 
 SIDE = perspective_camera(look_at((0, -6, 1.5), (0, 0, 0)), 240, 180)
@@ -106,7 +106,7 @@ def test_strokes_in_view_are_as_dense_as_those_of_the_whole_surface(surface):
         camera = orthographic_camera(look_at(eye, (0, 0, 0)), 400, 400, scale=2.6)
         drawn = draw_instances(instances, camera, StrokeStyle(spacing=10)).strokes
         whole = draw_instances(instances, camera, StrokeStyle(spacing=10, hidden=True)).strokes
-        whole = clip_to_visible(whole, instances, camera)
+        whole = visible_strokes(whole, instances, camera)
         lengths = [length_by_cell(strokes, camera, 50) for strokes in (drawn, whole)]
         totals.append([length.sum() for length in lengths])
         full = lengths[1] > 0.5 * np.percentile(lengths[1], 95)

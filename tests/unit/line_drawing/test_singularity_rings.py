@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from harness.stroke_tracing import trace_strokes
 from shapes import plane
 
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.projection.gbuffer import MeshInstance
 
 

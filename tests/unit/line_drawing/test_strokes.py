@@ -12,6 +12,7 @@ import pytest
 from conftest import long, mainly
 from field_helpers import bumpy
 from harness.stroke_spacing import lateral_gaps
+from harness.stroke_tracing import trace_strokes, visible_strokes
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
@@ -25,17 +26,16 @@ from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
-from rosy_addon.line_drawing.directional_spacing import spacing_in_picture
 from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.head_on_ends import head_on_ends
 from rosy_addon.line_drawing.outline import outline
+from rosy_addon.line_drawing.seeding import singularities
 from rosy_addon.line_drawing.separation import enforce_separation
-from rosy_addon.line_drawing.separation_rules import SeparationRules
-from rosy_addon.line_drawing.singularity_seeds import singularities
 from rosy_addon.line_drawing.spacing import (
     headlight_tone,
     spacing_by_curvature,
     spacing_by_tone,
+    spacing_in_picture,
     values_at_points,
     weight_by_tone,
 )
@@ -43,7 +43,6 @@ from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.line_drawing.trace import trace_strokes
 from rosy_addon.line_drawing.visibility import clip_to_visible, project_to_pixels
 from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -232,7 +231,7 @@ def test_strokes_look_like_the_render():
     instance = instance_of(icosphere(4), 4, kind="smoothest")
     camera = orbit_camera(instance.surface, 20, 30, 900, 900, perspective=False)
     gbuffer = project([instance], camera)
-    visible = clip_to_visible(trace_strokes(instance, 0.1), [instance], camera)
+    visible = visible_strokes(trace_strokes(instance, 0.1), [instance], camera)
     end = np.flatnonzero(np.diff(visible.stroke, prepend=-1) == 0)
     pixels, _ = project_to_pixels((visible.points[end] + visible.points[end - 1]) / 2, camera)
     column, row = np.floor(pixels.T).astype(int)
@@ -399,7 +398,6 @@ def planar_strokes(points, directions, spacing):
         member=directions,
         spacing=np.full(point_count, spacing),
         width=np.ones(point_count),
-        opacity=np.ones(point_count),
         closed=np.zeros(stroke_count, dtype=bool),
     )
 
@@ -677,9 +675,13 @@ def test_gaps_at_crossings(columns):
     assert not len(find_crossings(gapped).stroke)
     removed_length = strokes.length.sum() - gapped.length.sum()
     assert np.isclose(removed_length, len(crossings.stroke) * 0.3 * 0.2, rtol=0.1)
-    upper = gapped.select(gapped.family == 0)
-    assert np.isclose(upper.length.sum(), strokes.length[strokes.family == 0].sum())
-    assert not len(find_crossings(with_crossing_gaps(strokes, 0.3, weave=True)).stroke)
+    for family in (
+        0,
+        1,
+    ):  # strokes pass over and under in turn, so each family has half of the gaps
+        cut = strokes.length[strokes.family == family].sum()
+        cut -= gapped.length[gapped.family == family].sum()
+        assert np.isclose(cut, removed_length / 2, rtol=0.1)
 
 
 @pytest.mark.slow
@@ -702,13 +704,13 @@ def test_a_sphere_shows_its_near_side():
     instance = instance_of(icosphere(4), 2, kind="smoothest")
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
     strokes = trace_strokes(instance, 0.1)
-    visible = clip_to_visible(strokes, [instance], camera)
+    visible = visible_strokes(strokes, [instance], camera)
     assert visible.points[:, 1].max() < 0.06
     start, end, _ = segments_of(strokes)
     is_near_side = (start + end)[:, 1] < 0
     near_length = np.linalg.norm(end - start, axis=1)[is_near_side].sum()
     assert np.isclose(visible.length.sum(), near_length, rtol=0.02)
-    unclipped = clip_to_visible(strokes, [instance], camera, remove_hidden=False)
+    unclipped = clip_to_visible(strokes, camera, None)
     assert np.isclose(unclipped.length.sum(), strokes.length.sum())
 
 
@@ -717,12 +719,12 @@ def test_strokes_are_clipped_by_occluders_and_by_the_frame():
     instance = instance_of(plane(), 2)
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 200, scale=1.0)
     strokes = trace_strokes(instance, 0.05)
-    in_frame = clip_to_visible(strokes, [instance], camera)
+    in_frame = visible_strokes(strokes, [instance], camera)
     assert np.abs(in_frame.points[:, :2]).max() <= 0.5 + 1e-9
     matrix = np.eye(4)
     matrix[:3, 3] = (1.0, 0, 1.0)
     occluder = MeshInstance(plane(), matrix)
-    visible = clip_to_visible(strokes, [instance, occluder], camera)
+    visible = visible_strokes(strokes, [instance, occluder], camera)
     assert visible.points[:, 0].max() < 0.02
     assert len(visible) >= 15
 
@@ -734,9 +736,9 @@ def test_outlines_of_simple_shapes():
     assert len(lines) == 1 and lines.closed[0] and lines.names[lines.family[0]] == "silhouettes"
     assert np.abs(lines.points[:, 1]).max() < 0.01
     assert np.isclose(lines.length[0], 2 * np.pi, rtol=0.01)
-    box = outline(MeshInstance(sharp_cube(), IDENTITY))
+    box = outline(MeshInstance(sharp_cube(), IDENTITY), camera)
     assert np.isclose(box.length.sum(), 12) and set(box.family.tolist()) == {1}
-    edge = outline(MeshInstance(plane(), IDENTITY))
+    edge = outline(MeshInstance(plane(), IDENTITY), camera)
     assert np.isclose(edge.length.sum(), 8) and set(edge.family.tolist()) == {2}
 
 
@@ -750,7 +752,7 @@ def svg_camera():
 def svg_of(**pen_options):
     """Return the root element of an SVG file, and its strokes."""
     instance = instance_of(plane(), 4)
-    strokes = clip_to_visible(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
+    strokes = visible_strokes(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
     return ElementTree.fromstring(svg_text(strokes, svg_camera(), Pen(**pen_options))), strokes
 
 
@@ -789,7 +791,7 @@ def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
 def test_closed_strokes_are_closed_paths():
     instance = MeshInstance(icosphere(4), IDENTITY, axis_field(icosphere(4), 4, (0, 0, 1)))
     camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
-    strokes = clip_to_visible(trace_strokes(instance, 0.15), [instance], camera)
+    strokes = visible_strokes(trace_strokes(instance, 0.15), [instance], camera)
     assert strokes.closed.any() and not strokes.closed.all()
 
     def path_data(selected, plotter):
@@ -921,6 +923,3 @@ def test_errors_are_one_line(error_of):
     assert "zero everywhere" in error_of(
         trace_strokes, MeshInstance(surface, IDENTITY, RosyField(4, np.zeros((16, 3)))), 0.1
     )
-    assert "per vertex" in error_of(trace_strokes, instance, np.ones(7))
-    assert "min_separation" in error_of(SeparationRules, min_separation=1.2)
-    assert "min_length" in error_of(SeparationRules, min_length=5.0, max_length=3.0)

@@ -10,22 +10,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import long
+from harness.stroke_tracing import trace_strokes, visible_strokes, write_svg
 from PIL import Image
 from scipy.ndimage import binary_erosion, gaussian_filter, sobel
-from shapes import plane, torus
+from shapes import torus
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
-from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.outline import outline
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.line_drawing.svg import Pen, write_svg
-from rosy_addon.line_drawing.trace import trace_strokes
-from rosy_addon.line_drawing.visibility import clip_to_visible, pixel_size
-from rosy_addon.projection.camera import look_at, orbit_camera, orthographic_camera
+from rosy_addon.line_drawing.svg import Pen
+from rosy_addon.line_drawing.visibility import pixel_size
+from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
@@ -145,7 +145,7 @@ def strokes(scene):
     lines = trace_strokes(crossed, 9.0 * pixel_size(crossed.world_points(), camera)).tapered(
         0.8, 0.15
     )
-    return clip_to_visible(
+    return visible_strokes(
         Strokes.concatenate(lines, outline(instance, camera)), [instance], camera
     )
 
@@ -170,11 +170,11 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
     """Open paths end at their first point, so they look the same."""
     instance, camera = scene
     crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
-    lines = clip_to_visible(
+    lines = visible_strokes(
         trace_strokes(crossed, 10.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
     )
     lines = Strokes.concatenate(
-        lines, clip_to_visible(outline(instance, camera), [instance], camera)
+        lines, visible_strokes(outline(instance, camera), [instance], camera)
     )
     assert lines.closed.sum() >= 3
     pictures = []
@@ -213,30 +213,10 @@ def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
     assert correlation(ink_of(tmp_path / "a.png"), raster(strokes, scene[1], PEN_WIDTH)) > 0.98
 
 
-@pytest.mark.parametrize("program", PROGRAMS)
-def test_half_the_opacity_is_half_the_ink(program, tmp_path):
-    surface = plane()
-    instance = MeshInstance(
-        surface, np.eye(4), generate(surface, GeneratorSettings("axis", (1.0, 0.0, 0.0)), 2)
-    )
-    eye = look_at((0, 0, 5), (0, 0, 0), (0, 1, 0))
-    camera = orthographic_camera(eye, WIDTH, HEIGHT, scale=2.0)
-    lines = clip_to_visible(trace_strokes(instance, 0.1), [instance], camera)
-    right = lines.points[:, 0] > 0
-    lines = replace(lines, opacity=np.where(right, 0.25, 0.5))
-    write_svg(tmp_path / "a.svg", lines, camera, Pen(width=3))
-    program(tmp_path / "a.svg", tmp_path / "a.png")
-    left, right = np.split(ink_of(tmp_path / "a.png"), 2, axis=1)
-    # If paths had round ends where the opacity changes, they would overlap there and be darker.
-    assert 0.48 < left.max() < 0.52
-    assert right[:, 1:].max() < 0.27
-    assert abs(right.sum() / left.sum() - 0.5) < 0.02
-
-
 @needs_browser
 def test_strokes_have_the_directions_of_the_render(scene, tmp_path):
     instance, camera = scene
-    lines = clip_to_visible(
+    lines = visible_strokes(
         trace_strokes(instance, 5.0 * pixel_size(instance.world_points(), camera)),
         [instance],
         camera,

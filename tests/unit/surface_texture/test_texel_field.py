@@ -19,7 +19,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.surface_texture.charts import uv_charts
 from rosy_addon.surface_texture.draw import step_length
 from rosy_addon.surface_texture.texel_field import frames_at, texel_field
-from rosy_addon.surface_texture.texels import rasterize_charts, texture_frame
+from rosy_addon.surface_texture.texels import TexelSurface, rasterize_charts, texture_frame
 
 #: Steps of the streamlines that are compared.
 STEPS = 40
@@ -40,7 +40,7 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
     assert charts.chart.max() + 1 == 32
     texels = rasterize_charts(charts, texture_frame(charts, 1024, "torus"), "torus")
     step = step_length(mesh, charts, texels)
-    field = texel_field(mesh, charts, texels, step, np.pi)
+    field = texel_field(TexelSurface(instance, mesh, charts, texels, step), np.pi)
     look = look_on_surface(Look(), step, step)
     covering = build_covering(field, look, np.full((len(texels), 1), 0.1, dtype=np.float32))
     start = np.unique(field.seam_steps.source)
@@ -83,7 +83,7 @@ def test_steps_across_seams_are_isometries():
     mesh = build_tangent_mesh(instance)
     charts = uv_charts(surface, mesh, patches_uv(3))
     texels = rasterize_charts(charts, texture_frame(charts, 512, "torus"), "torus")
-    steps = texel_field(mesh, charts, texels, 0.01, np.pi).seam_steps
+    steps = texel_field(TexelSurface(instance, mesh, charts, texels, 0.01), np.pi).seam_steps
     source, target = texels.triangle[steps.source], texels.triangle[steps.target]
     displacement = np.exp(1j * np.arange(len(source)))
     before = charts.to_surface(source, displacement / 512)

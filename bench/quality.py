@@ -15,15 +15,15 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from harness.planar import lic, planar_pixel_field
 from scipy import ndimage
 
-from rosy_addon.compositor.lic import lic, look_noise
+from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import (
     PixelField,
     nearest_member,
-    planar_pixel_field,
     surface_pixel_field,
 )
 from rosy_addon.field.field_io import read_field

@@ -435,8 +435,6 @@ def _to_screen(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray, foreshorten: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute `PixelField.to_screen` for a block in single precision, as x and y."""
-    if field.screen_jacobian is None:
-        return x, y
     x_axis, y_axis = field.screen_jacobian[block, 0], field.screen_jacobian[block, 1]
     screen_x = x_axis.real * x + y_axis.real * y
     screen_y = x_axis.imag * x + y_axis.imag * y

@@ -33,7 +33,7 @@ from .flow import blend_channels, streamline_reach
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow, is_hatched
-from .look_units import AntialiasedLook
+from .look_units import PixelLook
 from .pixel_field import PixelField
 from .streamline_batch import StreamlineBatch
 from .strips import Strip, entries_of_rows, streamline_margin
@@ -390,7 +390,7 @@ def is_fine(look: Look) -> bool:
 
     Differences between neighboring streamlines do not drift. The eye sees them as a screen that stands still.
     """
-    return isinstance(look, AntialiasedLook) or has_flow(look)
+    return has_flow(look) or (isinstance(look, PixelLook) and look.antialiased)
 
 
 def _batch_size(half_length: int) -> int:

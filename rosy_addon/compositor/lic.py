@@ -21,31 +21,24 @@ from .pixel_field import PixelField
 from .strips import Strip
 
 
-def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicImages:
-    """Average noise along the streamlines of each member, with the method of the look.
+def lic_lengths(
+    field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
+) -> list[LicImages]:
+    """Average noise along the streamlines of each member, with the method of the looks.
 
     Parameters
     ----------
     field : PixelField
-    look : Look
-        In pixels of the frame.
-    noise : (P, K) float32 ndarray, optional
-        By default `look_noise(field, look)`.
+    looks : sequence of Look
+        In pixels of the frame. They differ in the length of streamlines. The first is the longest.
+    noise : (P, K) float32 ndarray
+    strip : Strip, optional
+        With the method "sheets", the images are those at its `averaged_rows`.
 
     Returns
     -------
-    LicImages
-    """
-    (images,) = lic_lengths(field, [look], look_noise(field, look) if noise is None else noise)
-    return images
-
-
-def lic_lengths(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
-) -> list[LicImages]:
-    """Do the same as `lic` for looks that differ in the length of streamlines, longest first.
-
-    With a strip, the method "sheets" returns the images at its `averaged_rows`.
+    list of LicImages
+        Of each look.
     """
     raise_mmap_threshold()
     method = looks[0].method

@@ -11,7 +11,7 @@ import numpy as np
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.shadow_maps import world_bounds
-from ..settings import Number, pixel_lengths, settings_of
+from ..settings import Number, pixel_lengths, settings_of, switch
 from .look import Look
 
 #: Lengths in Blender units follow the camera in steps of 1 / 32 octave, so that tables made for a
@@ -28,37 +28,25 @@ MIN_DISTANCE_FACTOR = 0.25
 
 
 @dataclass(frozen=True)
-class SupersampledLook(Look):
-    """A look with lengths in pixels of a supersampled frame, which may be out of range."""
+class PixelLook(Look):
+    """A look with its lengths in pixels of the frame that is drawn, which may be out of range."""
+
+    antialiased: bool = switch(
+        False,
+        "Draw streaks more accurately, as pixels have several samples; see `GBuffer.coverage`",
+    )
 
     def __post_init__(self) -> None:
         """Check nothing: the original look was checked."""
 
 
-def supersampled_look(look: Look) -> SupersampledLook:
+def supersampled_look(look: Look) -> PixelLook:
     """Return the look with its lengths in pixels of the supersampled frame."""
     settings = {name: getattr(look, name) for name in settings_of(Look)}
     for setting in pixel_lengths(Look):
         settings[setting.name] *= look.supersampling
     settings["unit_size"] /= look.supersampling
-    return SupersampledLook(**settings)
-
-
-@dataclass(frozen=True)
-class AntialiasedLook(Look):
-    """A look in pixels of a frame whose pixels have several samples; see `GBuffer.coverage`.
-
-    Streaks are drawn more accurately than without supersampling.
-    """
-
-    def without_antialiasing(self) -> Look:
-        """Return the same look for streaks that need not be accurate."""
-        return Look(**{name: getattr(self, name) for name in settings_of(Look)})
-
-
-def antialiased_look(look: Look) -> AntialiasedLook:
-    """Return the look for a frame of pixels that have several samples."""
-    return AntialiasedLook(**{name: getattr(look, name) for name in settings_of(Look)})
+    return PixelLook(**settings)
 
 
 def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> Look:

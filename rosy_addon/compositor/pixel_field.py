@@ -9,9 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..deterministic_trig import unit_phasor
 from ..field.directional_field import evaluate_harmonics
-from ..field.rosy_field import check_degree
 from ..field.symmetry import FieldSymmetry
 from ..progress import progress, report
 from ..projection.field_channel import FieldChannel
@@ -71,9 +69,9 @@ class PixelField:
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
         z = rho exp(i N t), where t is the angle of a member in the view plane. 0 is undefined.
-    screen_jacobian : (P, 2) complex64 ndarray or None
+    screen_jacobian : (P, 2) complex64 ndarray
         The axes of the frame of the view plane, projected to the screen along the surface. Pixels,
-        x + i y. None in the plane, where they are 1 and i.
+        x + i y.
     neighbor_mask : (P,) uint16 ndarray
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
@@ -95,7 +93,7 @@ class PixelField:
     height: int
     pixel: np.ndarray
     representation: np.ndarray
-    screen_jacobian: np.ndarray | None
+    screen_jacobian: np.ndarray
     neighbor_mask: np.ndarray
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
     gbuffer_index: slice | np.ndarray = dataclass_field(default_factory=lambda: slice(None))
@@ -141,7 +139,7 @@ class PixelField:
             self,
             pixel=self.pixel[extent],
             representation=self.representation[extent],
-            screen_jacobian=None if self.screen_jacobian is None else self.screen_jacobian[extent],
+            screen_jacobian=self.screen_jacobian[extent],
             neighbor_mask=self.neighbor_mask[extent],
             channels={channel: values[extent] for channel, values in self.channels.items()},
             gbuffer_index=index,
@@ -182,8 +180,6 @@ class PixelField:
         (P,) complex64 ndarray
             Pixels.
         """
-        if self.screen_jacobian is None:
-            return member.astype(np.complex64)
         # Double precision makes the float32 result the same with all versions of numpy.
         x, y = (
             self.screen_jacobian[:, 0].astype(np.complex128),
@@ -258,7 +254,7 @@ def surface_pixel_field(
     pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]
     if not z.all():
         with progress(0.9, 1.0):
-            mask = _mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+            mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
     report(1.0, "finding directions")
     return PixelField(
         degree=degree,
@@ -291,46 +287,7 @@ def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldC
     return {channel: values for channel, values in channels.items() if channel in present}
 
 
-def planar_pixel_field(
-    angles: np.ndarray, degree: int, magnitude: np.ndarray | float | None = None
-) -> PixelField:
-    """Make the pixel field of a field in the plane, given the angle of a member at each pixel.
-
-    Parameters
-    ----------
-    angles : (H, W) ndarray
-        Radians, counter-clockwise from the direction of the rows. Rows from the bottom. The field
-        is undefined where the angle is not finite or the magnitude is not above 0.
-    degree : int
-    magnitude : (H, W) ndarray or float, optional
-        rho, by default 1.
-
-    Returns
-    -------
-    PixelField
-        All pixels of the image.
-    """
-    degree = check_degree(degree)
-    angles = np.asarray(angles, dtype=np.float64)
-    height, width = angles.shape
-    rho = np.broadcast_to(np.float32(1) if magnitude is None else magnitude, angles.shape)
-    defined = np.isfinite(angles) & (rho > 0)
-    z = unit_phasor(np.where(defined, degree * angles, 0.0).ravel())
-    z *= np.where(defined, rho, 0).astype(np.float32).ravel()
-    pixel = np.arange(height * width, dtype=np.int32)
-    all_neighbors = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
-    return PixelField(
-        degree=degree,
-        width=width,
-        height=height,
-        pixel=pixel,
-        representation=z,
-        screen_jacobian=None,
-        neighbor_mask=_mask_undefined(all_neighbors, pixel, width, height, z != 0),
-    )
-
-
-def _mask_undefined(
+def mask_undefined(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
 ) -> np.ndarray:
     """Clear the bits of neighbor masks that lead from or to undefined pixels.

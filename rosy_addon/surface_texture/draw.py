@@ -15,7 +15,7 @@ from ..compositor.color_values import (
     value_range,
     value_scale,
 )
-from ..compositor.compose import colorize, degree_layer
+from ..compositor.compose import colorize, streak_tone
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import noise_channel_count, with_cycle_distance
 from ..compositor.lic import lic_lengths
@@ -296,7 +296,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
     with progress(0.95, 0.97):
-        layer = degree_layer(field, look, images)
+        tone = streak_tone(field, look, images)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if colors_values(look):
@@ -307,5 +307,5 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     color = np.empty((len(field.pixel), 3), dtype=np.float32)
     for block in pixel_blocks(len(color)):
         report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
-        color[block] = colorize(field.part(block), images.part(block), layer.tone[block], look)
+        color[block] = colorize(field.part(block), images.part(block), tone[block], look)
     return color

@@ -74,7 +74,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
 
 def _is_antialiased(rosy: SimpleNamespace, look: Any) -> bool:
     """Whether a look is that of pixels with several samples."""
-    return isinstance(look, rosy.look_units.AntialiasedLook)
+    return isinstance(look, rosy.look_units.PixelLook) and look.antialiased
 
 
 def _smoothed(rosy: SimpleNamespace, covering: Any, field: Any, images: Any) -> Any:

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long
+from harness.planar import planar_pixel_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_fields import pair_angle, pixel_centers
@@ -19,7 +20,6 @@ from rosy_addon.compositor.covering import build_covering
 from rosy_addon.compositor.filter_kernel import kernel_weights
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import planar_pixel_field
 
 SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import long
+from harness.planar import compose_planar
 from scipy import ndimage
 
-from rosy_addon.compositor.compose import compose_planar
 from rosy_addon.compositor.drifting_averages import DriftingAverages
 from rosy_addon.compositor.filter_kernel import kernel_of, sample_weights
 from rosy_addon.compositor.flow import (
@@ -32,7 +32,7 @@ KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
 
 def member(angle, degree, look):
     """Return the image of the first member of a uniform field, around 0."""
-    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look).layers[0]
+    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look).layer
     return layer.images.members[0, :, 0].reshape(SIZE, SIZE) - 0.5
 
 

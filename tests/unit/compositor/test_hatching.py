@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long, mainly
+from harness.planar import planar_pixel_field
 from scipy.ndimage import gaussian_filter, map_coordinates
 from shapes import cube
 
@@ -29,7 +30,6 @@ from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.compositor.paper_grain import picture_paper_grain
-from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.compositor.shading import diffuse
 from rosy_addon.compositor.streak_statistics import (
     StreakSettings,

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-
 from harness.planar import compose_planar
 
 from . import cases

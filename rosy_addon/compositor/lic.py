@@ -9,7 +9,6 @@ import numpy as np
 
 from ..memory import raise_mmap_threshold
 from ..progress import progress
-from .brute_force import brute_force
 from .fast_lic import fast_lic
 from .flow import noise_channel_count
 from .ibfv import ibfv_lengths
@@ -17,6 +16,7 @@ from .image_noise import image_noise
 from .lic_images import LicImages
 from .look import Look
 from .member_decomposition import member_decomposition
+from .per_pixel_lic import brute_force
 from .pixel_field import PixelField
 from .strips import Strip
 

@@ -15,11 +15,11 @@ from planar_fields import pair_angle, pixel_centers
 from scipy import ndimage
 
 from rosy_addon.compositor import fast_lic
-from rosy_addon.compositor.brute_force import brute_force
 from rosy_addon.compositor.covering import build_covering
 from rosy_addon.compositor.filter_kernel import kernel_weights
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.per_pixel_lic import brute_force
 
 SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)

@@ -11,7 +11,7 @@ from ..memory import raise_mmap_threshold
 from ..progress import progress
 from .fast_lic import fast_lic
 from .flow import noise_channel_count
-from .ibfv import ibfv_lengths
+from .ibfv import streak_waves, wave_images
 from .image_noise import image_noise
 from .lic_images import LicImages
 from .look import Look
@@ -45,7 +45,7 @@ def lic_lengths(
     if method == "sheets":
         return fast_lic(field, looks, noise, strip)
     if method == "ibfv":
-        return ibfv_lengths(field, looks, noise)
+        return wave_images(streak_waves(field, looks, noise), looks)
     convolve = member_decomposition if method == "members" else brute_force
     images = []
     for number, look in enumerate(looks):

@@ -124,17 +124,18 @@ class PixelField:
         """Number of families of lines. 1 if the field does not distinguish its lines."""
         return next((number for kind, number in self.channels if kind == "family"), 1)
 
-    def part(self, extent: slice) -> PixelField:
+    def part(self, extent: slice | np.ndarray) -> PixelField:
         """Return the field at some of the pixels, without its `seam_steps`.
 
         Its `neighbor_mask` is that of all pixels.
         """
         index = self.gbuffer_index
-        if isinstance(index, slice):
-            first = index.start or 0
-            index = slice(first + extent.start, first + extent.stop)
-        else:
+        if not isinstance(index, slice):
             index = index[extent]
+        elif isinstance(extent, slice):
+            index = slice((index.start or 0) + extent.start, (index.start or 0) + extent.stop)
+        else:
+            index = (index.start or 0) + extent
         return replace(
             self,
             pixel=self.pixel[extent],

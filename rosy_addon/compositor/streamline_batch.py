@@ -165,7 +165,7 @@ class StreamlineBatch:
                 if self._kernel == "box":
                     last = np.minimum(step + length, last_step)
                     first = np.maximum(step - length, -last_step)
-                    noise_sum = self._prefix_sums_through(last, lanes)
+                    noise_sum = self._rows(last, lanes)
                     noise_sum = noise_sum - self._prefix_sums_before(first, lanes)
                 else:
                     if is_along is None:
@@ -342,17 +342,15 @@ class StreamlineBatch:
                         self._extend_sums(step, lanes)
                         return step_counts, step
                     active, active_counts, cell, sheet = (
-                        active[remaining],
-                        active_counts[remaining],
-                        cell[remaining],
-                        sheet[remaining],
+                        values[remaining] for values in (active, active_counts, cell, sheet)
                     )
-                    packed_phase, target_phase, position = (
-                        packed_phase[remaining],
-                        target_phase[remaining],
+                    packed_phase, target_phase, total = (
+                        values[remaining] for values in (packed_phase, target_phase, total)
+                    )
+                    position, previous_direction = (
                         position[remaining],
+                        previous_direction[remaining],
                     )
-                    previous_direction, total = previous_direction[remaining], total[remaining]
                     loops.keep(remaining)
         if active is not None:
             step_counts[active] = active_counts
@@ -455,31 +453,19 @@ class StreamlineBatch:
 
     def _second_prefix_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""
-        half, seed = lanes // 2, self._sums[0, :lanes]
+        seed = self._sums[0, :lanes]
         if np.ndim(step) == 0:
             if step >= 0:
-                return self._sums[step, :lanes]
+                return self._rows(step, lanes)
             if step == -1:
                 return np.zeros_like(seed)
-            opposite_sums = self._sums[-step - 2, :lanes]
-            return (step + 1) * seed + np.concatenate(
-                [opposite_sums[half:], opposite_sums[:half]]
-            ).conj()
-        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
-        lane, same_side = np.arange(lanes), (step >= 0)[:, None]
-        row = np.where(step >= 0, step, np.maximum(-step - 2, 0)) * stride
-        gathered = flat.take(row + np.where(same_side[:, 0], lane, (lane + half) % lanes), axis=0)
+            return (step + 1) * seed + self._rows(-step - 2, lanes, True).conj()
+        same_side = step >= 0
+        rows = np.where(same_side, step, np.maximum(-step - 2, 0))
+        gathered = self._rows(rows, lanes, ~same_side)
         mirrored = (step + 1)[:, None] * seed + gathered.conj()
-        return np.where(
-            same_side, gathered, np.where((step == -1)[:, None], np.complex64(0), mirrored)
-        )
-
-    def _prefix_sums_through(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
-        """(2 n, K) complex64 prefix sums up to a step, including it."""
-        if np.ndim(step) == 0:
-            return self._sums[step, :lanes]
-        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
-        return flat.take(step * stride + np.arange(lanes), axis=0)
+        mirrored[step == -1] = 0
+        return np.where(same_side[:, None], gathered, mirrored)
 
     def _prefix_sums_before(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64 prefix sums up to a step, excluding it.
@@ -487,18 +473,26 @@ class StreamlineBatch:
         Negative steps are on the opposite half of the streamline. Its sums run away from the seed,
         and its derivatives to the left have the opposite sign.
         """
-        half, seed = lanes // 2, self._sums[0, :lanes]
+        seed, same_side = self._sums[0, :lanes], step > 0
         if np.ndim(step) == 0:
-            if step > 0:
-                return self._sums[step - 1, :lanes]
-            opposite_sums = self._sums[-step, :lanes]
-            return seed - np.concatenate([opposite_sums[half:], opposite_sums[:half]]).conj()
+            if same_side:
+                return self._rows(step - 1, lanes)
+            return seed - self._rows(-step, lanes, True).conj()
+        gathered = self._rows(np.where(same_side, step - 1, -step), lanes, ~same_side)
+        return np.where(same_side[:, None], gathered, seed - gathered.conj())
+
+    def _rows(
+        self, row: int | np.ndarray, lanes: int, is_opposite: bool | np.ndarray = False
+    ) -> np.ndarray:
+        """(2 n, K) complex64 `_sums` of a row, or of a row of each lane, or of the opposite lane."""
+        half = lanes // 2
+        if np.ndim(row) == 0:
+            rows = self._sums[row, :lanes]
+            return np.concatenate([rows[half:], rows[:half]]) if is_opposite else rows
         flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
         lane = np.arange(lanes)
-        same_side = step > 0
-        row = np.where(same_side, step - 1, -step) * stride
-        gathered = flat.take(row + np.where(same_side, lane, (lane + half) % lanes), axis=0)
-        return np.where(same_side[:, None], gathered, seed - gathered.conj())
+        lane = np.where(is_opposite, (lane + half) % lanes, lane)
+        return flat.take(row * stride + lane, axis=0)
 
 
 class _LoopFinder:

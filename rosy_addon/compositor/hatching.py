@@ -240,9 +240,7 @@ def line_coverage(
     (P,) float32 ndarray
         0 to 1.
     """
-    if modulation.even_lines is None:
-        coverage = _streak_coverage(line, target_coverage, images, look, modulation)
-    else:
+    if modulation.even_lines is not None:
         width = uneven_width(
             target_coverage,
             look,
@@ -250,6 +248,17 @@ def line_coverage(
             None if modulation.paper_grain is None else modulation.paper_grain[line],
         )
         coverage = modulation.even_lines.coverage(line, width, look)
+    else:
+        statistics = look_streak_statistics(look)
+        streak, slope = standard_streak(images, line, statistics.std)
+        if modulation.break_images is not None:
+            amount = break_amount(target_coverage, look.breaks, look.wobble)
+            broken = standard_streak(modulation.break_images, line, statistics.break_std)
+            streak += amount * (broken[0] - streak)
+            if slope is not None:
+                slope += amount * (broken[1] - slope)
+        streak += modulation.relief(line, look)
+        coverage = _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
     if modulation.undirected is not None:
         spots = modulation.spots(line, look)
         undefined = np.flatnonzero(~np.isnan(spots))
@@ -258,26 +267,6 @@ def line_coverage(
             spots[undefined], target_coverage[undefined], thresholds, look
         )
     return coverage
-
-
-def _streak_coverage(
-    line: int,
-    target_coverage: np.ndarray,
-    images: LicImages,
-    look: Look,
-    modulation: LineModulation,
-) -> np.ndarray:
-    """`line_coverage` of the streaks of LIC images."""
-    statistics = look_streak_statistics(look)
-    streak, slope = standard_streak(images, line, statistics.std)
-    if modulation.break_images is not None:
-        amount = break_amount(target_coverage, look.breaks, look.wobble)
-        broken = standard_streak(modulation.break_images, line, statistics.break_std)
-        streak += amount * (broken[0] - streak)
-        if slope is not None:
-            slope += amount * (broken[1] - slope)
-    streak += modulation.relief(line, look)
-    return _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
 
 
 def standard_streak(

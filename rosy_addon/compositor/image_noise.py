@@ -43,15 +43,21 @@ BLOCK_ROWS = 32
 TAPS_PER_SIDE = 3
 
 
-def hash_bits_2d(
-    x: np.ndarray, y: np.ndarray, seed: int, channel: int, density: float
+#: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
+HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
+SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
+FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
+
+
+def hash_bits(
+    cell_index: Sequence[np.ndarray], seed: int, channel: int, density: float
 ) -> np.ndarray:
     """Hash the cells of an integer lattice to random bits.
 
     Parameters
     ----------
-    x, y : int ndarray
-        Cell indices.
+    cell_index : sequence of int ndarray
+        Up to five indices of cells.
     seed, channel : int
     density : float
         Fraction of cells whose bit is set, to the nearest 2 ** -24.
@@ -65,19 +71,6 @@ def hash_bits_2d(
     The finalizer is `lowbias32` of Chris Wellons, "Prospecting for Hash Functions", 2018 (public
     domain).
     """
-    return hash_bits_nd((x, y), seed, channel, density)
-
-
-#: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
-HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
-SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
-FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
-
-
-def hash_bits_nd(
-    cell_index: Sequence[np.ndarray], seed: int, channel: int, density: float
-) -> np.ndarray:
-    """Hash cells with up to five indices to random bits; see `hash_bits_2d`."""
     start = (seed * SEED_FACTOR + channel * CHANNEL_FACTOR) & 0xFFFFFFFF
     h = cell_index[0].astype(np.uint32) * np.uint32(HASH_FACTORS[0])
     for component, factor in zip(cell_index[1:], HASH_FACTORS[1:], strict=False):
@@ -183,7 +176,7 @@ def _lattice_noise(
                 px, py = column + x, row[block] + y
                 cell_x = np.floor(cos * px - sin * py).astype(np.int32)
                 cell_y = np.floor(sin * px + cos * py).astype(np.int32)
-                total[block] += hash_bits_2d(cell_x, cell_y, seed, channel, density)
+                total[block] += hash_bits((cell_x, cell_y), seed, channel, density)
     scale = NOISE_STD / np.sqrt(density * (1 - density))
     return (
         np.float32(NOISE_MEAN - density * scale)

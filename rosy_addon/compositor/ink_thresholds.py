@@ -130,9 +130,7 @@ def line_thresholds(
     statistics = look_streak_statistics(look)
     break_streak = modulation.break_streak(line, look)
     if modulation.even_lines is not None:
-        paper_grain = None if modulation.paper_grain is None else modulation.paper_grain[line]
-        position = 1 - modulation.even_lines.streaks[line]
-        result = _even_line_thresholds(position, break_streak, paper_grain, look)
+        result = _even_line_thresholds(line, break_streak, look, modulation)
     else:
         relief = modulation.relief(line, look)
         streak = standard_streak(images, line, statistics.std)[0] + relief
@@ -163,16 +161,17 @@ def _streak_thresholds(
 
 
 def _even_line_thresholds(
-    position: np.ndarray,
-    break_streak: np.ndarray | None,
-    paper_grain: np.ndarray | None,
-    look: Look,
+    line: int, break_streak: np.ndarray | None, look: Look, modulation: LineModulation
 ) -> np.ndarray:
-    """`line_thresholds` of even lines; `position` is 0 in the middle of a line, 1 between two lines."""
+    """`line_thresholds` of even lines."""
+    # 0 in the middle of a line, 1 between two lines.
+    position = 1 - modulation.even_lines.streaks[line]
+    paper_grain = modulation.paper_grain
     if break_streak is None and paper_grain is None:
         return position
+    grain = None if paper_grain is None else paper_grain[line]
     return _bisect(
-        lambda coverage: uneven_width(coverage, look, break_streak, paper_grain) - position,
+        lambda coverage: uneven_width(coverage, look, break_streak, grain) - position,
         len(position),
     )
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits_2d
+from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
 from .look import Look
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 
@@ -128,7 +128,7 @@ def _grain_tiles(rectangle: TileRectangle, grain: float, seed: int) -> np.ndarra
     for start in range(0, len(row), BLOCK_ROWS):
         report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
-        bits = hash_bits_2d(column, row[block], seed ^ SEED_SALT, 0, 0.5)
+        bits = hash_bits((column, row[block]), seed ^ SEED_SALT, 0, 0.5)
         white[block] = bits.astype(np.float32) - np.float32(0.5)
     heights = _band_noise(white, sigmas)[margin:-margin, margin:-margin]
     return np.ascontiguousarray(heights / np.float32(_band_noise_std(*sigmas))).reshape(-1)

@@ -293,11 +293,19 @@ class StreamlineBatch:
             elif step <= self._half_window:
                 lateral = _lateral_offset(position, direction)
             total += record[:, 1:]
-            self._record_step(step, active, lanes, state, lateral, total)
-            if self._axial_offset is not None and step <= self._half_window:
-                self._axial_offset[step, :lanes] = 0
-                axial = _axial_steps(position, direction, step_scale)
-                self._axial_offset[step, slice(lanes) if active is None else active] = axial
+            lane = slice(lanes) if active is None else active
+            self._totals[lane] = total
+            self._sums[step, :lanes] = self._totals[:lanes]
+            if self._has_second_sums and step:
+                self._sums[step, :lanes] += self._sums[step - 1, :lanes]
+            if step <= self._half_window:
+                records = [(self._states, state), (self._lateral_offset, lateral)]
+                if self._axial_offset is not None:
+                    axial = _axial_steps(position, direction, step_scale)
+                    records.append((self._axial_offset, axial))
+                for buffer, values in records:
+                    buffer[step, :lanes] = SINK_CELL  # and 0, of lanes that have ended
+                    buffer[step, lane] = values
             if step == self._max_steps:
                 break
             # Two-step Adams-Bashforth method, 3/2 d - 1/2 d_previous.
@@ -385,31 +393,6 @@ class StreamlineBatch:
         if len(crossing):
             cell[crossing] = seams.target_cell.take(seam)
         return ended, crossing, seam
-
-    def _record_step(
-        self,
-        step: int,
-        active: np.ndarray | None,
-        lanes: int,
-        state: np.ndarray,
-        lateral: np.ndarray | None,
-        total: np.ndarray,
-    ) -> None:
-        """Write row `step` of the buffers, for all lanes or the active ones."""
-        self._totals[slice(lanes) if active is None else active] = total
-        self._sums[step, :lanes] = self._totals[:lanes]
-        if self._has_second_sums and step:
-            self._sums[step, :lanes] += self._sums[step - 1, :lanes]
-        if step > self._half_window:
-            return
-        if active is None:
-            self._states[step, :lanes] = state
-            self._lateral_offset[step, :lanes] = lateral
-        else:
-            self._states[step, :lanes] = SINK_CELL
-            self._states[step, active] = state
-            self._lateral_offset[step, :lanes] = 0
-            self._lateral_offset[step, active] = lateral
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
         """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""

@@ -27,7 +27,7 @@ from .image_noise import (
     STEP_LABEL,
     box_radius,
     gaussian_blur,
-    hash_bits_nd,
+    hash_bits,
 )
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
@@ -268,7 +268,7 @@ def _accumulate_octaves(
         for position in lattice:
             cell = np.floor(position * scale).astype(np.int32)
             for channel, out in enumerate(total):
-                bits = hash_bits_nd((*cell, octave_index, instance_hash), seed, channel, density)
+                bits = hash_bits((*cell, octave_index, instance_hash), seed, channel, density)
                 out += weight * (bits - np.float32(density))
 
 

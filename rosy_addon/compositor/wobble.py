@@ -111,9 +111,20 @@ def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
     (n,) float32 ndarray
         Radians.
     """
+    # The base-2 logarithm of the mean wavelength.
     level = np.log2(grain * np.float32(MEAN_WAVELENGTH_GRAINS))
     level = np.broadcast_to(level, position.shape[1:])
-    return np.float32(WOBBLE_STD) * _wave_sum(position, level)
+    octave = np.floor(level)
+    blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
+    total = np.zeros(len(level), dtype=np.float32)
+    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
+    for index, weight in enumerate(cos_sin(blend_angle)):
+        x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
+        for frequency_x, frequency_y, frequency_z, phase in wave_table():
+            cycle = frequency_x * x + frequency_y * y + frequency_z * z + phase
+            cycle = 2 * (cycle - np.floor(cycle)) - 1
+            total += weight * (4 * cycle * (1 - np.abs(cycle)))
+    return np.float32(WOBBLE_STD) * (total * np.float32(UNIT_VARIANCE_SCALE))
 
 
 def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
@@ -145,29 +156,3 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
                 phase = unit_phasor(-channel[1] * block_angle)
                 channels[channel][block] = product(values[block], phase)
     return replace(field, representation=representation, channels=channels)
-
-
-def _wave_sum(position: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Sum the waves at positions, with a standard deviation of about 1.
-
-    Parameters
-    ----------
-    position : (3, n) float32 ndarray
-    level : (n,) ndarray
-        Base-2 logarithm of the mean wavelength, in the units of `position`.
-
-    Returns
-    -------
-    (n,) float32 ndarray
-    """
-    octave = np.floor(level)
-    blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
-    total = np.zeros(len(level), dtype=np.float32)
-    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
-    for index, weight in enumerate(cos_sin(blend_angle)):
-        x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
-        for frequency_x, frequency_y, frequency_z, phase in wave_table():
-            cycle = frequency_x * x + frequency_y * y + frequency_z * z + phase
-            cycle = 2 * (cycle - np.floor(cycle)) - 1
-            total += weight * (4 * cycle * (1 - np.abs(cycle)))
-    return total * np.float32(UNIT_VARIANCE_SCALE)

@@ -12,7 +12,7 @@ from ..cache import Cache
 from ..color import map_colors, to_linear
 from ..progress import progress, report
 from ..projection.gbuffer import GBuffer, PixelCoverage
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
@@ -38,6 +38,7 @@ from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField
+from .reported_blocks import reported_blocks
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
@@ -262,8 +263,7 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
     field = field.part(rows)
     if canvas.map_position is not None:
         field = replace(field, map_position=canvas.map_position[field.gbuffer_index])
-    for block in pixel_blocks(len(field.pixel)):
-        report(0.9 + 0.1 * block.start / len(field.pixel), "drawing the ink")
+    for block in reported_blocks(len(field.pixel), "drawing the ink", 0.9, 1.0):
         part, part_images = field.part(block), images.part(block)
         entries = part.gbuffer_index
         if layer.tone is None:
@@ -312,8 +312,7 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     channels[:, 0] = layer.tone
     (images,) = lic_lengths(layer.field, [look], channels, strip)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
-    for block in pixel_blocks(means.shape[1]):
-        report(1.0, "finding tones")
+    for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
         means[:, block] = (
             NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
@@ -334,8 +333,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.nda
     std = np.float32(look_streak_statistics(look).paper_grain_std)
     channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
     heights = np.empty((field.line_count, len(noise)), dtype=np.float32)
-    for block in pixel_blocks(len(noise)):
-        report(1.0, "drawing the paper grain")
+    for block in reported_blocks(len(noise), "drawing the paper grain", 1.0, 1.0):
         heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / std).T[channel]
     return heights
 
@@ -350,8 +348,7 @@ def streak_tone(field: PixelField, look: Look, images: LicImages) -> np.ndarray:
     """
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     tone = np.empty_like(images.blend)
-    for block in pixel_blocks(len(tone)):
-        report(block.start / len(tone), "blending lines")
+    for block in reported_blocks(len(tone), "blending lines"):
         effective_samples = images.effective_samples[block]
         gain = look.gain * blend_gain(field.line_count, effective_samples, look) * supersampled_gain
         tone[block] = scale_contrast(images.blend[block], gain[:, None])

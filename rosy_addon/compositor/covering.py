@@ -29,10 +29,10 @@ import numpy as np
 from ..deterministic_trig import cos_sin, vector_angle
 from ..field.directional_field import evaluate_harmonics
 from ..progress import report
-from ..projection.pixel_blocks import pixel_blocks
 from .flow import forward_share
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
+from .reported_blocks import reported_blocks
 
 #: The largest integer in `Covering.state_table`.
 INT16_MAX = 32767
@@ -267,8 +267,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         np.float32(INT16_MAX / max_slope),
     ]
     state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
-    for block in pixel_blocks(count):
-        report(block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions"):
         block_cells = cell_of_pixel[block]
         right, up = _noise_gradient(cell_noise, block_cells, width, field.neighbor_mask[block])
         right, up = right * quantize[2], up * quantize[2]

@@ -22,9 +22,8 @@ import numpy as np
 from ..cache import Cache
 from ..deterministic_trig import vector_angle
 from ..field.frames import transform_components
-from ..progress import progress, report
+from ..progress import progress
 from ..projection.gbuffer import GBuffer, MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.project import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
 from .lic_images import LicImages, lic_images
@@ -32,6 +31,7 @@ from .look import Look, is_hatched
 from .look_units import instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
+from .reported_blocks import reported_blocks
 from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
 from .wobble import WOBBLE_STD
 
@@ -377,8 +377,7 @@ class _InstanceLines:
         )
         streaks, period = np.empty((2, self._field.line_count, len(pixels)), dtype=np.float32)
         growth = np.zeros(len(pixels), dtype=np.float32)
-        for block in pixel_blocks(len(pixels)):
-            report(1.0, STEP_LABEL)
+        for block in reported_blocks(len(pixels), STEP_LABEL, 1.0, 1.0):
             part = pixels[block]
             phases, line_period, octaves = self._evaluate(self._field.part(part), lines)
             if self._wobble_angle is not None:

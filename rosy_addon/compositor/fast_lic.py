@@ -35,6 +35,7 @@ from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow, is_hatched
 from .look_units import PixelLook
 from .pixel_field import PixelField
+from .reported_blocks import reported_blocks
 from .streamline_batch import StreamlineBatch
 from .strips import Strip, entries_of_rows, streamline_margin
 
@@ -253,8 +254,7 @@ class _LineAverages:
         """
         smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
         for line, out in enumerate(smooth):
-            for block in pixel_blocks(len(cells)):
-                report(1.0, STEP_LABEL)
+            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
                 entry = line * covering.cell_count + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 total = np.float32(2) * own
@@ -269,8 +269,7 @@ class _LineAverages:
         """(M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
-            for block in pixel_blocks(len(cells)):
-                report(1.0, STEP_LABEL)
+            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
                 entry = first_entry + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 left, right = (

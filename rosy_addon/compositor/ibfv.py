@@ -44,6 +44,7 @@ from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField
+from .reported_blocks import reported_blocks
 
 #: The doublings end when the weights of further steps are below this. Averages are divided by the weights
 #: that they have.
@@ -94,8 +95,7 @@ class StreakWaves:
         real, imaginary = np.float32(turn.real), np.float32(turn.imag)
         count = members.shape[1]
         for line, member in enumerate(members):
-            for block in pixel_blocks(count):
-                report(0.5 * block.start / count, "blending lines")
+            for block in reported_blocks(count, "blending lines", 0.0, 0.5):
                 np.add(self.constant[line, block], np.float32(NOISE_MEAN), out=member[block])
                 if self.wave is not None:
                     wave = self.wave[line, block]
@@ -638,8 +638,7 @@ def _line_waves(field: PixelField, covering: Covering, look: Look, sums: _Sums) 
     wave = np.empty((lines, count), dtype=np.complex64) if flows else None
     effective_samples = np.zeros(count, dtype=np.float32)
     for line, first_sheet in enumerate(member_lines(field).tolist()):
-        for block in pixel_blocks(count):
-            report((line + block.start / count) / lines, "blending lines")
+        for block in reported_blocks(count, "blending lines", line / lines, (line + 1) / lines):
             state = first_sheet * covering.cell_count + covering.cell_of_pixel[block].astype(
                 np.intp
             )

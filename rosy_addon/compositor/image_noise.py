@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from ..progress import progress, report
-from ..projection.pixel_blocks import pixel_blocks
 from .filter_kernel import Kernel
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
+from .reported_blocks import reported_blocks
 
 #: Mean and standard deviation of binary noise.
 NOISE_MEAN, NOISE_STD = 0.5, 0.5
@@ -123,8 +123,9 @@ def image_noise(
         settings = grain, seed, channel, density, high_pass
         with progress(channel / channels, (channel + 1) / channels):
             tiles = cached_tiles(_noise_tiles, rectangle, *settings)
-        for block in pixel_blocks(len(pixel)):
-            report((channel + 1) / channels, STEP_LABEL)
+        for block in reported_blocks(
+            len(pixel), STEP_LABEL, (channel + 1) / channels, (channel + 1) / channels
+        ):
             index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
             noise[block, channel] = tiles.take(index)
     return noise

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from ..progress import report
-from ..projection.pixel_blocks import pixel_blocks
 from .look import Look
 from .pixel_field import PixelField
+from .reported_blocks import reported_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,8 +50,7 @@ def lic_images(
 ) -> LicImages:
     """Blend member images. Parameters as in `LicImages`."""
     blend = np.empty(members.shape[1:], dtype=np.float32)
-    for block in pixel_blocks(len(blend)):
-        report(block.start / len(blend), "blending lines")
+    for block in reported_blocks(len(blend), "blending lines"):
         blend[block] = members[:, block].mean(axis=0)
     return LicImages(members, blend, effective_samples, slopes)
 
@@ -63,8 +61,7 @@ def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
         return None
     look = with_magnitude_range(look, field)
     limits = np.empty(len(field.pixel), dtype=np.int32)
-    for block in pixel_blocks(len(limits)):
-        report(block.start / len(limits), "tracing streamlines")
+    for block in reported_blocks(len(limits), "tracing streamlines"):
         limits[block] = np.rint(look.length * relative_magnitude(field.part(block), look))
     return limits
 

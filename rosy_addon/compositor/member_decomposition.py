@@ -11,8 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress, report
-from ..projection.pixel_blocks import pixel_blocks
+from ..progress import progress
 from .lic_images import LicImages
 from .look import Look
 from .per_pixel_lic import (
@@ -23,6 +22,7 @@ from .per_pixel_lic import (
     members_on_screen,
 )
 from .pixel_field import PixelField, all_members, blend_weights, neighbor_table
+from .reported_blocks import reported_blocks
 
 
 def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
@@ -54,8 +54,7 @@ def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> Li
         return first
     with progress(0.5, 1.0):
         second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
-    for block in pixel_blocks(len(field.pixel)):
-        report(1.0, "blending lines")
+    for block in reported_blocks(len(field.pixel), "blending lines", 1.0, 1.0):
         weight = _first_set_weight(field.part(block), look)
         second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
         second.effective_samples[block] += weight * (
@@ -104,8 +103,7 @@ def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
     other, and the weights do not match them.
     """
     screen_members = np.empty((field.line_count, len(field.pixel)), dtype=np.complex64)
-    for block in pixel_blocks(len(field.pixel)):
-        report(block.start / len(field.pixel), "finding directions")
+    for block in reported_blocks(len(field.pixel), "finding directions"):
         part = field.part(block)
         members = np.stack(
             [part.to_screen(part.member_direction(member)) for member in all_members(part, 0.0)]

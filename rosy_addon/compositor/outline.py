@@ -19,11 +19,11 @@ from ..progress import progress, report
 from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.pixel_neighbors import affine_depth, neighbor_masks
 from ..projection.project import project_samples
 from .look import Look
 from .look_units import supersampled_look
+from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
 #: `pixel_neighbors.affine_depth`).
@@ -192,8 +192,7 @@ class _Edges:
         self._cell = np.empty(count, dtype=np.int32)
         # Larger depths are nearer to the eye.
         self._depth, self._tolerance = np.empty((2, count), dtype=np.float32)
-        for block in pixel_blocks(count):
-            report(0.2 * block.start / count, STEP_LABEL)
+        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.2):
             row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
             cell = (row + margin) * np.int32(self._stride) + column + np.int32(margin)
             self._cell[block] = cell
@@ -269,8 +268,7 @@ class _Edges:
         if mesh.triangle_part is None:
             return
         min_cosine = -2.0 if crease_angle is None else np.float32(np.cos(crease_angle))
-        for block in pixel_blocks(self._count):
-            report(0.8 + 0.2 * block.start / self._count, STEP_LABEL)
+        for block in reported_blocks(self._count, STEP_LABEL, 0.8, 1.0):
             entry = np.flatnonzero(gbuffer.instance_id[block] == instance_id) + block.start
             part = mesh.triangle_part.take(gbuffer.triangle[entry])
             for dx, dy, bit in NEIGHBORS_4:
@@ -292,8 +290,7 @@ class _Edges:
         ends. The border is set where another instance or no surface follows.
         """
         gbuffer, depth, outline = self._gbuffer, self._depth, np.float32(self._look.outline)
-        for block in pixel_blocks(self._count):
-            report(block.start / self._count, STEP_LABEL)
+        for block in reported_blocks(self._count, STEP_LABEL):
             row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
             for dx, dy, bit in NEIGHBORS_4:
                 inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
@@ -321,8 +318,7 @@ class _Edges:
         the next.
         """
         depth, tolerance, defined = self._depth, self._tolerance, self._defined
-        for block in pixel_blocks(self._count):
-            report(block.start / self._count, STEP_LABEL)
+        for block in reported_blocks(self._count, STEP_LABEL):
             for dx, dy, bit in ((1, 0, 5), (0, 1, 7)):
                 first = np.flatnonzero(self._is_linked(block, bit)) + block.start
                 second = self._neighbor(first, dx, dy)

@@ -18,6 +18,7 @@ from .filter_kernel import WEIGHT_SLOPES, kernel_of, kernel_weights
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, all_members, neighbor_table, normalized
+from .reported_blocks import reported_blocks
 
 #: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -119,8 +120,7 @@ def members_on_screen(
     members, directions : (count, P) complex64 ndarray
     """
     members, directions = np.empty((2, count, len(field.pixel)), dtype=np.complex64)
-    for block in pixel_blocks(len(field.pixel)):
-        report(block.start / len(field.pixel), "finding directions")
+    for block in reported_blocks(len(field.pixel), "finding directions"):
         part = field.part(block)
         members[:, block] = all_members(part, angle)[:count]
         for member, direction in zip(members, directions, strict=True):
@@ -217,13 +217,11 @@ def direction_table(
     table = np.zeros((count + 1, 4), dtype=np.float32)
     table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
     unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
-    for block in pixel_blocks(count):
-        report(0.3 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.0, 0.3):
         unit_direction[block] = normalized(direction[block])
         unit_member[block] = normalized(member[block])
     min_cosine = np.cos(np.pi / max(degree, 2))
-    for block in pixel_blocks(count):
-        report(0.3 + 0.7 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.3, 1.0):
         conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()
         gradient_sines = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):

@@ -14,8 +14,9 @@ from ..field.symmetry import FieldSymmetry
 from ..progress import progress, report
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
+from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
 NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -211,8 +212,7 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     entry = np.full(field.height * field.width, count, dtype=np.int32)
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        report(block.start / count, "finding neighbors")
+    for block in reported_blocks(count, "finding neighbors"):
         pixel, mask = field.pixel[block], field.neighbor_mask[block]
         for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
             linked = np.flatnonzero(mask >> bit & 1)
@@ -246,8 +246,7 @@ def surface_pixel_field(
     jacobians = np.empty((2, count), dtype=np.complex64).T
     instance_selected = np.asarray(gbuffer.instance_degrees) == degree
     selected = np.empty(count, dtype=bool)
-    for block in pixel_blocks(count):
-        report(0.5 + 0.4 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.5, 0.9):
         jacobians[block] = screen_jacobians(gbuffer.part(block))
         selected[block] = instance_selected[gbuffer.instance_id[block]]
     selected = slice(None) if selected.all() else np.flatnonzero(selected)

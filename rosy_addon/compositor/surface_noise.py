@@ -16,9 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import progress
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
 from .image_noise import (
     BLUR_FACTOR,
@@ -29,6 +28,7 @@ from .image_noise import (
     gaussian_blur,
     hash_bits,
 )
+from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
 SUBPIXEL_OFFSETS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
@@ -107,8 +107,7 @@ def surface_noise(
     units = instance_units(gbuffer, pixel)
     instance_hash = instance_hashes(gbuffer.instance_names)
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
-    for block in pixel_blocks(len(gbuffer.pixel)):
-        report(0.3 + 0.3 * block.start / len(gbuffer.pixel), STEP_LABEL)
+    for block in reported_blocks(len(gbuffer.pixel), STEP_LABEL, 0.3, 0.6):
         block_rest = rest.block(block)
         instance_id = gbuffer.instance_id[block]
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
@@ -125,8 +124,7 @@ def surface_noise(
         with progress(0.6, 1.0):
             _high_pass(gbuffer, total, BLUR_FACTOR * high_pass)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
-    for block in pixel_blocks(len(noise)):
-        report(1.0, STEP_LABEL)
+    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
 
@@ -324,16 +322,16 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     image_width = int(column.max()) - left + 1 + margin
     # Index of each pixel in the image that is blurred.
     index = np.empty(count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        report(0.0, STEP_LABEL)
+    for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
         row = gbuffer.pixel[block] // width - np.int32(bottom)
         index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
 
     def blurred_image(values: np.ndarray | None, part: int) -> np.ndarray:
         """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
         image = np.zeros((height, image_width), dtype=np.float32)
-        for block in pixel_blocks(count):
-            report(part / (len(channels) + 1), STEP_LABEL)
+        for block in reported_blocks(
+            count, STEP_LABEL, part / (len(channels) + 1), part / (len(channels) + 1)
+        ):
             image.reshape(-1)[index[block]] = 1 if values is None else values[block]
         start, stop = part / (len(channels) + 1), (part + 1) / (len(channels) + 1)
         with progress(start, stop):
@@ -344,6 +342,7 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     weight = np.maximum(weight.take(index), 1e-3)
     for part, channel in enumerate(channels, start=1):
         blurred = blurred_image(channel, part)
-        for block in pixel_blocks(count):
-            report((part + 1) / (len(channels) + 1), STEP_LABEL)
+        for block in reported_blocks(
+            count, STEP_LABEL, (part + 1) / (len(channels) + 1), (part + 1) / (len(channels) + 1)
+        ):
             channel[block] -= blurred.take(index[block]) / weight[block]

@@ -10,13 +10,12 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..progress import report
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.mip_map import MipMap
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import surface_tones
 from .look import Look
+from .reported_blocks import reported_blocks
 from .shading import Light, diffuse, light_visibility
 
 #: Minimum difference between the tones that become white and black.
@@ -120,8 +119,7 @@ def target_tone(
         check_tone(look, [instance.tone for instance in gbuffer.instances], reference)
     visibility = light_visibility(gbuffer, look, lights, cache)
     tone = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
-    for block in pixel_blocks(len(tone)):
-        report(block.start / len(tone), "finding tones")
+    for block in reported_blocks(len(tone), "finding tones"):
         block_visibility = [of_light[block] for of_light in visibility]
         part = gbuffer.part(block)
         tone[block] = _block_tone(part, look, lights, reference, block_visibility)

@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..progress import report
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS
 from .image_noise import NOISE_MEAN
 from .pixel_field import PixelField
+from .reported_blocks import reported_blocks
 
 #: Radius of the disc in grains: spots are then about as wide as lines.
 DISC_GRAINS = 1.0
@@ -81,8 +82,9 @@ def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np
         first_cell = (first_row - margin) * stride - margin
         mean = noise[around].mean(axis=1) - np.float32(NOISE_MEAN)
         samples[_padded(field, field.pixel[around], stride) - first_cell] = mean + 1j
-        for block in pixel_blocks(len(band)):
-            report(first_row / field.height, STEP_LABEL)
+        for block in reported_blocks(
+            len(band), STEP_LABEL, first_row / field.height, first_row / field.height
+        ):
             cell = _padded(field, field.pixel[band[block]], stride) - first_cell
             total = np.zeros(len(cell), dtype=np.complex64)
             for dx, dy in offsets.tolist():

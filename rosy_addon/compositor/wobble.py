@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..deterministic_trig import cos_sin, unit_phasor
-from ..progress import progress, report
+from ..progress import progress
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import rest_coordinates
 from .look import Look, is_hatched
 from .look_units import cell_size_args
 from .pixel_field import PixelField, product
+from .reported_blocks import reported_blocks
 from .surface_noise import cell_scale, instance_units
 
 #: Number of plane waves in the sum.
@@ -82,8 +82,7 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
         with progress(0.0, 0.5):
             rest = rest_coordinates(gbuffer)
     angle = np.empty(count, dtype=np.float32)
-    for block in pixel_blocks(count):
-        report(0.5 + 0.5 * block.start / count, "bending lines")
+    for block in reported_blocks(count, "bending lines", 0.5, 1.0):
         if rest is None:
             row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
             position = np.stack([column, row, 0 * row]).astype(np.float32)
@@ -145,8 +144,7 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
         channel: np.empty(len(angle), np.complex64) if channel[0] == "deviation" else values
         for channel, values in field.channels.items()
     }
-    for block in pixel_blocks(len(angle)):
-        report(block.start / len(angle), "bending lines")
+    for block in reported_blocks(len(angle), "bending lines"):
         block_angle = angle[block].astype(np.float64)
         phase = unit_phasor(field.degree * block_angle)
         representation[block] = product(field.representation[block], phase)

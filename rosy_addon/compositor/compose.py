@@ -37,13 +37,13 @@ from .look import Look, colors_magnitude, colors_values, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
-from .pixel_field import PixelField
+from .pixel_field import PixelField, entries_of_rows
 from .reported_blocks import reported_blocks
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
 from .strip_division import divide_into_strips
-from .strips import Strip, entries_of_rows, join_strips
+from .strips import Strip, join_strips
 from .target_tone import ReferenceRender, target_tone
 
 #: Share of the progress that tones, directions and outlines take, which all strips share.
@@ -416,9 +416,9 @@ def _resolve_pixels(
     for start in range(0, height, band_rows):
         report(start / height, "drawing the ink")
         band = rgba[start : start + band_rows]
-        first_pixel = (rows[0] + start * s) * width
-        border = np.array([first_pixel, first_pixel + band.size // 4 * s * s], dtype=np.int64)
-        block = slice(*np.searchsorted(pixel, border.astype(pixel.dtype)).tolist())
+        band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
+        first_pixel = band_of_frame[0] * width
+        block = entries_of_rows(pixel, width, band_of_frame)
         if block.start == block.stop:  # rows that are not written to take no memory
             continue
         # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
@@ -437,12 +437,12 @@ def _resolve_pixels(
         if coverage is None:
             band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
         else:
-            first, stop = np.searchsorted(coverage.pixel, border.astype(np.int32)).tolist()
-            entry = coverage.entry[first:stop]
+            shares = entries_of_rows(coverage.pixel, width, band_of_frame)
+            entry = coverage.entry[shares]
             shared = np.empty((len(entry), 4), dtype=np.float32)
             shared[:, 3] = alpha[entry] * np.float32(coverage.share)
             shared[:, :3] = color[entry] * shared[:, 3:]
-            np.add.at(band_rgba, coverage.pixel[first:stop] - first_pixel, shared)
+            np.add.at(band_rgba, coverage.pixel[shares] - first_pixel, shared)
             band[...] = band_rgba.reshape(band.shape)
         band_alpha = band[..., 3:]
         np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)

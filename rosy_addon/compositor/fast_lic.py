@@ -34,10 +34,10 @@ from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow, is_hatched
 from .look_units import PixelLook
-from .pixel_field import PixelField
+from .pixel_field import PixelField, entries_of_rows
 from .reported_blocks import reported_blocks
 from .streamline_batch import StreamlineBatch
-from .strips import Strip, entries_of_rows, streamline_margin
+from .strips import Strip, streamline_margin
 
 #: Label of most steps.
 STEP_LABEL = "tracing streamlines"

@@ -123,11 +123,9 @@ def image_noise(
         settings = grain, seed, channel, density, high_pass
         with progress(channel / channels, (channel + 1) / channels):
             tiles = cached_tiles(_noise_tiles, rectangle, *settings)
-        for block in reported_blocks(
-            len(pixel), STEP_LABEL, (channel + 1) / channels, (channel + 1) / channels
-        ):
-            index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
-            noise[block, channel] = tiles.take(index)
+            for block in reported_blocks(len(pixel), STEP_LABEL, 1.0, 1.0):
+                index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
+                noise[block, channel] = tiles.take(index)
     return noise
 
 

@@ -287,6 +287,12 @@ def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldC
     return {channel: values for channel, values in channels.items() if channel in present}
 
 
+def entries_of_rows(pixel: np.ndarray, width: int, rows: tuple[int, int]) -> slice:
+    """Return the range of ascending flat pixels, (P,), that are in some rows of a frame."""
+    first_pixels = np.array([max(rows[0], 0) * width, rows[1] * width])
+    return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
+
+
 def mask_undefined(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
 ) -> np.ndarray:
@@ -312,8 +318,7 @@ def mask_undefined(
         row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
         open_bits = row_bits[:-2] | row_bits[1:-1] << 3 | row_bits[2:] << 6
         open_bits *= padded[1:-1, 1:-1]
-        first_pixels = np.array([start, start + band_rows], dtype=np.int64) * width
-        band = slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
+        band = entries_of_rows(pixel, width, (start, start + band_rows))
         result[band] = mask[band] & open_bits[row[band] - start, column[band]]
     return result
 

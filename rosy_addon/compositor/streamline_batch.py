@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
-from .drifting_averages import DriftingAverages
+from .drifting_averages import MAX_LEVELS, DriftingAverages, MovingKernel
 from .filter_kernel import kernel_of, kernel_weights
-from .flow import MAX_LEVELS, moving_kernel, streamline_reach
+from .flow import streamline_reach
 from .look import Look, has_flow
 
 #: Steps between compactions, which remove streamlines that have ended.
@@ -89,7 +89,7 @@ class StreamlineBatch:
         self._moving_kernels = []
         if has_flow(look):
             self._moving_kernels = [
-                moving_kernel(each, 1 if limit is None else min(each.length + 1, MAX_LEVELS))
+                MovingKernel(each, 1 if limit is None else min(each.length + 1, MAX_LEVELS))
                 for each, limit in zip(looks, step_limits, strict=True)
             ]
         step_scale, noise_scale, slope_scale = covering.state_scales

@@ -326,23 +326,18 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
         row = gbuffer.pixel[block] // width - np.int32(bottom)
         index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
 
-    def blurred_image(values: np.ndarray | None, part: int) -> np.ndarray:
+    def blurred_image(values: np.ndarray | None) -> np.ndarray:
         """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
         image = np.zeros((height, image_width), dtype=np.float32)
-        for block in reported_blocks(
-            count, STEP_LABEL, part / (len(channels) + 1), part / (len(channels) + 1)
-        ):
+        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
             image.reshape(-1)[index[block]] = 1 if values is None else values[block]
-        start, stop = part / (len(channels) + 1), (part + 1) / (len(channels) + 1)
-        with progress(start, stop):
-            image = gaussian_blur(image, sigma)
-        return image.reshape(-1)
+        return gaussian_blur(image, sigma).reshape(-1)
 
-    weight = blurred_image(None, 0)
-    weight = np.maximum(weight.take(index), 1e-3)
-    for part, channel in enumerate(channels, start=1):
-        blurred = blurred_image(channel, part)
-        for block in reported_blocks(
-            count, STEP_LABEL, (part + 1) / (len(channels) + 1), (part + 1) / (len(channels) + 1)
-        ):
-            channel[block] -= blurred.take(index[block]) / weight[block]
+    images = len(channels) + 1
+    with progress(0.0, 1 / images):
+        weight = np.maximum(blurred_image(None).take(index), 1e-3)
+    for number, channel in enumerate(channels, start=1):
+        with progress(number / images, (number + 1) / images):
+            blurred = blurred_image(channel)
+            for block in reported_blocks(count, STEP_LABEL, 1.0, 1.0):
+                channel[block] -= blurred.take(index[block]) / weight[block]

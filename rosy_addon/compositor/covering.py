@@ -293,6 +293,9 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
             for column in (0, 1, *range(3, rows.shape[1], 2)):
                 np.negative(rows[:, column], out=rows[:, column])
             scatter_rows(state_table[sheet + line_count], block_cells, rows)
+    seams = None
+    if field.seam_steps is not None and len(field.seam_steps.source):
+        seams = SeamTable(field.seam_steps, cell_of_pixel, per_turn)
     return Covering(
         sheets=2 * line_count,
         sheets_per_turn=per_turn,
@@ -305,7 +308,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
             max_noise / INT16_MAX,
             max_slope / INT16_MAX,
         ),
-        seams=_seam_table(field.seam_steps, cell_of_pixel, per_turn),
+        seams=seams,
         has_directions=not field.symmetry.has_opposites,
     )
 
@@ -324,15 +327,6 @@ def _over_square(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     square = np.maximum(x * x + y * y, np.float32(SHORT_STEP * SHORT_STEP))
     return x / square, y / square
-
-
-def _seam_table(
-    steps: SeamSteps | None, cell_of_pixel: np.ndarray, sheets_per_turn: int
-) -> SeamTable | None:
-    """Return the table of steps across seams, or None if there are none."""
-    if steps is None or not len(steps.source):
-        return None
-    return SeamTable(steps, cell_of_pixel, sheets_per_turn)
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:

@@ -137,36 +137,15 @@ def _noise_tiles(
     density: float,
     high_pass: float,
 ) -> np.ndarray:
-    """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
+    """Flat float32 noise of one channel in a rectangle of the picture, row by row, averaged over each pixel."""
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
-    padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
-    cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
-    if high_pass:
-        outside = "edge" if margin == full_margin else "mean"
-        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
-        report(1.0, STEP_LABEL)
-        cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
-    return np.ascontiguousarray(cells).reshape(-1)
-
-
-def _lattice_noise(
-    left: int,
-    right: int,
-    bottom: int,
-    top: int,
-    grain: float,
-    seed: int,
-    channel: int,
-    density: float,
-) -> np.ndarray:
-    """(top - bottom, right - left) float32 noise without high pass, averaged over each pixel."""
     cos, sin = np.cos(LATTICE_ANGLE) / grain, np.sin(LATTICE_ANGLE) / grain
-    column = np.arange(left, right, dtype=np.float64)
-    row = np.arange(bottom, top, dtype=np.float64)[:, None]
+    column = np.arange(left - margin, right + margin, dtype=np.float64)
+    row = np.arange(bottom - margin, top + margin, dtype=np.float64)[:, None]
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
-    total = np.zeros((top - bottom, right - left), dtype=np.float32)
+    total = np.zeros((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
         report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
@@ -177,10 +156,13 @@ def _lattice_noise(
                 cell_y = np.floor(sin * px + cos * py).astype(np.int32)
                 total[block] += hash_bits((cell_x, cell_y), seed, channel, density)
     scale = NOISE_STD / np.sqrt(density * (1 - density))
-    return (
-        np.float32(NOISE_MEAN - density * scale)
-        + np.float32(scale / (TAPS_PER_SIDE * TAPS_PER_SIDE)) * total
-    )
+    cells = np.float32(NOISE_MEAN - density * scale) + np.float32(scale / len(taps) ** 2) * total
+    if high_pass:
+        outside = "edge" if margin == full_margin else "mean"
+        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
+        report(1.0, STEP_LABEL)
+        cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
+    return np.ascontiguousarray(cells).reshape(-1)
 
 
 def high_pass_margin(high_pass: float) -> int:

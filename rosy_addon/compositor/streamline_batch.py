@@ -333,7 +333,9 @@ class StreamlineBatch:
             if len(crossing):
                 steps = covering.seams.steps
                 reached = steps.displaced(seam, position[crossing]) + steps.offset.take(seam)
-                position[crossing] = _within_reach(reached)
+                axes = reached.view(np.float32)
+                np.clip(axes, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=axes)
+                position[crossing] = reached
                 direction[crossing] = steps.displaced(seam, direction[crossing])
                 target_phase[crossing] += covering.seams.sheet_shift.take(seam)
             packed_phase = covering.packed_phase.take(cell, mode="clip")
@@ -506,13 +508,6 @@ class _LoopFinder:
         """Forget the streamlines that have ended; those with these indices remain."""
         if len(self._past_state):
             self._past_state = self._past_state[remaining]
-
-
-def _within_reach(position: np.ndarray) -> np.ndarray:
-    """(n,) complex64 offsets from the centers of cells, at most `MAX_SEAM_OFFSET` along each axis."""
-    offset = position.view(np.float32)
-    np.clip(offset, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=offset)
-    return position
 
 
 def _lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -152,10 +152,24 @@ def solid_noise(
     out : (K, n) float32 ndarray
         Independent channels with the mean 0. The standard deviation of single cells is `NOISE_STD`.
     """
+    # Base-2 logarithm of the size of cells.
     level = np.log2(cell_size * np.float32(LATTICE_SCALE))
     lattice = [_to_lattice_space(rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
+    # Finer cells than float32 can tell apart would have indices too large for integers.
+    farthest = max(float(np.abs(position).max(initial=0)) for position in lattice)
+    level = np.maximum(level, np.float32(np.log2(max(farthest, 1e-30)) - MAX_CELL_BITS))
+    finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
     out[...] = 0
-    _accumulate_octaves(out, lattice, level, instance_hash, seed, density)
+    for index in range(OCTAVES):
+        octave = finest + np.float32(index)
+        weight = octave_weights(octave - level)
+        scale = np.exp2(-octave)
+        octave_index = (octave + OCTAVE_OFFSET).astype(np.int32)
+        for position in lattice:
+            cell = np.floor(position * scale).astype(np.int32)
+            for channel, total in enumerate(out):
+                bits = hash_bits((*cell, octave_index, instance_hash), seed, channel, density)
+                total += weight * (bits - np.float32(density))
     out *= np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
 
 
@@ -229,45 +243,6 @@ def feature_scale(
     """
     bend = curvature * pixel_size * np.float32(FEATURE_GRAINS * grain)
     return 1 / np.clip(bend, 1, np.float32(1 / (1 - detail)))
-
-
-def _accumulate_octaves(
-    total: np.ndarray,
-    lattice: Sequence[np.ndarray],
-    level: np.ndarray,
-    instance_hash: np.ndarray,
-    seed: int,
-    density: float,
-) -> None:
-    """Add the weighted bits of the cells of all octaves to `total`.
-
-    Parameters
-    ----------
-    total : (K, n) float32 ndarray
-        Modified in place.
-    lattice : sequence of (3, n) float32 ndarray
-        Sample positions in the space of the lattice.
-    level : (n,) float32 ndarray
-        Base-2 logarithm of the size of cells at each pixel, in the units of that space.
-    instance_hash : (n,) uint32 ndarray
-        Hashes of the mesh instances.
-    seed, density
-        As for `surface_noise`.
-    """
-    # Finer cells than float32 can tell apart would have indices too large for integers.
-    farthest = max(float(np.abs(position).max(initial=0)) for position in lattice)
-    level = np.maximum(level, np.float32(np.log2(max(farthest, 1e-30)) - MAX_CELL_BITS))
-    finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
-    for index in range(OCTAVES):
-        octave = finest + np.float32(index)
-        weight = octave_weights(octave - level)
-        scale = np.exp2(-octave)
-        octave_index = (octave + OCTAVE_OFFSET).astype(np.int32)
-        for position in lattice:
-            cell = np.floor(position * scale).astype(np.int32)
-            for channel, out in enumerate(total):
-                bits = hash_bits((*cell, octave_index, instance_hash), seed, channel, density)
-                out += weight * (bits - np.float32(density))
 
 
 def octave_weights(octave_offset: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from ..cache import Cache
 from ..color import map_colors, to_linear
 from ..progress import progress, report
-from ..projection.gbuffer import GBuffer, PixelCoverage
+from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
@@ -187,12 +187,65 @@ class _Canvas:
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
         """Return the picture of a strip, and that of the spread: the latter empty without thresholds."""
-        gbuffer = self._gbuffer
-        frame = gbuffer.camera.width, strip.drawn_rows, self.look.supersampling, gbuffer.coverage
-        rgba = _resolve_pixels(gbuffer.pixel, self.color, self.alpha, *frame)
+        rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
             return rgba, rgba[:, :0]
-        return rgba, _resolve_pixels(gbuffer.pixel, self.spread, self.alpha, *frame)
+        return rgba, self._resolved(self.spread, strip.drawn_rows)
+
+    def _resolved(self, color: np.ndarray, rows: tuple[int, int]) -> np.ndarray:
+        """Assemble an image from the colors of subpixels.
+
+        Parameters
+        ----------
+        color : (P, 3) or (P, 1) float32 ndarray
+            Linear, not premultiplied.
+        rows : (int, int)
+            Of the supersampled frame: the first row of the image, and the row after its last one.
+
+        Returns
+        -------
+        (h, w, 4) float32 ndarray
+            Linear RGBA, not premultiplied.
+        """
+        gbuffer, s = self._gbuffer, self.look.supersampling
+        pixel, width, coverage = gbuffer.pixel, gbuffer.camera.width, gbuffer.coverage
+        height = (rows[1] - rows[0]) // s
+        rgba = np.zeros((height, width // s, 4), dtype=np.float32)
+        band_rows = max(BLOCK_PIXELS // (width * s), 1)
+        for start in range(0, height, band_rows):
+            report(start / height, "drawing the ink")
+            band = rgba[start : start + band_rows]
+            band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
+            first_pixel = band_of_frame[0] * width
+            block = entries_of_rows(pixel, width, band_of_frame)
+            if block.start == block.stop:  # rows that are not written to take no memory
+                continue
+            # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
+            band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
+            block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
+            block_rgba[:, 3] = self.alpha[block]
+            if s == 1 and coverage is None:
+                block_rgba[:, :3] = color[block]
+                scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
+                band[...] = band_rgba.reshape(band.shape)
+                continue
+            if coverage is not None:
+                block_rgba[:, 3] *= coverage.own[block]
+            block_rgba[:, :3] = color[block] * block_rgba[:, 3:]
+            scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
+            if coverage is None:
+                band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
+            else:
+                shares = entries_of_rows(coverage.pixel, width, band_of_frame)
+                entry = coverage.entry[shares]
+                shared = np.empty((len(entry), 4), dtype=np.float32)
+                shared[:, 3] = self.alpha[entry] * np.float32(coverage.share)
+                shared[:, :3] = color[entry] * shared[:, 3:]
+                np.add.at(band_rgba, coverage.pixel[shares] - first_pixel, shared)
+                band[...] = band_rgba.reshape(band.shape)
+            band_alpha = band[..., 3:]
+            np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
+        return rgba
 
 
 class _Layer(NamedTuple):
@@ -375,75 +428,3 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
         missing = np.isnan(position)
         color[missing] = to_linear(tone[missing])
     return color
-
-
-def _resolve_pixels(
-    pixel: np.ndarray,
-    color: np.ndarray,
-    alpha: np.ndarray,
-    width: int,
-    rows: tuple[int, int],
-    supersampling: int,
-    coverage: PixelCoverage | None = None,
-) -> np.ndarray:
-    """Assemble the image from the colors of subpixels.
-
-    Parameters
-    ----------
-    pixel : (P,) int32 ndarray
-        Flat indices into the supersampled frame.
-    color : (P, 3) or (P, 1) float32 ndarray
-        Linear, not premultiplied.
-    alpha : (P,) float32 ndarray
-    width : int
-        Of the supersampled frame, in pixels.
-    rows : (int, int)
-        Of that frame: the first row of the image, and the row after its last one.
-    supersampling : int
-        Subpixels along each side of a pixel.
-    coverage : PixelCoverage, optional
-        Shares of pixels that the colors have, if they are not those of subpixels.
-
-    Returns
-    -------
-    (H / supersampling, width / supersampling, 4) float32 ndarray
-        Linear RGBA, not premultiplied.
-    """
-    s = supersampling
-    height = (rows[1] - rows[0]) // s
-    rgba = np.zeros((height, width // s, 4), dtype=np.float32)
-    band_rows = max(BLOCK_PIXELS // (width * s), 1)
-    for start in range(0, height, band_rows):
-        report(start / height, "drawing the ink")
-        band = rgba[start : start + band_rows]
-        band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
-        first_pixel = band_of_frame[0] * width
-        block = entries_of_rows(pixel, width, band_of_frame)
-        if block.start == block.stop:  # rows that are not written to take no memory
-            continue
-        # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
-        band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
-        block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
-        block_rgba[:, 3] = alpha[block]
-        if s == 1 and coverage is None:
-            block_rgba[:, :3] = color[block]
-            scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-            band[...] = band_rgba.reshape(band.shape)
-            continue
-        if coverage is not None:
-            block_rgba[:, 3] *= coverage.own[block]
-        block_rgba[:, :3] = color[block] * block_rgba[:, 3:]
-        scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-        if coverage is None:
-            band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
-        else:
-            shares = entries_of_rows(coverage.pixel, width, band_of_frame)
-            entry = coverage.entry[shares]
-            shared = np.empty((len(entry), 4), dtype=np.float32)
-            shared[:, 3] = alpha[entry] * np.float32(coverage.share)
-            shared[:, :3] = color[entry] * shared[:, 3:]
-            np.add.at(band_rgba, coverage.pixel[shares] - first_pixel, shared)
-            band[...] = band_rgba.reshape(band.shape)
-        band_alpha = band[..., 3:]
-        np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
-    return rgba

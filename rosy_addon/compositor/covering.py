@@ -91,8 +91,8 @@ class Covering:
 
     Attributes
     ----------
-    sheets : int
-        S.
+    line_count : int
+        M = S / 2, the number of lines through a cell.
     sheets_per_turn : int
         Sheets that a full turn passes: S, or N.
     width : int
@@ -113,7 +113,7 @@ class Covering:
         Whether lines point one way only: the field has no opposites.
     """
 
-    sheets: int
+    line_count: int
     sheets_per_turn: int
     width: int
     cell_of_pixel: np.ndarray
@@ -122,11 +122,6 @@ class Covering:
     state_scales: tuple[float, float, float]
     seams: SeamTable | None = None
     has_directions: bool = False
-
-    @property
-    def line_count(self) -> int:
-        """M, the number of lines through a cell."""
-        return self.sheets // 2
 
     @property
     def cell_count(self) -> int:
@@ -155,7 +150,7 @@ class Covering:
         """
         one_turn = np.arange(self.sheets_per_turn) * self.cell_count
         forward = np.tile(one_turn, 2 * max_winding)
-        if self.sheets_per_turn == self.sheets:
+        if self.sheets_per_turn == 2 * self.line_count:
             return forward, self.line_count
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
@@ -167,7 +162,7 @@ class Covering:
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
         """(n,) bool: whether states of a field of odd degree are its directions, not their opposites."""
         sheet = state // np.int32(self.cell_count)
-        if self.sheets_per_turn == self.sheets:
+        if self.sheets_per_turn == 2 * self.line_count:
             return sheet % 2 == 0
         return sheet < self.line_count
 
@@ -297,7 +292,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
     if field.seam_steps is not None and len(field.seam_steps.source):
         seams = SeamTable(field.seam_steps, cell_of_pixel, per_turn)
     return Covering(
-        sheets=2 * line_count,
+        line_count=line_count,
         sheets_per_turn=per_turn,
         width=width,
         cell_of_pixel=cell_of_pixel,

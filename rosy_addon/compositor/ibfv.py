@@ -478,22 +478,18 @@ class _Sheets:
         own = self._first_states.take(sheet)
         own += cell
         states, unlinked = [own], []
-        for step in (column, row * 3, column + 3 * row):
-            neighbor = step + 4
+        for columns, rows in ((column, 0), (0, row), (column, row)):
+            neighbor = columns + 3 * rows + 4
             neighbor *= self.cell_count
             neighbor += cell
             shift = self._shift.take(neighbor)
-            unlinked.append(np.flatnonzero(shift < 0))
+            points = np.flatnonzero(shift < 0)
             state = self._first_states.take(sheet + shift, mode="clip")
             state += cell
-            states.append(state)
-        row_cells = row * self._width
-        states[1] += column
-        states[2] += row_cells
-        states[3] += column
-        states[3] += row_cells
-        for state, points in zip(states[1:], unlinked, strict=True):
+            state += columns + rows * self._width
             state[points] = own[points]
+            states.append(state)
+            unlinked.append(points)
         np.abs(x, out=x)
         np.abs(y, out=y)
         both = x * y

@@ -165,16 +165,9 @@ def convolve_members(
             block_limit = None if step_limit is None else step_limit[block]
             (forward_sum, forward), (backward_sum, backward) = (
                 integrate_noise(
-                    block,
-                    neighbors,
-                    tracer(block),
-                    padded_noise,
-                    look.length,
-                    side * look.step,
-                    block_limit,
-                    slope,
+                    block, neighbors, tracer(block), padded_noise, look, side, block_limit
                 )
-                for side, slope in zip((1, -1), WEIGHT_SLOPES[kernel], strict=True)
+                for side in (1, -1)
             )
             full_length = look.length if block_limit is None else block_limit
             weights = kernel_weights(forward, backward, full_length, kernel)
@@ -264,10 +257,9 @@ def integrate_noise(
     neighbors: np.ndarray,
     direction_at: DirectionSampler,
     noise: np.ndarray,
-    length: int,
-    step: float,
+    look: Look,
+    side: int,
     step_limit: np.ndarray | None,
-    weight_slope: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
@@ -288,15 +280,12 @@ def integrate_noise(
         between calls.
     noise : (P + 1, K) float32 ndarray
         0 in row P.
-    length : int
-        Maximum number of steps.
-    step : float
-        Length of a step in pixels, at most 1. Negative for the backward half.
+    look : Look
+        In pixels of the frame. Its `length`, `step` and kernel are used.
+    side : {1, -1}
+        The half of the streamline: forward or backward.
     step_limit : (B,) ndarray or None
-        Number of steps after which each streamline ends. None for `length`.
-    weight_slope : float
-        How much the weight of the samples falls over the whole length; negative if it rises. See
-        `filter_kernel`.
+        Number of steps after which each streamline ends. None for the length of the look.
 
     Returns
     -------
@@ -305,7 +294,9 @@ def integrate_noise(
     samples : (B,) float32 ndarray
         Number of these samples.
     """
-    end = neighbors.shape[1] - 1
+    end, step = neighbors.shape[1] - 1, side * look.step
+    forward_slope, backward_slope = WEIGHT_SLOPES[kernel_of(look)]
+    weight_slope = forward_slope if side > 0 else backward_slope
     neighbors = neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
     offset = np.zeros((len(entry), 2), dtype=np.float32)
@@ -313,9 +304,9 @@ def integrate_noise(
     samples = np.zeros(len(entry), dtype=np.float32)
     previous_direction = None
     weight_step = weight_slope / (
-        1 + np.asarray(length if step_limit is None else step_limit, dtype=np.float32)
+        1 + np.asarray(look.length if step_limit is None else step_limit, dtype=np.float32)
     )
-    for step_index in range(1, length + 1):
+    for step_index in range(1, look.length + 1):
         direction = direction_at(entry, offset)
         if previous_direction is None:
             offset += np.float32(step) * direction

@@ -16,7 +16,7 @@ from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines, even_line_images, has_even_lines
+from .even_lines import EvenLines, has_even_lines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
 from .flow import with_cycle_distance
@@ -32,7 +32,7 @@ from .hatching import (
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
-from .lic_images import LicImages, relative_magnitude, with_magnitude_range
+from .lic_images import LicImages, lic_images, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
@@ -341,7 +341,9 @@ def _line_images(
         looks.append(replace(layer.look, length=break_steps(layer.look)))
     images = stages.lic(layer.field, looks, strip) if looks else []
     if even_lines is not None:
-        images = [even_line_images(even_lines), *images]
+        # Even lines stand for streaks.
+        members = even_lines.streaks[..., None]
+        images = [lic_images(members, np.ones(members.shape[1], dtype=np.float32)), *images]
     return images[0], images[1] if has_breaks(layer.look) else None
 
 

@@ -26,7 +26,6 @@ from ..progress import progress
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.project import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
-from .lic_images import LicImages, lic_images
 from .look import Look, is_hatched
 from .look_units import instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
@@ -205,13 +204,6 @@ def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> 
     covered += np.maximum(half - 1 - low, 0)  # the previous line
     covered /= edge
     return covered
-
-
-def even_line_images(lines: EvenLines) -> LicImages:
-    """Return even lines as the images of members, as if they were streaks."""
-    count = lines.streaks.shape[1]
-    effective_samples = np.ones(count, dtype=np.float32)
-    return lic_images(lines.streaks[..., None], effective_samples)
 
 
 def uneven_width(

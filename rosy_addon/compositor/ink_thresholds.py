@@ -396,13 +396,12 @@ def picture_thresholds(
     for (node, weight), level in zip(PIXEL_NODES, PIXEL_LEVELS, strict=True):
         if not is_sampled and node:
             continue
+        part = modulation
         resolved: np.ndarray | float = 1.0
         if even_lines is not None:
             sample, period = _even_sample(even_lines, crowding > level, node)
             part = modulation._replace(even_lines=sample)
             resolved = np.einsum("klp,lp->kp", places, resolved_share(period, samples_per_side))
-        else:
-            part = modulation
         if part.break_images is not None:
             part = part._replace(break_images=_streak_sample(part.break_images, node))
         part_images = _streak_sample(images, node)

@@ -37,11 +37,6 @@ def colors_values(look: Any) -> bool:
     return look.hue == "values" and not colors_magnitude(look)
 
 
-def uses_color_map(look: Any) -> bool:
-    """Return whether lines have the colors of the color map."""
-    return colors_magnitude(look) or colors_values(look)
-
-
 def is_hatched(look: Any) -> bool:
     """Return whether lines are drawn with ink on paper."""
     return look.ink == "hatch"
@@ -386,7 +381,7 @@ class Look:
             "magma": "Black through red to pale yellow",
             "grey": "Black to white",
         },
-        **_shading("colour", uses_color_map),
+        **_shading("colour", lambda look: colors_magnitude(look) or colors_values(look)),
     )
     shading: float = number(
         0.7,

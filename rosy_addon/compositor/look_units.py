@@ -11,7 +11,7 @@ import numpy as np
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.shadow_maps import world_bounds
-from ..settings import Number, pixel_lengths, settings_of, switch
+from ..settings import pixel_lengths, settings_of, switch
 from .look import Look
 
 #: Lengths in Blender units follow the camera in steps of 1 / 32 octave, so that tables made for a
@@ -114,9 +114,10 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
 def scaled_look(look: Look, scale: float) -> Look:
     """Multiply the lengths of a look, as far as their ranges allow."""
     scale = float(np.clip(scale, *_scale_limits(look)))
-    lengths = {
-        setting.name: _scaled_length(look, setting, scale) for setting in pixel_lengths(Look)
-    }
+    lengths = {}
+    for setting in pixel_lengths(Look):
+        length = getattr(look, setting.name) * scale
+        lengths[setting.name] = max(round(length), 1) if setting.is_integer else length
     unit_size = float(np.clip(look.unit_size / scale, *_range_of("unit_size")))
     return replace(look, **lengths, unit_size=unit_size)
 
@@ -205,9 +206,3 @@ def _scale_limits(look: Look) -> tuple[float, float]:
     )
     min_scale = max(1.0, settings_of(Look)["grain"].low) / look.grain
     return min(min_scale, 1.0), max(max_scale, 1.0)
-
-
-def _scaled_length(look: Look, setting: Number, scale: float) -> float:
-    """Return a length of a look times a scale, rounded to at least 1 if it is an integer."""
-    value = getattr(look, setting.name) * scale
-    return max(round(value), 1) if setting.is_integer else value

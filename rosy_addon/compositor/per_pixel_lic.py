@@ -295,8 +295,7 @@ def integrate_noise(
         Number of these samples.
     """
     end, step = neighbors.shape[1] - 1, side * look.step
-    forward_slope, backward_slope = WEIGHT_SLOPES[kernel_of(look)]
-    weight_slope = forward_slope if side > 0 else backward_slope
+    weight_slope = WEIGHT_SLOPES[kernel_of(look)][0 if side > 0 else 1]
     neighbors = neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
     offset = np.zeros((len(entry), 2), dtype=np.float32)

@@ -278,8 +278,13 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
             step_x, step_y = _to_screen(field, block, *direction, look.foreshorten)
             slope_x, slope_y = step_x, step_y
             if look.foreshorten:
-                step_x, step_y = _shorten_to_neighbors(step_x, step_y)
-                slope_x, slope_y = _over_square(step_x, step_y)
+                # Steps are at most one row or one column of pixels.
+                scale = 1 / np.maximum(np.maximum(np.abs(step_x), np.abs(step_y)), np.float32(1))
+                step_x, step_y = step_x * scale, step_y * scale
+                # A derivative to the left is multiplied by a distance to the left (see
+                # `streamline_batch`). Both are proportional to the length of the step.
+                square = np.maximum(step_x * step_x + step_y * step_y, np.float32(SHORT_STEP**2))
+                slope_x, slope_y = step_x / square, step_y / square
             rows[:, 3::2] = np.rint(up * slope_x[:, None] - right * slope_y[:, None])
             step_x, step_y = step_x * quantize[0], step_y * quantize[0]
             rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
@@ -306,22 +311,6 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         seams=seams,
         has_directions=not field.symmetry.has_opposites,
     )
-
-
-def _shorten_to_neighbors(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shorten steps that are longer than one row or one column of pixels."""
-    scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
-    return x * scale, y * scale
-
-
-def _over_square(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Divide steps by their squared lengths, for derivatives of the noise to their left.
-
-    Such a derivative is multiplied by a distance to the left (see `streamline_batch`). Both are
-    proportional to the length of the step.
-    """
-    square = np.maximum(x * x + y * y, np.float32(SHORT_STEP * SHORT_STEP))
-    return x / square, y / square
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:

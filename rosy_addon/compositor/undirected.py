@@ -26,20 +26,13 @@ GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 STEP_LABEL = "drawing undirected texture"
 
 
-def _unit_disc() -> np.ndarray:
-    """(SAMPLE_COUNT, 2) float32 points that are spread evenly over the unit disc."""
-    index = np.arange(SAMPLE_COUNT)
-    radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32)
-
-
-#: The samples of a disc of radius 1.
-UNIT_DISC = _unit_disc()
-
-
 def disc_offsets(grain: float) -> np.ndarray:
     """Return the (SAMPLE_COUNT, 2) int32 pixel offsets (dx, dy) of the samples of a disc."""
-    return np.floor(np.float32(DISC_GRAINS * grain) * UNIT_DISC + np.float32(0.5)).astype(np.int32)
+    # A sunflower spiral is spread evenly over the unit disc.
+    index = np.arange(SAMPLE_COUNT)
+    radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE
+    disc = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32)
+    return np.floor(np.float32(DISC_GRAINS * grain) * disc + np.float32(0.5)).astype(np.int32)
 
 
 def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np.ndarray | None:

@@ -154,10 +154,7 @@ def _measure_images(field: PixelField, images: LicImages) -> Measurements:
 
 def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
     """Return (P,) complex: the unit directions on the screen of members in the view plane."""
-    if field.screen_jacobian is not None:
-        member = (
-            field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
-        )
+    member = field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
     return member / np.maximum(np.abs(member), 1e-12)
 
 

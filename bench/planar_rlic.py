@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-
-from rosy_addon.compositor.compose import compose_planar
+from harness.planar import compose_planar
 
 from . import cases
 from .timing import Case, compare, main, use_one_core

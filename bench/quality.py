@@ -15,15 +15,15 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from harness.planar import lic, planar_pixel_field
 from scipy import ndimage
 
-from rosy_addon.compositor.lic import lic, look_noise
+from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import (
     PixelField,
     nearest_member,
-    planar_pixel_field,
     surface_pixel_field,
 )
 from rosy_addon.field.field_io import load_field
@@ -154,10 +154,7 @@ def _measure_images(field: PixelField, images: LicImages) -> Measurements:
 
 def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
     """Return (P,) complex: the unit directions on the screen of members in the view plane."""
-    if field.screen_jacobian is not None:
-        member = (
-            field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
-        )
+    member = field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
     return member / np.maximum(np.abs(member), 1e-12)
 
 

@@ -7,11 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import RosyError
-from ..progress import report
 from ..projection.gbuffer import GBuffer, MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import surface_values
 from .look import Look, colors_values
+from .reported_blocks import reported_blocks
 
 #: Smallest difference between the numbers at the bottom and at the top of the color map. With it, the
 #: map is a step: larger numbers have the color at the top.
@@ -108,7 +107,6 @@ def map_positions(gbuffer: GBuffer, look: Look) -> np.ndarray:
     check_color_values(look, gbuffer.instances)
     low, scale = value_scale(look, value_ranges(gbuffer.instances))
     positions = np.empty(len(gbuffer.pixel), dtype=np.float32)
-    for block in pixel_blocks(len(positions)):
-        report(block.start / len(positions), "finding colors")
+    for block in reported_blocks(len(positions), "finding colors"):
         positions[block] = scaled_positions(surface_values(gbuffer.part(block)), low, scale)
     return positions

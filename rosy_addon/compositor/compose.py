@@ -11,12 +11,12 @@ import numpy as np
 from ..cache import Cache
 from ..color import map_colors, to_linear
 from ..progress import progress, report
-from ..projection.gbuffer import GBuffer, PixelCoverage
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.gbuffer import GBuffer
+from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines, even_line_images, has_even_lines
+from .even_lines import EvenLines, has_even_lines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
 from .flow import with_cycle_distance
@@ -31,18 +31,19 @@ from .hatching import (
 )
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
-from .lic import lic, lic_lengths
-from .lic_images import LicImages, relative_magnitude, with_magnitude_range
+from .lic import lic_lengths
+from .lic_images import LicImages, lic_images, relative_magnitude, with_magnitude_range
 from .look import Look, colors_magnitude, colors_values, is_hatched
-from .look_units import AntialiasedLook, antialiased_look, look_in_pixels, supersampled_look
+from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
-from .picture import DegreeLayer, Picture, common_color_range
-from .pixel_field import PixelField, planar_pixel_field
+from .picture import Picture, common_color_range
+from .pixel_field import PixelField, entries_of_rows
+from .reported_blocks import reported_blocks
 from .shading import Light
 from .stages import ComposeStages
 from .streak_statistics import break_steps, look_streak_statistics
 from .strip_division import divide_into_strips
-from .strips import Strip, entries_of_rows, join_strips
+from .strips import Strip, join_strips
 from .target_tone import ReferenceRender, target_tone
 
 #: Share of the progress that tones, directions and outlines take, which all strips share.
@@ -107,7 +108,7 @@ def compose(
     elif strips is None:
         strips = divide_into_strips(look, camera, gbuffer.instances)
     look = with_cycle_distance(look_in_pixels(look, camera, gbuffer.instances))
-    pixel_look = supersampled_look(look) if gbuffer.coverage is None else antialiased_look(look)
+    pixel_look = replace(supersampled_look(look), antialiased=gbuffer.coverage is not None)
     draws_thresholds = draws_thresholds and is_hatched(look)
     if draws_thresholds:
         pixel_look = sharp_look(pixel_look)
@@ -120,14 +121,13 @@ def compose(
         for number, degree in enumerate(canvas.degrees):
             with progress(0.2 + 0.8 * number / len(canvas.degrees), 1.0):
                 layers.append(_prepared(stages, canvas, degree, pixel_look))
-    pictures, drawn = [], []
+    pictures = []
     with progress(SHARED_SHARE, 1.0):
         for number, strip in enumerate(strips):
-            drawn = []
             for index, layer in enumerate(layers):
                 start = (number + index / len(layers)) / len(strips)
                 with progress(start, start + 0.95 / (len(layers) * len(strips))):
-                    drawn.append(_draw_layer(stages, canvas, layer, strip))
+                    _draw_layer(stages, canvas, layer, strip)
             with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
                 pictures.append(canvas.picture(strip))
     rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
@@ -138,7 +138,6 @@ def compose(
         color_range = value_ends(look, value_ranges(gbuffer.instances))
     return Picture(
         rgba,
-        tuple(drawn) if len(strips) == 1 else (),
         spread[..., 0] if draws_thresholds else None,
         color_range,
         line_count=max((layer.field.line_count for layer in layers), default=0),
@@ -188,12 +187,65 @@ class _Canvas:
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
         """Return the picture of a strip, and that of the spread: the latter empty without thresholds."""
-        gbuffer = self._gbuffer
-        frame = gbuffer.camera.width, strip.drawn_rows, self.look.supersampling, gbuffer.coverage
-        rgba = _resolve_pixels(gbuffer.pixel, self.color, self.alpha, *frame)
+        rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
             return rgba, rgba[:, :0]
-        return rgba, _resolve_pixels(gbuffer.pixel, self.spread, self.alpha, *frame)
+        return rgba, self._resolved(self.spread, strip.drawn_rows)
+
+    def _resolved(self, color: np.ndarray, rows: tuple[int, int]) -> np.ndarray:
+        """Assemble an image from the colors of subpixels.
+
+        Parameters
+        ----------
+        color : (P, 3) or (P, 1) float32 ndarray
+            Linear, not premultiplied.
+        rows : (int, int)
+            Of the supersampled frame: the first row of the image, and the row after its last one.
+
+        Returns
+        -------
+        (h, w, 4) float32 ndarray
+            Linear RGBA, not premultiplied.
+        """
+        gbuffer, s = self._gbuffer, self.look.supersampling
+        pixel, width, coverage = gbuffer.pixel, gbuffer.camera.width, gbuffer.coverage
+        height = (rows[1] - rows[0]) // s
+        rgba = np.zeros((height, width // s, 4), dtype=np.float32)
+        band_rows = max(BLOCK_PIXELS // (width * s), 1)
+        for start in range(0, height, band_rows):
+            report(start / height, "drawing the ink")
+            band = rgba[start : start + band_rows]
+            band_of_frame = rows[0] + start * s, rows[0] + (start + len(band)) * s
+            first_pixel = band_of_frame[0] * width
+            block = entries_of_rows(pixel, width, band_of_frame)
+            if block.start == block.stop:  # rows that are not written to take no memory
+                continue
+            # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
+            band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
+            block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
+            block_rgba[:, 3] = self.alpha[block]
+            if s == 1 and coverage is None:
+                block_rgba[:, :3] = color[block]
+                scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
+                band[...] = band_rgba.reshape(band.shape)
+                continue
+            if coverage is not None:
+                block_rgba[:, 3] *= coverage.own[block]
+            block_rgba[:, :3] = color[block] * block_rgba[:, 3:]
+            scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
+            if coverage is None:
+                band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
+            else:
+                shares = entries_of_rows(coverage.pixel, width, band_of_frame)
+                entry = coverage.entry[shares]
+                shared = np.empty((len(entry), 4), dtype=np.float32)
+                shared[:, 3] = self.alpha[entry] * np.float32(coverage.share)
+                shared[:, :3] = color[entry] * shared[:, 3:]
+                np.add.at(band_rgba, coverage.pixel[shares] - first_pixel, shared)
+                band[...] = band_rgba.reshape(band.shape)
+            band_alpha = band[..., 3:]
+            np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
+        return rgba
 
 
 class _Layer(NamedTuple):
@@ -204,20 +256,16 @@ class _Layer(NamedTuple):
     field : PixelField
     look : Look
         In pixels of the G-buffer, for the symmetry of the field and the range of its magnitudes.
-    even_lines : EvenLines or None
+    modulation : LineModulation
+        Without what depends on the strip.
     tone : (P,) float32 ndarray or None
         Of hatched looks.
-    paper_grain, outline, undirected
-        See `LineModulation`.
     """
 
     field: PixelField
     look: Look
-    even_lines: EvenLines | None = None
+    modulation: LineModulation
     tone: np.ndarray | None = None
-    paper_grain: np.ndarray | None = None
-    outline: np.ndarray | None = None
-    undirected: np.ndarray | None = None
 
 
 def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: Look) -> _Layer:
@@ -233,7 +281,7 @@ def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: L
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if not is_hatched(look):
-        return _Layer(field, look, even_lines)
+        return _Layer(field, look, LineModulation())
     if has_paper_grain(look):
         with progress(0.6, 0.7):
             paper_grain = _paper_grain(stages, field, look)
@@ -242,33 +290,37 @@ def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: L
             outline = stages.outline(field, look)
     with progress(0.9, 1.0):
         undirected = stages.undirected_texture(field, look)
-    tone = canvas.tone_rgb[field.gbuffer_index].mean(axis=1)
-    return _Layer(
-        field, look, even_lines, np.clip(tone, 0, 1, out=tone), paper_grain, outline, undirected
+    modulation = LineModulation(
+        paper_grain=paper_grain, outline=outline, undirected=undirected, even_lines=even_lines
     )
+    if even_lines is None or undirected is not None or has_breaks(look) or has_paper_grain(look):
+        look_streak_statistics(look)  # `line_coverage` finds them in their cache
+    tone = canvas.tone_rgb[field.gbuffer_index].mean(axis=1)
+    return _Layer(field, look, modulation, np.clip(tone, 0, 1, out=tone))
 
 
-def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: Strip) -> DegreeLayer:
-    """Draw the fields of one degree in a strip, and return its images."""
+def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: Strip) -> None:
+    """Draw the fields of one degree in a strip."""
     field, look = layer.field, layer.look
     rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
+    modulation = layer.modulation.part(rows)
     with progress(0.0, 0.7):
-        images, break_images = _line_images(stages, layer, strip)
-    modulation = None
-    if is_hatched(look):
-        with progress(0.7, 0.85):
-            modulation = _line_modulation(stages, layer, strip, break_images)
+        images, break_images = _line_images(stages, layer, strip, modulation.even_lines)
+    with progress(0.7, 0.9):
+        if layer.tone is None:
+            streaks = streak_tone(field, look, images)
+        else:
+            tone = layer.tone[rows]
+            line_tones = _tone_along_lines(layer, strip) if has_overshoot(look) else None
+            modulation = modulation._replace(break_images=break_images, line_tones=line_tones)
     field = field.part(rows)
     if canvas.map_position is not None:
         field = replace(field, map_position=canvas.map_position[field.gbuffer_index])
-    with progress(0.85, 0.9):
-        drawn = degree_layer(field, look, images)
-    for block in pixel_blocks(len(field.pixel)):
-        report(0.9 + 0.1 * block.start / len(field.pixel), "drawing the ink")
+    for block in reported_blocks(len(field.pixel), "drawing the ink", 0.9, 1.0):
         part, part_images = field.part(block), images.part(block)
         entries = part.gbuffer_index
-        if modulation is None:
-            canvas.color[entries] = colorize(part, part_images, drawn.tone[block], look)
+        if layer.tone is None:
+            canvas.color[entries] = colorize(part, part_images, streaks[block], look)
             canvas.color[entries] *= canvas.tone_rgb[entries]
         elif canvas.draws_thresholds:
             samples = canvas.look.supersampling
@@ -276,106 +328,46 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
             canvas.color[entries], canvas.spread[entries] = pixels[:, :3], pixels[:, 3:]
         else:
             canvas.color[entries], canvas.alpha[entries] = render_hatching(
-                part, part_images, look, layer.tone[rows][block], modulation.part(block)
+                part, part_images, look, tone[block], modulation.part(block)
             )
-    return drawn
 
 
 def _line_images(
-    stages: ComposeStages, layer: _Layer, strip: Strip
+    stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
 ) -> tuple[LicImages, LicImages | None]:
     """Return the images of the lines at the pixels of a strip, and those of their breaks if they have any."""
-    field, look = layer.field, layer.look
-    break_look = replace(look, length=break_steps(look))
-    if layer.even_lines is not None:
-        rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
-        images = even_line_images(layer.even_lines.part(rows))
-        return images, stages.lic(field, [break_look], strip)[0] if has_breaks(look) else None
-    looks = [look, break_look] if has_breaks(look) else [look]
-    images, *break_images = stages.lic(field, looks, strip)
-    return images, break_images[0] if break_images else None
+    looks = [layer.look] if even_lines is None else []
+    if has_breaks(layer.look):
+        looks.append(replace(layer.look, length=break_steps(layer.look)))
+    images = stages.lic(layer.field, looks, strip) if looks else []
+    if even_lines is not None:
+        # Even lines stand for streaks.
+        members = even_lines.streaks[..., None]
+        images = [lic_images(members, np.ones(members.shape[1], dtype=np.float32)), *images]
+    return images[0], images[1] if has_breaks(layer.look) else None
 
 
-def compose_planar(
-    angles: np.ndarray,
-    degree: int,
-    look: Look,
-    magnitude: np.ndarray | float | None = None,
-    noise: np.ndarray | None = None,
-) -> Picture:
-    """Draw a field in the plane, without mesh, camera and light.
-
-    Parameters
-    ----------
-    angles : (H, W) ndarray
-        Angle of a member at each pixel, radians, counter-clockwise from the direction of the rows.
-        Rows from the bottom. NaN is undefined.
-    degree : int
-    look : Look
-        Lengths are in pixels. Its supersampling is ignored.
-    magnitude : (H, W) ndarray or float, optional
-        rho, by default 1.
-    noise : (H, W) or (H, W, 3) ndarray, optional
-        Values from 0 to 1. By default the noise of the look in image space.
-
-    Returns
-    -------
-    Picture
-    """
-    field = planar_pixel_field(angles, degree, magnitude)
-    if noise is not None:
-        noise = np.asarray(noise, dtype=np.float32).reshape(len(field.pixel), -1)
-    look = look_for_symmetry(with_cycle_distance(replace(look, supersampling=1)), field.symmetry)
-    images = lic(field, look, noise)
-    layer = degree_layer(field, look, images)
-    color = colorize(field, layer.images, layer.tone, look)
-    opaque = np.ones(len(field.pixel), dtype=np.float32)
-    return Picture(
-        _resolve_pixels(field.pixel, color, opaque, field.width, (0, field.height), 1), (layer,)
-    )
-
-
-def _line_modulation(
-    stages: ComposeStages, layer: _Layer, strip: Strip, break_images: LicImages | None
-) -> LineModulation:
-    """Collect the parts of the `LineModulation` that a look uses, at the pixels of a strip."""
-    field, look = layer.field, layer.look
-    uses_streaks = layer.even_lines is None or has_breaks(look) or has_paper_grain(look)
-    if uses_streaks or layer.undirected is not None:
-        look_streak_statistics(look)  # `line_coverage` finds them in their cache
-    rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
-    shared = LineModulation(
-        None, layer.paper_grain, None, layer.outline, layer.undirected, layer.even_lines
-    )
-    line_tones = None
-    if has_overshoot(look):
-        line_tones = _tone_along_lines(field, look, layer.tone, strip)
-    return shared.part(rows)._replace(break_images=break_images, line_tones=line_tones)
-
-
-def _tone_along_lines(field: PixelField, look: Look, tone: np.ndarray, strip: Strip) -> np.ndarray:
-    """(M, n) means of (P,) tones along lines, over the overshoot distance in each direction."""
-    if isinstance(look, AntialiasedLook):
-        look = look.without_antialiasing()
+def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
+    """(M, n) means of the tones along lines, over the overshoot distance in each direction."""
     # Weights that fall exponentially would reach too far.
-    method = "sheets" if look.method == "ibfv" else look.method
-    overshoot_look = replace(
-        look,
+    method = "sheets" if layer.look.method == "ibfv" else layer.look.method
+    look = replace(
+        layer.look,
         method=method,
-        length=overshoot_steps(look),
+        length=overshoot_steps(layer.look),
         taper=False,
         oriented=False,
         flow=0.0,
+        antialiased=False,
     )
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.
-    channels = np.ones((len(tone), 3), dtype=np.float32)
-    channels[:, 0] = tone
-    (images,) = lic_lengths(field, [overshoot_look], channels, strip)
+    channels = np.ones((len(layer.tone), 3), dtype=np.float32)
+    channels[:, 0] = layer.tone
+    (images,) = lic_lengths(layer.field, [look], channels, strip)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
-    for block in pixel_blocks(means.shape[1]):
-        report(1.0, "finding tones")
+    for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
         means[:, block] = (
             NOISE_MEAN + np.float32(1 - NOISE_MEAN) * centered[..., 0] / centered[..., 1]
@@ -396,28 +388,32 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.nda
     std = np.float32(look_streak_statistics(look).paper_grain_std)
     channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
     heights = np.empty((field.line_count, len(noise)), dtype=np.float32)
-    for block in pixel_blocks(len(noise)):
-        report(1.0, "drawing the paper grain")
+    for block in reported_blocks(len(noise), "drawing the paper grain", 1.0, 1.0):
         heights[:, block] = ((noise[block] - np.float32(NOISE_MEAN)) / std).T[channel]
     return heights
 
 
-def degree_layer(field: PixelField, look: Look, images: LicImages) -> DegreeLayer:
-    """Build the layer of one degree: its blend, with the contrast of one image times the gain."""
+def streak_tone(field: PixelField, look: Look, images: LicImages) -> np.ndarray:
+    """Correct the contrast of blended images: that of one image, times the gain of the look.
+
+    Returns
+    -------
+    (P, K) float32 ndarray
+        Display values, not clipped.
+    """
     supersampled_gain = np.float32(supersampling_gain(look) if look.supersampling > 1 else 1)
     tone = np.empty_like(images.blend)
-    for block in pixel_blocks(len(tone)):
-        report(block.start / len(tone), "blending lines")
+    for block in reported_blocks(len(tone), "blending lines"):
         effective_samples = images.effective_samples[block]
         gain = look.gain * blend_gain(field.line_count, effective_samples, look) * supersampled_gain
         tone[block] = scale_contrast(images.blend[block], gain[:, None])
-    return DegreeLayer(field.degree, field.pixel, images, tone)
+    return tone
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look) -> np.ndarray:
     """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
 
-    (P, K) `tone` is that of `DegreeLayer`. Pixels without a number are gray.
+    (P, K) `tone` is that of `streak_tone`. Pixels without a number are gray.
     """
     hue, position = None, None
     if colors_magnitude(look):
@@ -434,75 +430,3 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
         missing = np.isnan(position)
         color[missing] = to_linear(tone[missing])
     return color
-
-
-def _resolve_pixels(
-    pixel: np.ndarray,
-    color: np.ndarray,
-    alpha: np.ndarray,
-    width: int,
-    rows: tuple[int, int],
-    supersampling: int,
-    coverage: PixelCoverage | None = None,
-) -> np.ndarray:
-    """Assemble the image from the colors of subpixels.
-
-    Parameters
-    ----------
-    pixel : (P,) int32 ndarray
-        Flat indices into the supersampled frame.
-    color : (P, 3) or (P, 1) float32 ndarray
-        Linear, not premultiplied.
-    alpha : (P,) float32 ndarray
-    width : int
-        Of the supersampled frame, in pixels.
-    rows : (int, int)
-        Of that frame: the first row of the image, and the row after its last one.
-    supersampling : int
-        Subpixels along each side of a pixel.
-    coverage : PixelCoverage, optional
-        Shares of pixels that the colors have, if they are not those of subpixels.
-
-    Returns
-    -------
-    (H / supersampling, width / supersampling, 4) float32 ndarray
-        Linear RGBA, not premultiplied.
-    """
-    s = supersampling
-    height = (rows[1] - rows[0]) // s
-    rgba = np.zeros((height, width // s, 4), dtype=np.float32)
-    band_rows = max(BLOCK_PIXELS // (width * s), 1)
-    for start in range(0, height, band_rows):
-        report(start / height, "drawing the ink")
-        band = rgba[start : start + band_rows]
-        first_pixel = (rows[0] + start * s) * width
-        border = np.array([first_pixel, first_pixel + band.size // 4 * s * s], dtype=np.int64)
-        block = slice(*np.searchsorted(pixel, border.astype(pixel.dtype)).tolist())
-        if block.start == block.stop:  # rows that are not written to take no memory
-            continue
-        # Colors are premultiplied for averaging. Subpixels without a field are black, with alpha 0.
-        band_rgba = np.zeros((band.size // 4 * s * s, 4), dtype=np.float32)
-        block_rgba = np.empty((block.stop - block.start, 4), dtype=np.float32)
-        block_rgba[:, 3] = alpha[block]
-        if s == 1 and coverage is None:
-            block_rgba[:, :3] = color[block]
-            scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-            band[...] = band_rgba.reshape(band.shape)
-            continue
-        if coverage is not None:
-            block_rgba[:, 3] *= coverage.own[block]
-        block_rgba[:, :3] = color[block] * block_rgba[:, 3:]
-        scatter_rows(band_rgba, pixel[block] - first_pixel, block_rgba)
-        if coverage is None:
-            band[...] = band_rgba.reshape(len(band), s, width // s, s, 4).mean(axis=(1, 3))
-        else:
-            first, stop = np.searchsorted(coverage.pixel, border.astype(np.int32)).tolist()
-            entry = coverage.entry[first:stop]
-            shared = np.empty((len(entry), 4), dtype=np.float32)
-            shared[:, 3] = alpha[entry] * np.float32(coverage.share)
-            shared[:, :3] = color[entry] * shared[:, 3:]
-            np.add.at(band_rgba, coverage.pixel[first:stop] - first_pixel, shared)
-            band[...] = band_rgba.reshape(band.shape)
-        band_alpha = band[..., 3:]
-        np.divide(band[..., :3], band_alpha, out=band[..., :3], where=band_alpha > 0)
-    return rgba

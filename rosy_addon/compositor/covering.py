@@ -29,10 +29,10 @@ import numpy as np
 from ..deterministic_trig import cos_sin, vector_angle
 from ..field.directional_field import evaluate_harmonics
 from ..progress import report
-from ..projection.pixel_blocks import pixel_blocks
 from .flow import forward_share
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
+from .reported_blocks import reported_blocks
 
 #: The largest integer in `Covering.state_table`.
 INT16_MAX = 32767
@@ -91,8 +91,8 @@ class Covering:
 
     Attributes
     ----------
-    sheets : int
-        S.
+    line_count : int
+        M = S / 2, the number of lines through a cell.
     sheets_per_turn : int
         Sheets that a full turn passes: S, or N.
     width : int
@@ -113,7 +113,7 @@ class Covering:
         Whether lines point one way only: the field has no opposites.
     """
 
-    sheets: int
+    line_count: int
     sheets_per_turn: int
     width: int
     cell_of_pixel: np.ndarray
@@ -122,11 +122,6 @@ class Covering:
     state_scales: tuple[float, float, float]
     seams: SeamTable | None = None
     has_directions: bool = False
-
-    @property
-    def line_count(self) -> int:
-        """M, the number of lines through a cell."""
-        return self.sheets // 2
 
     @property
     def cell_count(self) -> int:
@@ -155,7 +150,7 @@ class Covering:
         """
         one_turn = np.arange(self.sheets_per_turn) * self.cell_count
         forward = np.tile(one_turn, 2 * max_winding)
-        if self.sheets_per_turn == self.sheets:
+        if self.sheets_per_turn == 2 * self.line_count:
             return forward, self.line_count
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
@@ -167,7 +162,7 @@ class Covering:
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
         """(n,) bool: whether states of a field of odd degree are its directions, not their opposites."""
         sheet = state // np.int32(self.cell_count)
-        if self.sheets_per_turn == self.sheets:
+        if self.sheets_per_turn == 2 * self.line_count:
             return sheet % 2 == 0
         return sheet < self.line_count
 
@@ -267,8 +262,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         np.float32(INT16_MAX / max_slope),
     ]
     state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
-    for block in pixel_blocks(count):
-        report(block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions"):
         block_cells = cell_of_pixel[block]
         right, up = _noise_gradient(cell_noise, block_cells, width, field.neighbor_mask[block])
         right, up = right * quantize[2], up * quantize[2]
@@ -284,8 +278,13 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
             step_x, step_y = _to_screen(field, block, *direction, look.foreshorten)
             slope_x, slope_y = step_x, step_y
             if look.foreshorten:
-                step_x, step_y = _shorten_to_neighbors(step_x, step_y)
-                slope_x, slope_y = _over_square(step_x, step_y)
+                # Steps are at most one row or one column of pixels.
+                scale = 1 / np.maximum(np.maximum(np.abs(step_x), np.abs(step_y)), np.float32(1))
+                step_x, step_y = step_x * scale, step_y * scale
+                # A derivative to the left is multiplied by a distance to the left (see
+                # `streamline_batch`). Both are proportional to the length of the step.
+                square = np.maximum(step_x * step_x + step_y * step_y, np.float32(SHORT_STEP**2))
+                slope_x, slope_y = step_x / square, step_y / square
             rows[:, 3::2] = np.rint(up * slope_x[:, None] - right * slope_y[:, None])
             step_x, step_y = step_x * quantize[0], step_y * quantize[0]
             rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
@@ -294,8 +293,11 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
             for column in (0, 1, *range(3, rows.shape[1], 2)):
                 np.negative(rows[:, column], out=rows[:, column])
             scatter_rows(state_table[sheet + line_count], block_cells, rows)
+    seams = None
+    if field.seam_steps is not None and len(field.seam_steps.source):
+        seams = SeamTable(field.seam_steps, cell_of_pixel, per_turn)
     return Covering(
-        sheets=2 * line_count,
+        line_count=line_count,
         sheets_per_turn=per_turn,
         width=width,
         cell_of_pixel=cell_of_pixel,
@@ -306,34 +308,9 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
             max_noise / INT16_MAX,
             max_slope / INT16_MAX,
         ),
-        seams=_seam_table(field.seam_steps, cell_of_pixel, per_turn),
+        seams=seams,
         has_directions=not field.symmetry.has_opposites,
     )
-
-
-def _shorten_to_neighbors(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shorten steps that are longer than one row or one column of pixels."""
-    scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
-    return x * scale, y * scale
-
-
-def _over_square(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Divide steps by their squared lengths, for derivatives of the noise to their left.
-
-    Such a derivative is multiplied by a distance to the left (see `streamline_batch`). Both are
-    proportional to the length of the step.
-    """
-    square = np.maximum(x * x + y * y, np.float32(SHORT_STEP * SHORT_STEP))
-    return x / square, y / square
-
-
-def _seam_table(
-    steps: SeamSteps | None, cell_of_pixel: np.ndarray, sheets_per_turn: int
-) -> SeamTable | None:
-    """Return the table of steps across seams, or None if there are none."""
-    if steps is None or not len(steps.source):
-        return None
-    return SeamTable(steps, cell_of_pixel, sheets_per_turn)
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
@@ -435,8 +412,6 @@ def _to_screen(
     field: PixelField, block: slice, x: np.ndarray, y: np.ndarray, foreshorten: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute `PixelField.to_screen` for a block in single precision, as x and y."""
-    if field.screen_jacobian is None:
-        return x, y
     x_axis, y_axis = field.screen_jacobian[block, 0], field.screen_jacobian[block, 1]
     screen_x = x_axis.real * x + y_axis.real * y
     screen_y = x_axis.imag * x + y_axis.imag * y

@@ -7,13 +7,110 @@ interpolated.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from .filter_kernel import Kernel
-from .flow import MAX_AXIAL_STEPS, MovingKernel
+from .filter_kernel import Kernel, kernel_of, kernel_weights, sample_weights
+from .flow import MAX_AXIAL_STEPS, channel_shifts, channel_weights, streamline_reach
+from .look import Look
 
 #: Effective samples of a streamline that ends before its kernels begin. It is gray.
 MIN_EFFECTIVE_SAMPLES = 1e-3
+
+
+#: Levels of `MovingKernel.energies`, at most.
+MAX_LEVELS = 256
+
+
+class MovingKernel:
+    """The kernels of the channels of a look whose streaks drift.
+
+    Parameters
+    ----------
+    look : Look
+        In pixels of the frame, with flow.
+    levels : int
+        Of the lengths of streamlines, if they depend on the magnitude.
+
+    Attributes
+    ----------
+    kind : {"box", "taper", "ramp"}
+    length : int
+        Steps of the kernel at rest, in each direction.
+    shifts, weights : (3,) float64 ndarray
+        From `channel_shifts` and `channel_weights`.
+    reach : int
+        R, steps from the pixel to the last sample.
+    energies : (3, L, 2 R + 2) float64 ndarray
+        Prefix sums over the samples, from -R - 1, of the squares of the weights forward and backward, and
+        of their products. Level l is for streamlines of the length times l / (L - 1).
+    full_samples : (L,) float64 ndarray
+        `filter_kernel.KernelWeights.effective_samples` of the kernels at rest.
+    """
+
+    def __init__(self, look: Look, levels: int = 1) -> None:
+        self.length, self.kind = look.length, kernel_of(look)
+        self.shifts, self.weights = channel_shifts(look), channel_weights(look.flow_phase)
+        self.reach = streamline_reach(look)
+        position = np.arange(-self.reach, self.reach + 1)
+        self.energies = np.zeros((3, levels, len(position) + 1))
+        self.full_samples = np.empty(levels)
+        for level in range(levels):
+            share = level / (levels - 1) if levels > 1 else 1.0
+            length = float(round(share * self.length))
+            self.full_samples[level] = kernel_weights(*[length] * 3, self.kind).effective_samples
+            rows = np.stack(
+                [
+                    weight * _shifted_weights(position, share * shift, length, self.kind)
+                    for shift, weight in zip(self.shifts, self.weights, strict=True)
+                ]
+            )
+            mirrored = rows[:, ::-1]
+            for total, products in zip(
+                self.energies[:, level], (rows**2, mirrored**2, rows * mirrored), strict=True
+            ):
+                np.cumsum(products.sum(axis=0), out=total[1:])
+
+    def effective_samples(
+        self, share: np.ndarray, forward: np.ndarray, behind: np.ndarray, ahead: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Count the samples of equal weight whose mean has the variance of the average.
+
+        Parameters
+        ----------
+        share : (n,) float32 ndarray
+            Length of the kernels, relative to `length`.
+        forward : (n,) float32 ndarray
+            Share of the kernel that drifts forward.
+        behind, ahead : (n,) intp ndarray
+            Steps to the ends of the streamlines.
+
+        Returns
+        -------
+        effective_samples : (n,) float64 ndarray
+        factor : (n,) float64 ndarray
+            By which weighted sums are multiplied to be averages times the effective samples.
+        """
+        table = self.energies.reshape(3, -1)
+        width, levels = self.energies.shape[2], len(self.full_samples)
+        level = np.rint(share * (levels - 1)).astype(np.intp)
+        center = level * width + (self.reach + 1)
+        available = table.take(center + np.minimum(ahead, self.reach), axis=1)
+        available -= table.take(center - np.minimum(behind, self.reach) - 1, axis=1)
+        shares = np.stack([forward**2, (1 - forward) ** 2, 2 * forward * (1 - forward)])
+        full = (shares * self.energies[:, level, -1]).sum(axis=0)
+        samples = self.full_samples[level]
+        return samples * (shares * available).sum(axis=0) / full, np.sqrt(samples / full)
+
+
+def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
+    """Weights of a kernel whose center is `shift` steps backward, interpolated between whole steps."""
+    whole = math.floor(shift)
+    fraction = shift - whole
+    return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (
+        sample_weights(position + whole + 1, length, kind)
+    )
 
 
 class DriftingAverages:

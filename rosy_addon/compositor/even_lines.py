@@ -14,7 +14,7 @@ are too far apart, as in near parts of a perspective picture, further lines grow
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -22,16 +22,15 @@ import numpy as np
 from ..cache import Cache
 from ..deterministic_trig import vector_angle
 from ..field.frames import transform_components
-from ..progress import progress, report
+from ..progress import progress
 from ..projection.gbuffer import GBuffer, MeshInstance
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.project import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
-from .lic_images import LicImages, lic_images
 from .look import Look, is_hatched
 from .look_units import instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
+from .reported_blocks import reported_blocks
 from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
 from .wobble import WOBBLE_STD
 
@@ -207,13 +206,6 @@ def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> 
     return covered
 
 
-def even_line_images(lines: EvenLines) -> LicImages:
-    """Return even lines as the images of members, as if they were streaks."""
-    count = lines.streaks.shape[1]
-    effective_samples = np.ones(count, dtype=np.float32)
-    return lic_images(lines.streaks[..., None], effective_samples)
-
-
 def uneven_width(
     target_coverage: np.ndarray,
     look: Look,
@@ -313,176 +305,138 @@ def even_lines(
     present = np.flatnonzero(np.bincount(instance_id)).tolist()
     for number, index in enumerate(present):
         start, stop = number / len(present), (number + 1) / len(present)
+        lines = _InstanceLines(gbuffer, field, look, gbuffer.instances[index], wobble_angle, cache)
         pixels = np.flatnonzero(instance_id == index)
         with progress(start, (start + stop) / 2):
-            result = _instance_lines(gbuffer, field, look, index, pixels, wobble_angle, 1.0, cache)
+            result = lines.at(pixels, 1.0)
         streaks[:, pixels], period[:, pixels], growth[pixels] = result
         is_crowded = (result[1] < crowded_pixels(look)[1]).any(axis=0)
         pixels = pixels[is_crowded & (field.representation[pixels] != 0)]
         if len(pixels):
             with progress((start + stop) / 2, stop):
-                result = _instance_lines(
-                    gbuffer, field, look, index, pixels, wobble_angle, COARSE_RATIO, cache
-                )
+                result = lines.at(pixels, COARSE_RATIO)
             coarse_streaks = np.zeros_like(streaks) if coarse_streaks is None else coarse_streaks
             coarse_streaks[:, pixels] = result[0]
     return EvenLines(streaks, period, growth if growth.any() else None, coarse_streaks)
 
 
-def _instance_lines(
-    gbuffer: GBuffer,
-    field: PixelField,
-    look: Look,
-    index: int,
-    pixels: np.ndarray,
-    wobble_angle: np.ndarray | None,
-    ratio: float,
-    cache: Cache | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Evaluate the lines of one mesh instance at some pixels of the field.
+class _InstanceLines:
+    """The lines of one mesh instance; parameters as for `even_lines`."""
 
-    Parameters
-    ----------
-    gbuffer, field, look, wobble_angle, cache
-        As for `even_lines`.
-    index : int
-        Of the instance.
-    pixels : (n,) intp ndarray
-        Of the field.
-    ratio : float
-        Distance between lines on the surface, relative to that of the look.
+    def __init__(
+        self,
+        gbuffer: GBuffer,
+        field: PixelField,
+        look: Look,
+        instance: MeshInstance,
+        wobble_angle: np.ndarray | None,
+        cache: Cache | None,
+    ) -> None:
+        self._gbuffer, self._field, self._look = gbuffer, field, look
+        self._instance, self._wobble_angle, self._cache = instance, wobble_angle, cache
+        #: Distance between lines on the surface, in Blender units.
+        self._spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
+        # The sides of triangles from corner 0 to corners 1 and 2, in camera space.
+        matrix = gbuffer.camera.view @ np.asarray(instance.matrix, dtype=np.float64)
+        surface = instance.surface
+        points = transform_components(np.ascontiguousarray(surface.vertices.T), matrix[:3, :3])
+        first, *others = (points.take(corner, axis=1) for corner in surface.triangle_vertex.T)
+        self._sides = np.stack([(corner - first).astype(np.float32) for corner in others])
 
-    Returns
-    -------
-    streaks, period : (M, n) float32 ndarray
-        As in `EvenLines`. The period is that of the ratio 1.
-    growth : (n,) float32 ndarray
-    """
-    instance = gbuffer.instances[index]
-    spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
-    with progress(0.0, 1.0):
+    def at(self, pixels: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Evaluate the lines at some pixels of the field.
+
+        Parameters
+        ----------
+        pixels : (n,) intp ndarray
+        ratio : float
+            Distance between lines on the surface, relative to that of the look.
+
+        Returns
+        -------
+        streaks, period : (M, n) float32 ndarray
+            As in `EvenLines`. The period is that of the ratio 1.
+        growth : (n,) float32 ndarray
+        """
+        instance, look = self._instance, self._look
         lines = cached_surface_lines(
-            instance.surface, instance.matrix, instance.field, look.display, ratio * spacing, cache
+            instance.surface,
+            instance.matrix,
+            instance.field,
+            look.display,
+            ratio * self._spacing,
+            self._cache,
         )
-    sides = _camera_space_sides(gbuffer, instance)
-    unit = spacing / (SPACING_GRAINS * look.grain)
-    entries = np.arange(len(gbuffer.pixel), dtype=np.intp)[field.gbuffer_index]
-    streaks, period = np.empty((2, field.line_count, len(pixels)), dtype=np.float32)
-    growth = np.zeros(len(pixels), dtype=np.float32)
-    is_all = len(pixels) == len(field.pixel)
-    for block in pixel_blocks(len(pixels)):
-        report(1.0, STEP_LABEL)
-        part = pixels[block]
-        block_field = field.part(block) if is_all else _taken(field, part)
-        phases, line_period, octaves = _evaluate(
-            gbuffer, entries[part], block_field, look, lines, sides, unit
+        streaks, period = np.empty((2, self._field.line_count, len(pixels)), dtype=np.float32)
+        growth = np.zeros(len(pixels), dtype=np.float32)
+        for block in reported_blocks(len(pixels), STEP_LABEL, 1.0, 1.0):
+            part = pixels[block]
+            phases, line_period, octaves = self._evaluate(self._field.part(part), lines)
+            if self._wobble_angle is not None:
+                shift = np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD)
+                phases += shift * self._wobble_angle[part]
+            if octaves is not None:
+                doublings = np.floor(octaves)
+                first, last = GROWTH_OCTAVES
+                growth[block] = smoothstep((octaves - doublings - first) / (last - first))
+                scale = np.exp2(doublings).astype(np.float32)
+                phases *= scale
+                line_period /= scale
+            streaks[:, block] = 1 - 2 * np.abs(phases - np.rint(phases))
+            period[:, block] = line_period
+        return streaks, period, growth
+
+    def _evaluate(
+        self, field: PixelField, lines: SurfaceLines
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Evaluate lines at the pixels of a part of the field.
+
+        Returns
+        -------
+        phases : (M, n) float32 ndarray
+        period : (M, n) float32 ndarray
+            In pixels.
+        octaves : (n,) float32 ndarray or None
+            Base-2 logarithm of the distance between lines, without foreshortening, relative to the one
+            asked for, at least 0. None if lines may be farther apart.
+        """
+        gbuffer, look, entries = self._gbuffer, self._look, field.gbuffer_index
+        leaf, weights = lines.tree.locate(gbuffer.triangle[entries], gbuffer.barycentric[entries])
+        members = all_members(field, look.guiding_angle)
+        # Directions of the surface are counted counter-clockwise about the normal of the triangle.
+        step = np.where(gbuffer.front_facing[entries], 1, -1)
+        heading = self._heading_in_view(entries, lines.heading.take(leaf, axis=1))
+        relative = members[0] * heading.conj()
+        turn = vector_angle(relative.real, relative.imag) * np.float32(field.degree / (2 * np.pi))
+        first_direction = step * np.rint(turn).astype(np.int32)
+        asked_pixels = np.float32(SPACING_GRAINS * look.grain)
+        # Distance between lines on screen, relative to the one asked for.
+        unit = self._spacing / (SPACING_GRAINS * look.grain)
+        scale = np.full(len(entries), unit * gbuffer.camera.pixels_per_unit, dtype=np.float32)
+        if gbuffer.camera.is_perspective:
+            scale /= -gbuffer.position[entries, 2]
+        octaves = None
+        if look.unit == "pixels":
+            octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
+        across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
+        defined = (field.representation != 0) & (heading != 0)
+        phases, period = np.empty((2, field.line_count, len(entries)), dtype=np.float32)
+        for line in range(field.line_count):
+            family = (first_direction + step * line) % field.degree % field.line_count
+            phases[line] = lines.pattern.evaluate(leaf, weights, family)
+            along = np.abs(field.to_screen(field.member_direction(members[line]), foreshorten=True))
+            foreshortening = np.abs(across) / np.maximum(along, np.float32(1e-6))
+            period[line] = asked_pixels * scale * foreshortening * defined
+        return phases, period, octaves
+
+    def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
+        """(n,) complex64 directions in the view plane, from (2, n) `SurfaceLines.heading`."""
+        gbuffer = self._gbuffer
+        triangle = gbuffer.triangle[entries]
+        tangent = [
+            heading[0] * first.take(triangle) + heading[1] * second.take(triangle)
+            for first, second in zip(*self._sides, strict=True)
+        ]
+        return view_plane_rotation(
+            tangent, gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
         )
-        if wobble_angle is not None:
-            phases += np.float32(look.wobble * WOBBLE_SHIFT / WOBBLE_STD) * wobble_angle[part]
-        if octaves is not None:
-            doublings = np.floor(octaves)
-            first, last = GROWTH_OCTAVES
-            growth[block] = smoothstep((octaves - doublings - first) / (last - first))
-            scale = np.exp2(doublings).astype(np.float32)
-            phases *= scale
-            line_period /= scale
-        streaks[:, block] = 1 - 2 * np.abs(phases - np.rint(phases))
-        period[:, block] = line_period
-    return streaks, period, growth
-
-
-def _taken(field: PixelField, pixels: np.ndarray) -> PixelField:
-    """Return the field at some pixels, for what depends on single pixels."""
-    return replace(
-        field,
-        pixel=field.pixel[pixels],
-        representation=field.representation[pixels],
-        screen_jacobian=field.screen_jacobian[pixels],
-        channels={channel: values[pixels] for channel, values in field.channels.items()},
-    )
-
-
-def _camera_space_sides(gbuffer: GBuffer, instance: MeshInstance) -> np.ndarray:
-    """(2, 3, T) float32: the sides of triangles from corner 0 to corners 1 and 2, in camera space."""
-    matrix = gbuffer.camera.view @ np.asarray(instance.matrix, dtype=np.float64)
-    surface = instance.surface
-    points = transform_components(np.ascontiguousarray(surface.vertices.T), matrix[:3, :3])
-    first, *others = (points.take(corner, axis=1) for corner in surface.triangle_vertex.T)
-    return np.stack([(corner - first).astype(np.float32) for corner in others])
-
-
-def _evaluate(
-    gbuffer: GBuffer,
-    entries: np.ndarray,
-    field: PixelField,
-    look: Look,
-    lines: SurfaceLines,
-    sides: np.ndarray,
-    unit: float,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Evaluate the lines of one mesh instance at some pixels.
-
-    Parameters
-    ----------
-    gbuffer : GBuffer
-    entries : (n,) int ndarray
-        Of the pixels in the G-buffer.
-    field : PixelField
-        At these pixels.
-    look : Look
-    lines : SurfaceLines
-    sides : (2, 3, T) float32 ndarray
-        From `_camera_space_sides`.
-    unit : float
-        Distance between lines on the surface divided by the one asked for in pixels.
-
-    Returns
-    -------
-    phases : (M, n) float32 ndarray
-    period : (M, n) float32 ndarray
-        In pixels.
-    octaves : (n,) float32 ndarray or None
-        Base-2 logarithm of the distance between lines, without foreshortening, relative to the one
-        asked for, at least 0. None if lines may be farther apart.
-    """
-    camera = gbuffer.camera
-    triangle = gbuffer.triangle[entries]
-    leaf, weights = lines.tree.locate(triangle, gbuffer.barycentric[entries])
-    members = all_members(field, look.guiding_angle)
-    # Directions of the surface are counted counter-clockwise about the normal of the triangle.
-    step = np.where(gbuffer.front_facing[entries], 1, -1)
-    heading = _heading_in_view(gbuffer, entries, lines.heading.take(leaf, axis=1), sides)
-    relative = members[0] * heading.conj()
-    turn = vector_angle(relative.real, relative.imag) * np.float32(field.degree / (2 * np.pi))
-    first_direction = step * np.rint(turn).astype(np.int32)
-    scale = np.full(len(entries), unit * camera.pixels_per_unit, dtype=np.float32)
-    if camera.is_perspective:
-        scale /= -gbuffer.position[entries, 2]
-    octaves = None
-    if look.unit == "pixels":
-        octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
-    asked_pixels = np.float32(SPACING_GRAINS * look.grain)
-    across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
-    defined = (field.representation != 0) & (heading != 0)
-    phases, period = np.empty((2, field.line_count, len(entries)), dtype=np.float32)
-    for line in range(field.line_count):
-        family = (first_direction + step * line) % field.degree % field.line_count
-        phases[line] = lines.pattern.evaluate(leaf, weights, family)
-        along = np.abs(field.to_screen(field.member_direction(members[line]), foreshorten=True))
-        foreshortening = np.abs(across) / np.maximum(along, np.float32(1e-6))
-        period[line] = asked_pixels * scale * foreshortening * defined
-    return phases, period, octaves
-
-
-def _heading_in_view(
-    gbuffer: GBuffer, entries: np.ndarray, heading: np.ndarray, sides: np.ndarray
-) -> np.ndarray:
-    """(n,) complex64 directions in the view plane, from (2, n) `SurfaceLines.heading`."""
-    triangle = gbuffer.triangle[entries]
-    tangent = [
-        heading[0] * first.take(triangle) + heading[1] * second.take(triangle)
-        for first, second in zip(*sides, strict=True)
-    ]
-    return view_plane_rotation(
-        tangent, gbuffer.geometric_normal[entries].T, gbuffer.view_direction[entries].T
-    )

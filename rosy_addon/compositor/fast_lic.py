@@ -33,10 +33,11 @@ from .flow import blend_channels, streamline_reach
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow, is_hatched
-from .look_units import AntialiasedLook
-from .pixel_field import PixelField
+from .look_units import PixelLook
+from .pixel_field import PixelField, entries_of_rows
+from .reported_blocks import reported_blocks
 from .streamline_batch import StreamlineBatch
-from .strips import Strip, entries_of_rows, streamline_margin
+from .strips import Strip, streamline_margin
 
 #: Label of most steps.
 STEP_LABEL = "tracing streamlines"
@@ -101,75 +102,62 @@ def fast_lic(
         drawn = entries_of_rows(field.pixel, field.width, (start, stop))
         rows = start - margin, min(stop + margin, strip.height)
         extent = entries_of_rows(field.pixel, field.width, rows)
-    step_limits = [magnitude_step_limits(field, look) for look in looks]
-    values = _line_values(field, extent, drawn, looks, noise, step_limits)
     images = []
-    for look, rows in zip(looks, values, strict=True):
-        channels = rows.shape[2] - 2 if has_slopes(look) else rows.shape[2] - 1
-        members = np.empty((*rows.shape[:2], channels), dtype=np.float32)
-        for line_values, member in zip(rows, members, strict=True):
+    for look, (sums, slopes) in zip(
+        looks, _line_averages(field, extent, drawn, looks, noise), strict=True
+    ):
+        members = np.empty((*sums.shape[:2], sums.shape[2] - 1), dtype=np.float32)
+        for line_sums, member in zip(sums, members, strict=True):
             report(0.9, STEP_LABEL)
-            _write_averages(line_values[:, : channels + 1], look, member)
-        effective_samples = rows[:, :, channels].mean(axis=0)
-        slopes = rows[:, :, -1].copy() if has_slopes(look) else None
+            _write_averages(line_sums, look, member)
         with progress(0.95):
-            images.append(lic_images(members, effective_samples, slopes))
+            images.append(lic_images(members, sums[:, :, -1].mean(axis=0), slopes))
     return images
 
 
-def _line_values(
-    field: PixelField,
-    extent: slice,
-    drawn: slice,
-    looks: Sequence[Look],
-    noise: np.ndarray,
-    step_limits: Sequence[np.ndarray | None],
-) -> list[np.ndarray]:
+def _line_averages(
+    field: PixelField, extent: slice, drawn: slice, looks: Sequence[Look], noise: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray | None]]:
     """Compute the averages of the lines at the pixels `drawn`, along streamlines in `extent`, for each look.
 
     Returns
     -------
-    list of (M, n, K + 2) float32 ndarray
-        The average of each noise channel times the effective samples, the effective samples, and the
-        slope (see `LicImages`) if it is needed.
+    sums : (M, n, K + 1) float32 ndarray
+        The average of each noise channel times the effective samples, and the effective samples.
+    slopes : (M, n) float32 ndarray or None
+        See `LicImages`.
     """
-    has_moving_kernel = has_flow(looks[0])
-    channels = 1 if has_moving_kernel else noise.shape[1]
-    shape = field.line_count, drawn.stop - drawn.start
-    values = [
-        np.empty((*shape, channels + 2 if has_slopes(look) else channels + 1), dtype=np.float32)
-        for look in looks
-    ]
+    channels = 1 if has_flow(looks[0]) else noise.shape[1]
     if drawn.start == drawn.stop:
-        return values
-    rows_field = _crop_rows(field, extent)
-    rows_noise = noise[extent] - np.float32(NOISE_MEAN)
+        empty = np.empty((field.line_count, 0, channels + 1), dtype=np.float32)
+        return [(empty, empty[..., 0] if has_slopes(look) else None) for look in looks]
+    step_limits = [magnitude_step_limits(field, look) for look in looks]
+    line = member_lines(field)
+    field = _crop_rows(field, extent)
+    noise = noise[extent] - np.float32(NOISE_MEAN)
     with progress(0.0, 0.1):
-        covering = build_covering(rows_field, looks[0], rows_noise)
+        covering = build_covering(field, looks[0], noise)
+    report(0.1, STEP_LABEL)
     cells = covering.cell_of_pixel[drawn.start - extent.start : drawn.stop - extent.start]
-    undefined = rows_field.representation == 0
-    tables = []
-    for _ in looks:
-        report(0.1, STEP_LABEL)
-        tables.append(_LineAverages(covering, cells, channels))
-        own_noise = rows_noise[undefined]
-        if has_moving_kernel:
-            own_noise = blend_channels(own_noise, looks[0])
-        tables[-1].init_undefined(covering.cell_of_pixel[undefined], own_noise)
+    tables = [_LineAverages(covering, cells, channels) for _ in looks]
+    undefined = field.representation == 0
+    own_noise = noise[undefined]
+    if has_flow(looks[0]):
+        own_noise = blend_channels(own_noise, looks[0])
+    for table in tables:
+        table.init_undefined(covering.cell_of_pixel[undefined], own_noise)
     cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
     with progress(0.1, 0.9):
         _cover_all_lines(covering, tables, looks, cell_limits)
-    line = member_lines(field)
-    for look, table, rows in zip(looks, tables, values, strict=True):
-        if is_fine(look):
-            with progress(0.9):
+    averages = []
+    with progress(0.9):
+        for look, table in zip(looks, tables, strict=True):
+            if is_fine(look):
                 table.smooth(covering, cells)
-        if has_slopes(look):
-            with progress(0.9):
-                rows[:, :, -1] = table.slopes(covering, cells, line)
-        report(0.9, STEP_LABEL)
-        table.gather(cells, line, rows[:, :, : channels + 1])
-    return values
+            slopes = table.slopes(covering, cells, line) if has_slopes(look) else None
+            report(0.0, STEP_LABEL)
+            averages.append((table.gather(cells, line), slopes))
+    return averages
 
 
 def _pixels_to_cells(
@@ -266,8 +254,7 @@ class _LineAverages:
         """
         smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
         for line, out in enumerate(smooth):
-            for block in pixel_blocks(len(cells)):
-                report(1.0, STEP_LABEL)
+            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
                 entry = line * covering.cell_count + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 total = np.float32(2) * own
@@ -282,8 +269,7 @@ class _LineAverages:
         """(M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
-            for block in pixel_blocks(len(cells)):
-                report(1.0, STEP_LABEL)
+            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
                 entry = first_entry + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 left, right = (
@@ -301,15 +287,12 @@ class _LineAverages:
         values[unknown] = own[unknown]
         return values
 
-    def gather(self, cell: np.ndarray, line: np.ndarray, result: np.ndarray) -> None:
-        """Write (M, n, K + 1) sums and effective samples of the lines of some cells to `result`."""
+    def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
+        """(M, n, K + 1) float32 sums and effective samples of the lines of some cells."""
+        result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
         for line_index, out in zip(line, result, strict=True):
-            out[...] = (
-                rows_as_scalars(self._values[line_index])
-                .take(cell)
-                .view(np.float32)
-                .reshape(out.shape)
-            )
+            rows_as_scalars(out)[:] = rows_as_scalars(self._values[line_index]).take(cell)
+        return result
 
 
 def _cover_all_lines(
@@ -390,7 +373,7 @@ def is_fine(look: Look) -> bool:
 
     Differences between neighboring streamlines do not drift. The eye sees them as a screen that stands still.
     """
-    return isinstance(look, AntialiasedLook) or has_flow(look)
+    return has_flow(look) or (isinstance(look, PixelLook) and look.antialiased)
 
 
 def _batch_size(half_length: int) -> int:

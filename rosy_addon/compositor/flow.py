@@ -21,11 +21,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from .filter_kernel import Kernel, kernel_of, kernel_weights, sample_weights
 from .image_noise import NOISE_MEAN
 from .look import Look, has_flow
 
@@ -39,9 +37,6 @@ IBFV_DISTANCE = 4.0
 #: The cosine of the angle between a line and the guiding angle above which the line drifts one way only. Of
 #: four directions, one is always above it.
 ONE_WAY_COSINE = math.sqrt(0.5)
-
-#: Levels of `MovingKernel.energies`, at most.
-MAX_LEVELS = 256
 
 #: Steps between a streamline and the center of a pixel that it passes, at most, along the streamline.
 MAX_AXIAL_STEPS = 2
@@ -140,105 +135,3 @@ def forward_share(cosine: np.ndarray) -> np.ndarray:
     """
     x = np.clip(0.5 + cosine * (0.5 / ONE_WAY_COSINE), 0.0, 1.0)
     return x * x * (3 - 2 * x)
-
-
-class MovingKernel(NamedTuple):
-    """The kernels of the channels of a look whose streaks drift.
-
-    Attributes
-    ----------
-    kind : {"box", "taper", "ramp"}
-    length : int
-        Steps of the kernel at rest, in each direction.
-    shifts, weights : (3,) float64 ndarray
-        From `channel_shifts` and `channel_weights`.
-    reach : int
-        R, steps from the pixel to the last sample.
-    energies : (3, L, 2 R + 2) float64 ndarray
-        Prefix sums over the samples, from -R - 1, of the squares of the weights forward and backward, and
-        of their products. Level l is for streamlines of the length times l / (L - 1).
-    full_samples : (L,) float64 ndarray
-        `filter_kernel.KernelWeights.effective_samples` of the kernels at rest.
-    """
-
-    kind: Kernel
-    length: int
-    shifts: np.ndarray
-    weights: np.ndarray
-    reach: int
-    energies: np.ndarray
-    full_samples: np.ndarray
-
-    def effective_samples(
-        self, share: np.ndarray, forward: np.ndarray, behind: np.ndarray, ahead: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Count the samples of equal weight whose mean has the variance of the average.
-
-        Parameters
-        ----------
-        share : (n,) float32 ndarray
-            Length of the kernels, relative to `length`.
-        forward : (n,) float32 ndarray
-            Share of the kernel that drifts forward.
-        behind, ahead : (n,) intp ndarray
-            Steps to the ends of the streamlines.
-
-        Returns
-        -------
-        effective_samples : (n,) float64 ndarray
-        factor : (n,) float64 ndarray
-            By which weighted sums are multiplied to be averages times the effective samples.
-        """
-        table = self.energies.reshape(3, -1)
-        width, levels = self.energies.shape[2], len(self.full_samples)
-        level = np.rint(share * (levels - 1)).astype(np.intp)
-        center = level * width + (self.reach + 1)
-        available = table.take(center + np.minimum(ahead, self.reach), axis=1)
-        available -= table.take(center - np.minimum(behind, self.reach) - 1, axis=1)
-        shares = np.stack([forward**2, (1 - forward) ** 2, 2 * forward * (1 - forward)])
-        full = (shares * self.energies[:, level, -1]).sum(axis=0)
-        samples = self.full_samples[level]
-        return samples * (shares * available).sum(axis=0) / full, np.sqrt(samples / full)
-
-
-def moving_kernel(look: Look, levels: int = 1) -> MovingKernel:
-    """Return the kernels of a look.
-
-    Parameters
-    ----------
-    look : Look
-        In pixels of the frame, with flow.
-    levels : int
-        Of the lengths of streamlines, if they depend on the magnitude; see `MovingKernel.energies`.
-    """
-    length, kind = look.length, kernel_of(look)
-    shifts, weights = channel_shifts(look), channel_weights(look.flow_phase)
-    reach = streamline_reach(look)
-    position = np.arange(-reach, reach + 1)
-    energies = np.zeros((3, levels, len(position) + 1))
-    full_samples = np.empty(levels)
-    for level in range(levels):
-        share = level / (levels - 1) if levels > 1 else 1.0
-        level_length = float(round(share * length))
-        full_samples[level] = kernel_weights(*[level_length] * 3, kind).effective_samples
-        rows = np.stack(
-            [
-                weight * _shifted_weights(position, share * shift, level_length, kind)
-                for shift, weight in zip(shifts, weights, strict=True)
-            ]
-        )
-        mirrored = rows[:, ::-1]
-        for total, products in zip(
-            energies[:, level], (rows**2, mirrored**2, rows * mirrored), strict=True
-        ):
-            np.cumsum(products.sum(axis=0), out=total[1:])
-    return MovingKernel(kind, length, shifts, weights, reach, energies, full_samples)
-
-
-def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
-    """Weights of a kernel whose center is `shift` steps backward, interpolated between whole steps."""
-    whole = math.floor(shift)
-    fraction = shift - whole
-    return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (
-        sample_weights(position + whole + 1, length, kind)
-    )

@@ -96,6 +96,23 @@ class LineModulation(NamedTuple):
             None if even_lines is None else even_lines.part(extent),
         )
 
+    def relief(self, line: int, look: Look) -> np.ndarray | np.float32:
+        """Return what the paper adds to the streaks of a line: (P,) float32, or 0 without paper grain."""
+        if self.paper_grain is None:
+            return np.float32(0)
+        return np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * self.paper_grain[line]
+
+    def break_streak(self, line: int, look: Look) -> np.ndarray | None:
+        """Return the (P,) short streaks that break a line, with mean 0 and standard deviation 1."""
+        if self.break_images is None:
+            return None
+        return standard_streak(self.break_images, line, look_streak_statistics(look).break_std)[0]
+
+    def spots(self, line: int, look: Look) -> np.ndarray:
+        """Return (P,) float32 streaks of the undirected texture, NaN where the field is defined."""
+        std = np.float32(look_streak_statistics(look).disc_std)
+        return self.undirected / std + self.relief(line, look)
+
 
 def render_hatching(
     field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation
@@ -223,37 +240,33 @@ def line_coverage(
     (P,) float32 ndarray
         0 to 1.
     """
-    if modulation.even_lines is None:
-        coverage = _streak_coverage(line, target_coverage, images, look, modulation)
+    if modulation.even_lines is not None:
+        width = uneven_width(
+            target_coverage,
+            look,
+            modulation.break_streak(line, look),
+            None if modulation.paper_grain is None else modulation.paper_grain[line],
+        )
+        coverage = modulation.even_lines.coverage(line, width, look)
     else:
-        coverage = _even_line_coverage(line, target_coverage, look, modulation)
+        statistics = look_streak_statistics(look)
+        streak, slope = standard_streak(images, line, statistics.std)
+        if modulation.break_images is not None:
+            amount = break_amount(target_coverage, look.breaks, look.wobble)
+            broken = standard_streak(modulation.break_images, line, statistics.break_std)
+            streak += amount * (broken[0] - streak)
+            if slope is not None:
+                slope += amount * (broken[1] - slope)
+        streak += modulation.relief(line, look)
+        coverage = _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
     if modulation.undirected is not None:
-        undefined = np.flatnonzero(~np.isnan(modulation.undirected))
-        coverage[undefined] = _undirected_coverage(
-            line, target_coverage[undefined], look, modulation, undefined
+        spots = modulation.spots(line, look)
+        undefined = np.flatnonzero(~np.isnan(spots))
+        thresholds = look_streak_statistics(look).disc_threshold
+        coverage[undefined] = _above_threshold(
+            spots[undefined], target_coverage[undefined], thresholds, look
         )
     return coverage
-
-
-def _streak_coverage(
-    line: int,
-    target_coverage: np.ndarray,
-    images: LicImages,
-    look: Look,
-    modulation: LineModulation,
-) -> np.ndarray:
-    """`line_coverage` of the streaks of LIC images."""
-    statistics = look_streak_statistics(look)
-    streak, slope = standard_streak(images, line, statistics.std)
-    if modulation.break_images is not None:
-        amount = break_amount(target_coverage, look.breaks, look.wobble)
-        broken = standard_streak(modulation.break_images, line, statistics.break_std)
-        streak += amount * (broken[0] - streak)
-        if slope is not None:
-            slope += amount * (broken[1] - slope)
-    if modulation.paper_grain is not None:
-        streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
-    return _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
 
 
 def standard_streak(
@@ -262,22 +275,6 @@ def standard_streak(
     """Streaks of a line with mean 0 and standard deviation 1, and their slopes if these are known."""
     streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / std
     return streak, None if images.slopes is None else images.slopes[line] / std
-
-
-def _undirected_coverage(
-    line: int,
-    target_coverage: np.ndarray,
-    look: Look,
-    modulation: LineModulation,
-    undefined: np.ndarray,
-) -> np.ndarray:
-    """`line_coverage` of the texture at the pixels where the field is undefined."""
-    statistics = look_streak_statistics(look)
-    streak = modulation.undirected[undefined] / np.float32(statistics.disc_std)
-    if modulation.paper_grain is not None:
-        relief = modulation.paper_grain[line][undefined]
-        streak += np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * relief
-    return _above_threshold(streak, target_coverage, statistics.disc_threshold, look)
 
 
 def _above_threshold(
@@ -301,21 +298,6 @@ def _above_threshold(
         threshold = threshold * np.sqrt(1 + slope / 5)
         half_width = np.sqrt(half_width * half_width + slope)
     return smoothstep((streak - threshold) / (2 * half_width) + 0.5)
-
-
-def _even_line_coverage(
-    line: int, target_coverage: np.ndarray, look: Look, modulation: LineModulation
-) -> np.ndarray:
-    """`line_coverage` of evenly spaced lines."""
-    break_streak = paper_grain = None
-    if modulation.break_images is not None:
-        break_std = look_streak_statistics(look).break_std
-        break_streak = modulation.break_images.members[line].mean(axis=1) - NOISE_MEAN
-        break_streak /= break_std
-    if modulation.paper_grain is not None:
-        paper_grain = modulation.paper_grain[line]
-    width = uneven_width(target_coverage, look, break_streak, paper_grain)
-    return modulation.even_lines.coverage(line, width, look)
 
 
 def has_breaks(look: Look) -> bool:

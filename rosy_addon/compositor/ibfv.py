@@ -34,7 +34,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..field.symmetry import FieldSymmetry
 from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
@@ -45,6 +44,7 @@ from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import Look, has_flow
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField
+from .reported_blocks import reported_blocks
 
 #: The doublings end when the weights of further steps are below this. Averages are divided by the weights
 #: that they have.
@@ -95,8 +95,7 @@ class StreakWaves:
         real, imaginary = np.float32(turn.real), np.float32(turn.imag)
         count = members.shape[1]
         for line, member in enumerate(members):
-            for block in pixel_blocks(count):
-                report(0.5 * block.start / count, "blending lines")
+            for block in reported_blocks(count, "blending lines", 0.0, 0.5):
                 np.add(self.constant[line, block], np.float32(NOISE_MEAN), out=member[block])
                 if self.wave is not None:
                     wave = self.wave[line, block]
@@ -105,34 +104,9 @@ class StreakWaves:
             return lic_images(members, self.effective_samples)
 
 
-def ibfv(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
-    """Compute one LIC image for each of the M lines.
-
-    Parameters
-    ----------
-    field : PixelField
-    look : Look
-        In pixels of the frame.
-    noise : (P, K) float32 ndarray
-    """
-    (images,) = ibfv_lengths(field, [look], noise)
-    return images
-
-
-def ibfv_lengths(field: PixelField, looks: Sequence[Look], noise: np.ndarray) -> list[LicImages]:
-    """Compute LIC images of several lengths; parameters as for `streak_waves`."""
-    with progress(0.0, 0.95):
-        waves = streak_waves(field, looks, noise)
-    with progress(0.95, 1.0):
-        return wave_images(waves, looks)
-
-
 def wave_images(waves: Sequence[StreakWaves], looks: Sequence[Look]) -> list[LicImages]:
     """Return the LIC images of looks at their phases."""
-    images = []
-    for wave, look in zip(waves, looks, strict=True):
-        images.append(wave.images(look.flow_phase))
-    return images
+    return [wave.images(look.flow_phase) for wave, look in zip(waves, looks, strict=True)]
 
 
 def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) -> list[StreakWaves]:
@@ -152,48 +126,29 @@ def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) ->
         Of each look.
     """
     look = looks[0]
-    if not len(field.pixel):
-        return [_empty_waves(field, each, noise) for each in looks]
     # Of the noise, the covering only needs the number of channels.
     with progress(0.0, 0.05):
         covering = build_covering(field, look, np.zeros((len(field.pixel), 1), np.float32))
-    sheets = _Sheets(covering, is_upstream=not look.oriented)
     with progress(0.05, 0.1):
-        sheets.link()
-    decays = []
-    for each in looks:
-        with progress(0.1):
-            decays.append(_decay(field, each))
-    doublings = max(doubling_count(float(np.max(decay))) for decay in decays)
-    full_decays = [float(full_decay(each, is_two_sided(field.symmetry, each))) for each in looks]
-    sharpening = np.float32(sharpening_strength(full_decays))
+        sheets = _Sheets(covering, is_upstream=not look.oriented)
     with progress(0.1):
+        decays = [_decay(field, each) for each in looks]
+        doublings = max(_doubling_count(float(np.max(decay))) for decay in decays)
+        full_decays = [float(_full_decay(field, each)) for each in looks]
+        sharpening = np.float32(SHARPENING * _doubling_count(max(full_decays)))
         sources = sheets.sources(noise, look, sharpening)
-    sums = [_Sums(sheets, sources, decay, step_turn(look)) for decay in decays]
-    for total in sums:
-        with progress(0.1):
-            total.start()
+        sums = [_Sums(sheets, sources, decay, _step_turn(look)) for decay in decays]
     with progress(0.1, 0.2):
         origins = sheets.one_step()
     for doubling in range(doublings):
         start, stop = (0.2 + 0.7 * place / doublings for place in (doubling, doubling + 1))
         with progress(start, stop):
             origins = sheets.doubled(sums, 1 << doubling, origins, doubling == doublings - 1)
-    waves = []
-    for each, total in zip(looks, sums, strict=True):
-        with progress(0.9, 1.0):
-            waves.append(_line_waves(field, covering, each, total))
-    return waves
-
-
-def _empty_waves(field: PixelField, look: Look, noise: np.ndarray) -> StreakWaves:
-    """The averages of a field without pixels."""
-    shape = field.line_count, 0
-    channels = 1 if has_flow(look) else noise.shape[1]
-    wave = np.empty(shape, dtype=np.complex64) if has_flow(look) else None
-    return StreakWaves(
-        np.empty((*shape, channels), dtype=np.float32), wave, np.empty(0, dtype=np.float32)
-    )
+    with progress(0.9, 1.0):
+        return [
+            _line_waves(field, covering, each, total)
+            for each, total in zip(looks, sums, strict=True)
+        ]
 
 
 def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
@@ -224,8 +179,8 @@ def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
     return sources
 
 
-def step_turn(look: Look) -> float:
-    """Return the angle by which the phase of the noise differs from that of the noise a step nearer."""
+def _step_turn(look: Look) -> float:
+    """The angle by which the phase of the noise differs from that of the noise a step nearer."""
     if not has_flow(look):
         return 0.0
     angle = 2 * np.pi * look.step / cycle_distance(look)
@@ -233,41 +188,31 @@ def step_turn(look: Look) -> float:
     return angle if look.oriented else -angle
 
 
-def is_two_sided(symmetry: FieldSymmetry, look: Look) -> bool:
-    """Return whether streaks are averages over both directions of a line, with equal weights."""
-    return symmetry.has_opposites and not has_flow(look)
+def _is_two_sided(field: PixelField, look: Look) -> bool:
+    """Whether streaks are averages over both directions of a line, with equal weights."""
+    return field.symmetry.has_opposites and not has_flow(look)
 
 
-def contrast_match(two_sided: bool) -> np.float32:
-    """Return the factor of the contrast of streaks on both sides of a pixel, or on one."""
-    return TWO_SIDED_MATCH if two_sided else ONE_SIDED_MATCH
-
-
-def full_decay(look: Look, two_sided: bool) -> np.float32:
-    """Return the ratio q of the weights of successive steps of full streamlines."""
-    return np.float32(decay_of_samples(np.float64(full_sample_count(look)), two_sided))
-
-
-def doubling_count(decay: float) -> int:
-    """Return how many doublings a sum needs whose weights have the ratio `decay`."""
+def _doubling_count(decay: float) -> int:
+    """How many doublings a sum needs whose weights have the ratio `decay`."""
     steps = math.log(MIN_WEIGHT) / math.log(decay) if decay > 0 else 0
     return math.ceil(math.log2(max(steps, 1)))
 
 
-def sharpening_strength(decays: Sequence[float]) -> float:
-    """Return how much noise is raised above its neighbors, for streaks with these decays."""
-    return SHARPENING * doubling_count(max(decays))
+def _full_decay(field: PixelField, look: Look) -> np.float32:
+    """The ratio q of the weights of successive steps of full streamlines."""
+    samples = np.float64(full_sample_count(look))
+    return np.float32(decay_of_samples(samples, _is_two_sided(field, look)))
 
 
 def _decay(field: PixelField, look: Look) -> np.ndarray:
     """(P,) or () float32 ratios q of the weights of successive steps."""
-    two_sided = is_two_sided(field.symmetry, look)
     limits = magnitude_step_limits(field, look)
     if limits is None:
-        return full_decay(look, two_sided)
+        return _full_decay(field, look)
     length = np.arange(look.length + 1, dtype=np.float64)
     samples = kernel_weights(length, length, length, kernel_of(look)).effective_samples
-    return decay_of_samples(samples, two_sided).astype(np.float32)[limits]
+    return decay_of_samples(samples, _is_two_sided(field, look)).astype(np.float32)[limits]
 
 
 def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarray:
@@ -343,36 +288,23 @@ class _Surroundings(NamedTuple):
         The points whose streamlines cannot.
     column, row : (n,) intp ndarray
         The steps to the next pixels, 1 or -1.
-    x, y : (n,) float32 ndarray
-        Distances from the center of the pixel, from 0 to 1 / 2.
+    weights : list of (n,) float32 ndarray
+        Of bilinear interpolation.
     """
 
     states: list[np.ndarray]
     unlinked: list[np.ndarray]
     column: np.ndarray
     row: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
+    weights: list[np.ndarray]
 
-    def weights(self) -> list[np.ndarray]:
-        """Return the (n,) float32 weights of bilinear interpolation."""
-        return _bilinear_weights(self.x, self.y)
-
-
-def interpolated(
-    values: np.ndarray, corners: Sequence[np.ndarray], weights: Sequence[np.ndarray]
-) -> np.ndarray:
-    """Return sums of values at (n,) indices, with weights."""
-    total = values.take(corners[0])
-    total *= weights[0]
-    for corner, weight in zip(corners[1:], weights[1:], strict=True):
-        total += values.take(corner) * weight
-    return total
-
-
-def _bilinear_weights(x: np.ndarray, y: np.ndarray) -> list[np.ndarray]:
-    both = x * y
-    return [1 - x - y + both, x - both, y - both, both]
+    def interpolate(self, values: np.ndarray) -> np.ndarray:
+        """Return (n,) values at the points, given those of all states."""
+        total = values.take(self.states[0])
+        total *= self.weights[0]
+        for state, weight in zip(self.states[1:], self.weights[1:], strict=True):
+            total += values.take(state) * weight
+        return total
 
 
 class _Sheets:
@@ -400,7 +332,7 @@ class _Sheets:
         if is_upstream and covering.has_directions:
             sheet = (sheet + lines) % (2 * lines)
         self._covering_sheet = sheet
-        self._shift = np.full(9 * self.cell_count, -1, dtype=np.int8)
+        self._shift = self._sheet_shifts()
         # The first state of each sheet, which are counted on after the last.
         self._first_states = np.tile(np.arange(self.count) * self.cell_count, 2)
 
@@ -409,34 +341,35 @@ class _Sheets:
         (numbers,) = np.nonzero(self._covering_sheet == covering_sheet)
         return int(numbers[0])
 
-    def link(self) -> None:
+    def _sheet_shifts(self) -> np.ndarray:
         """Tabulate what steps to neighbors add to the number of the sheet, from 0.
 
-        It is -1 where streamlines cannot step.
+        Returns
+        -------
+        (9 C,) int8 ndarray
+            -1 where streamlines cannot step.
         """
         phase = self._covering.packed_phase
-        table = self._shift.reshape(9, -1)
-        for share, _, block, state in self.blocks(1):
-            report(share, STEP_LABEL)
+        table = np.full((9, self.cell_count), -1, dtype=np.int8)
+        for _, block, state in self.blocks(1):
             cell, own = self.cells[block], phase.take(state)
             mask = unpack_neighbor_mask(own)
             for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
                 turned = own - phase.take(state + (row * self._width + column))
                 shift = np.rint(turned / self._spacing).astype(np.int32) % self.count
                 table[bit, cell] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
+        return table.reshape(-1)
 
     def sources(self, noise: np.ndarray, look: Look, sharpening: np.float32) -> list[np.ndarray]:
         """Return the (C,) `_noise_sources` of cells, 0 outside, from (P, K) noise; see `SHARPENING`."""
         plain: list[np.ndarray] = []
-        for share, _, block, cell in self.blocks(1):
-            report(share, STEP_LABEL)
+        for _, block, cell in self.blocks(1):
             parts = _noise_sources(noise[block] - np.float32(NOISE_MEAN), look)
             plain = plain or [np.zeros(self.cell_count, dtype=np.complex64) for _ in parts]
             for source, part in zip(plain, parts, strict=True):
                 source[cell] = part
         sharp = [source.copy() for source in plain]
-        for share, _, _, cell in self.blocks(1):
-            report(share, STEP_LABEL)
+        for _, _, cell in self.blocks(1):
             for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
                 if abs(column) + abs(row) == 1:
                     linked = cell[self._shift.take(bit * self.cell_count + cell) >= 0]
@@ -446,13 +379,11 @@ class _Sheets:
                         result[linked] += sharpening * difference
         return sharp
 
-    def blocks(self, sheets: int = 0) -> Iterator[tuple[float, int, slice, np.ndarray]]:
-        """Yield blocks of pixels on each sheet, or on the first ones.
+    def blocks(self, sheets: int = 0) -> Iterator[tuple[int, slice, np.ndarray]]:
+        """Yield blocks of pixels on each sheet, or on the first ones, and report the progress.
 
         Yields
         ------
-        share : float
-            Of the blocks before.
         sheet : int
         block : slice
         state : (n,) intp ndarray
@@ -460,8 +391,8 @@ class _Sheets:
         sheets, count = sheets or self.count, len(self.cells)
         for sheet in range(sheets):
             for block in pixel_blocks(count):
-                state = sheet * self.cell_count + self.cells[block].astype(np.intp)
-                yield (sheet + block.start / count) / sheets, sheet, block, state
+                report((sheet + block.start / count) / sheets, STEP_LABEL)
+                yield sheet, block, sheet * self.cell_count + self.cells[block].astype(np.intp)
 
     def one_step(self) -> _Origins:
         """Find where each state is reached from in a step, by the midpoint method."""
@@ -476,16 +407,12 @@ class _Sheets:
             rows *= scale
         step = step.reshape(-1)
         result = _Origins.ended(len(step))
-        for share, sheet, block, state in self.blocks():
-            report(share, STEP_LABEL)
+        for sheet, block, state in self.blocks():
             cell = self.cells[block]
             sheets = np.full(len(cell), sheet, dtype=np.int8)
             own = step.take(state)
-            middle = np.zeros_like(own)
             around = self.surroundings(_Origins(cell, sheets, np.float32(0.5) * own))
-            for corner, weight in zip(around.states, around.weights(), strict=True):
-                middle += weight * step.take(corner)
-            result.put(state, self._moved(_Origins(cell, sheets, middle)))
+            result.put(state, self._moved(_Origins(cell, sheets, around.interpolate(step))))
         return result
 
     def doubled(
@@ -500,13 +427,11 @@ class _Sheets:
         """
         doubled = [[values.copy() for values in total.values] for total in sums]
         result = _Origins.ended(0 if is_last else len(origins.cell))
-        for share, _, block, state in self.blocks():
-            report(share, STEP_LABEL)
+        for _, block, state in self.blocks():
             around = self.surroundings(origins.at(state))
-            weights = around.weights()
             for total, results in zip(sums, doubled, strict=True):
                 for place, (values, target) in enumerate(zip(total.values, results, strict=True)):
-                    arriving = interpolated(values, around.states, weights)
+                    arriving = around.interpolate(values)
                     target[state] += total.weighted(place, arriving, steps, block)
             if not is_last:
                 result.put(state, self._interpolated(origins, around))
@@ -522,7 +447,7 @@ class _Sheets:
         width, inverse_width = np.float32(self._width), np.float32(1 / self._width)
         directions = (around.column, 0), (0, around.row), (around.column, around.row)
         for corner, unlinked, weight, (column, row) in zip(
-            around.states[1:], around.unlinked, around.weights()[1:], directions, strict=True
+            around.states[1:], around.unlinked, around.weights[1:], directions, strict=True
         ):
             cells = origins.cell.take(corner)
             distance = origins.offset.take(corner)
@@ -553,23 +478,23 @@ class _Sheets:
         own = self._first_states.take(sheet)
         own += cell
         states, unlinked = [own], []
-        for step in (column, row * 3, column + 3 * row):
-            neighbor = step + 4
+        for columns, rows in ((column, 0), (0, row), (column, row)):
+            neighbor = columns + 3 * rows + 4
             neighbor *= self.cell_count
             neighbor += cell
             shift = self._shift.take(neighbor)
-            unlinked.append(np.flatnonzero(shift < 0))
+            points = np.flatnonzero(shift < 0)
             state = self._first_states.take(sheet + shift, mode="clip")
             state += cell
-            states.append(state)
-        row_cells = row * self._width
-        states[1] += column
-        states[2] += row_cells
-        states[3] += column
-        states[3] += row_cells
-        for state, points in zip(states[1:], unlinked, strict=True):
+            state += columns + rows * self._width
             state[points] = own[points]
-        return _Surroundings(states, unlinked, column, row, np.abs(x, out=x), np.abs(y, out=y))
+            states.append(state)
+            unlinked.append(points)
+        np.abs(x, out=x)
+        np.abs(y, out=y)
+        both = x * y
+        weights = [1 - x - y + both, x - both, y - both, both]
+        return _Surroundings(states, unlinked, column, row, weights)
 
     def _moved(self, origins: _Origins) -> _Origins:
         """Assign points to the pixels that they are in, if streamlines can step there."""
@@ -647,13 +572,9 @@ class _Sums:
         self._turns = [0.0, turn][: len(sources)]
         size = sheets.count * sheets.cell_count
         self.values = [np.zeros(size, dtype=np.complex64) for _ in sources]
-
-    def start(self) -> None:
-        """Set the sums to the noise of each state."""
-        for share, _, block, state in self._sheets.blocks():
-            report(share, STEP_LABEL)
-            for total, source in zip(self.values, self.sources, strict=True):
-                total[state] = source.take(self._sheets.cells[block])
+        for _, block, state in sheets.blocks():
+            for total, source in zip(self.values, sources, strict=True):
+                total[state] = source.take(sheets.cells[block])
 
     def weighted(self, place: int, values: np.ndarray, steps: int, block: slice) -> np.ndarray:
         """Multiply sums that arrive from a number of steps by their weight, and turn them.
@@ -707,14 +628,13 @@ def _line_waves(field: PixelField, covering: Covering, look: Look, sums: _Sums) 
     """Blend the two sheets of each line, and equalize the contrast."""
     lines, count = field.line_count, len(field.pixel)
     flows = has_flow(look)
-    match = contrast_match(is_two_sided(field.symmetry, look))
+    match = TWO_SIDED_MATCH if _is_two_sided(field, look) else ONE_SIDED_MATCH
     channels = 2 * len(sums.sources) - 1
     constant = np.empty((lines, count, 1 if flows else channels), dtype=np.float32)
     wave = np.empty((lines, count), dtype=np.complex64) if flows else None
     effective_samples = np.zeros(count, dtype=np.float32)
     for line, first_sheet in enumerate(member_lines(field).tolist()):
-        for block in pixel_blocks(count):
-            report((line + block.start / count) / lines, "blending lines")
+        for block in reported_blocks(count, "blending lines", line / lines, (line + 1) / lines):
             state = first_sheet * covering.cell_count + covering.cell_of_pixel[block].astype(
                 np.intp
             )

@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from ..progress import progress, report
-from ..projection.pixel_blocks import pixel_blocks
 from .filter_kernel import Kernel
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
+from .reported_blocks import reported_blocks
 
 #: Mean and standard deviation of binary noise.
 NOISE_MEAN, NOISE_STD = 0.5, 0.5
@@ -43,15 +43,21 @@ BLOCK_ROWS = 32
 TAPS_PER_SIDE = 3
 
 
-def hash_bits_2d(
-    x: np.ndarray, y: np.ndarray, seed: int, channel: int, density: float
+#: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
+HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
+SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
+FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
+
+
+def hash_bits(
+    cell_index: Sequence[np.ndarray], seed: int, channel: int, density: float
 ) -> np.ndarray:
     """Hash the cells of an integer lattice to random bits.
 
     Parameters
     ----------
-    x, y : int ndarray
-        Cell indices.
+    cell_index : sequence of int ndarray
+        Up to five indices of cells.
     seed, channel : int
     density : float
         Fraction of cells whose bit is set, to the nearest 2 ** -24.
@@ -65,19 +71,6 @@ def hash_bits_2d(
     The finalizer is `lowbias32` of Chris Wellons, "Prospecting for Hash Functions", 2018 (public
     domain).
     """
-    return hash_bits_nd((x, y), seed, channel, density)
-
-
-#: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
-HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
-SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
-FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
-
-
-def hash_bits_nd(
-    cell_index: Sequence[np.ndarray], seed: int, channel: int, density: float
-) -> np.ndarray:
-    """Hash cells with up to five indices to random bits; see `hash_bits_2d`."""
     start = (seed * SEED_FACTOR + channel * CHANNEL_FACTOR) & 0xFFFFFFFF
     h = cell_index[0].astype(np.uint32) * np.uint32(HASH_FACTORS[0])
     for component, factor in zip(cell_index[1:], HASH_FACTORS[1:], strict=False):
@@ -130,10 +123,9 @@ def image_noise(
         settings = grain, seed, channel, density, high_pass
         with progress(channel / channels, (channel + 1) / channels):
             tiles = cached_tiles(_noise_tiles, rectangle, *settings)
-        for block in pixel_blocks(len(pixel)):
-            report((channel + 1) / channels, STEP_LABEL)
-            index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
-            noise[block, channel] = tiles.take(index)
+            for block in reported_blocks(len(pixel), STEP_LABEL, 1.0, 1.0):
+                index = rectangle.index(*np.divmod(pixel[block], np.int32(width)))
+                noise[block, channel] = tiles.take(index)
     return noise
 
 
@@ -145,36 +137,15 @@ def _noise_tiles(
     density: float,
     high_pass: float,
 ) -> np.ndarray:
-    """Flat float32 noise of one channel in a rectangle of the picture, row by row."""
+    """Flat float32 noise of one channel in a rectangle of the picture, row by row, averaged over each pixel."""
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
-    padded_bounds = (left - margin, right + margin, bottom - margin, top + margin)
-    cells = _lattice_noise(*padded_bounds, grain, seed, channel, density)
-    if high_pass:
-        outside = "edge" if margin == full_margin else "mean"
-        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
-        report(1.0, STEP_LABEL)
-        cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
-    return np.ascontiguousarray(cells).reshape(-1)
-
-
-def _lattice_noise(
-    left: int,
-    right: int,
-    bottom: int,
-    top: int,
-    grain: float,
-    seed: int,
-    channel: int,
-    density: float,
-) -> np.ndarray:
-    """(top - bottom, right - left) float32 noise without high pass, averaged over each pixel."""
     cos, sin = np.cos(LATTICE_ANGLE) / grain, np.sin(LATTICE_ANGLE) / grain
-    column = np.arange(left, right, dtype=np.float64)
-    row = np.arange(bottom, top, dtype=np.float64)[:, None]
+    column = np.arange(left - margin, right + margin, dtype=np.float64)
+    row = np.arange(bottom - margin, top + margin, dtype=np.float64)[:, None]
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
-    total = np.zeros((top - bottom, right - left), dtype=np.float32)
+    total = np.zeros((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
         report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
@@ -183,12 +154,15 @@ def _lattice_noise(
                 px, py = column + x, row[block] + y
                 cell_x = np.floor(cos * px - sin * py).astype(np.int32)
                 cell_y = np.floor(sin * px + cos * py).astype(np.int32)
-                total[block] += hash_bits_2d(cell_x, cell_y, seed, channel, density)
+                total[block] += hash_bits((cell_x, cell_y), seed, channel, density)
     scale = NOISE_STD / np.sqrt(density * (1 - density))
-    return (
-        np.float32(NOISE_MEAN - density * scale)
-        + np.float32(scale / (TAPS_PER_SIDE * TAPS_PER_SIDE)) * total
-    )
+    cells = np.float32(NOISE_MEAN - density * scale) + np.float32(scale / len(taps) ** 2) * total
+    if high_pass:
+        outside = "edge" if margin == full_margin else "mean"
+        cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
+        report(1.0, STEP_LABEL)
+        cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
+    return np.ascontiguousarray(cells).reshape(-1)
 
 
 def high_pass_margin(high_pass: float) -> int:

@@ -30,7 +30,6 @@ from .hatching import (
 from .inks import Inks, inks_of
 from .lic_images import LicImages
 from .look import Look
-from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField
 from .streak_statistics import (
     COVERAGE_STEPS,
@@ -129,38 +128,26 @@ def line_thresholds(
         0 to 1, evenly distributed.
     """
     statistics = look_streak_statistics(look)
-    relief = break_streak = None
-    if modulation.paper_grain is not None:
-        relief = np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * modulation.paper_grain[line]
-    if modulation.break_images is not None:
-        break_streak, _ = standard_streak(modulation.break_images, line, statistics.break_std)
+    break_streak = modulation.break_streak(line, look)
     if modulation.even_lines is not None:
-        grain = None if relief is None else modulation.paper_grain[line]
-        position = 1 - modulation.even_lines.streaks[line]
-        result = _even_line_thresholds(position, break_streak, grain, look)
+        result = _even_line_thresholds(line, break_streak, look, modulation)
     else:
-        streak, _ = standard_streak(images, line, statistics.std)
-        result = _streak_thresholds(streak, break_streak, relief, look, statistics.threshold)
+        relief = modulation.relief(line, look)
+        streak = standard_streak(images, line, statistics.std)[0] + relief
+        if break_streak is not None:
+            break_streak += relief
+        result = _streak_thresholds(streak, break_streak, look, statistics.threshold)
     if modulation.undirected is not None:
-        undefined = np.flatnonzero(~np.isnan(modulation.undirected))
-        spots = modulation.undirected[undefined] / np.float32(statistics.disc_std)
-        if relief is not None:
-            spots += relief[undefined]
-        result[undefined] = _coverage_from(spots, statistics.disc_threshold)
+        spots = modulation.spots(line, look)
+        undefined = np.flatnonzero(~np.isnan(spots))
+        result[undefined] = _coverage_from(spots[undefined], statistics.disc_threshold)
     return result
 
 
 def _streak_thresholds(
-    streak: np.ndarray,
-    break_streak: np.ndarray | None,
-    relief: np.ndarray | None,
-    look: Look,
-    table: np.ndarray,
+    streak: np.ndarray, break_streak: np.ndarray | None, look: Look, table: np.ndarray
 ) -> np.ndarray:
     """`line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
-    if relief is not None:
-        streak = streak + relief
-        break_streak = None if break_streak is None else break_streak + relief
     if break_streak is None:
         return _coverage_from(streak, table)
     difference = break_streak - streak
@@ -174,16 +161,17 @@ def _streak_thresholds(
 
 
 def _even_line_thresholds(
-    position: np.ndarray,
-    break_streak: np.ndarray | None,
-    paper_grain: np.ndarray | None,
-    look: Look,
+    line: int, break_streak: np.ndarray | None, look: Look, modulation: LineModulation
 ) -> np.ndarray:
-    """`line_thresholds` of even lines; `position` is 0 in the middle of a line, 1 between two lines."""
+    """`line_thresholds` of even lines."""
+    # 0 in the middle of a line, 1 between two lines.
+    position = 1 - modulation.even_lines.streaks[line]
+    paper_grain = modulation.paper_grain
     if break_streak is None and paper_grain is None:
         return position
+    grain = None if paper_grain is None else paper_grain[line]
     return _bisect(
-        lambda coverage: uneven_width(coverage, look, break_streak, paper_grain) - position,
+        lambda coverage: uneven_width(coverage, look, break_streak, grain) - position,
         len(position),
     )
 
@@ -408,13 +396,12 @@ def picture_thresholds(
     for (node, weight), level in zip(PIXEL_NODES, PIXEL_LEVELS, strict=True):
         if not is_sampled and node:
             continue
+        part = modulation
         resolved: np.ndarray | float = 1.0
         if even_lines is not None:
             sample, period = _even_sample(even_lines, crowding > level, node)
             part = modulation._replace(even_lines=sample)
             resolved = np.einsum("klp,lp->kp", places, resolved_share(period, samples_per_side))
-        else:
-            part = modulation
         if part.break_images is not None:
             part = part._replace(break_images=_streak_sample(part.break_images, node))
         part_images = _streak_sample(images, node)

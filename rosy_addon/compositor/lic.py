@@ -9,50 +9,43 @@ import numpy as np
 
 from ..memory import raise_mmap_threshold
 from ..progress import progress
-from .brute_force import brute_force
 from .fast_lic import fast_lic
 from .flow import noise_channel_count
-from .ibfv import ibfv_lengths
+from .ibfv import streak_waves, wave_images
 from .image_noise import image_noise
 from .lic_images import LicImages
 from .look import Look
 from .member_decomposition import member_decomposition
+from .per_pixel_lic import brute_force
 from .pixel_field import PixelField
 from .strips import Strip
-
-
-def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicImages:
-    """Average noise along the streamlines of each member, with the method of the look.
-
-    Parameters
-    ----------
-    field : PixelField
-    look : Look
-        In pixels of the frame.
-    noise : (P, K) float32 ndarray, optional
-        By default `look_noise(field, look)`.
-
-    Returns
-    -------
-    LicImages
-    """
-    (images,) = lic_lengths(field, [look], look_noise(field, look) if noise is None else noise)
-    return images
 
 
 def lic_lengths(
     field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
 ) -> list[LicImages]:
-    """Do the same as `lic` for looks that differ in the length of streamlines, longest first.
+    """Average noise along the streamlines of each member, with the method of the looks.
 
-    With a strip, the method "sheets" returns the images at its `averaged_rows`.
+    Parameters
+    ----------
+    field : PixelField
+    looks : sequence of Look
+        In pixels of the frame. They differ in the length of streamlines. The first is the longest.
+    noise : (P, K) float32 ndarray
+    strip : Strip, optional
+        With the method "sheets", the images are those at its `averaged_rows`.
+
+    Returns
+    -------
+    list of LicImages
+        Of each look.
     """
     raise_mmap_threshold()
     method = looks[0].method
     if method == "sheets":
         return fast_lic(field, looks, noise, strip)
     if method == "ibfv":
-        return ibfv_lengths(field, looks, noise)
+        return wave_images(streak_waves(field, looks, noise), looks)
     convolve = member_decomposition if method == "members" else brute_force
     images = []
     for number, look in enumerate(looks):

@@ -15,6 +15,7 @@ from ..errors import RosyError
 from ..settings import (
     Choice,
     Stage,
+    always,
     check_settings,
     choice,
     color,
@@ -34,11 +35,6 @@ def colors_magnitude(look: Any) -> bool:
 def colors_values(look: Any) -> bool:
     """Return whether numbers on the surface drive the color of the lines."""
     return look.hue == "values" and not colors_magnitude(look)
-
-
-def uses_color_map(look: Any) -> bool:
-    """Return whether lines have the colors of the color map."""
-    return colors_magnitude(look) or colors_values(look)
 
 
 def is_hatched(look: Any) -> bool:
@@ -76,9 +72,14 @@ def _uses_ink_ramp(look: Any) -> bool:
 _SINGULARITIES: dict[str, Any] = {"panel": "singularities", "stage": Stage.SHADING}
 
 
+def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
+    """Return the arguments of settings that a panel shows, and that no LIC image depends on."""
+    return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
+
+
 def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
     """Return the arguments that most settings of the panel Ink share."""
-    return {"panel": "ink", "stage": Stage.SHADING, "applies": applies}
+    return _shading("ink", applies)
 
 
 @dataclass(frozen=True)
@@ -190,8 +191,7 @@ class Look:
         "fields of odd degree. 0: none",
         label="Arrowheads",
         is_pixel_length=True,
-        panel="streaks",
-        stage=Stage.SHADING,
+        **_shading("streaks"),
     )
     arrow_size: float = number(
         12.0,
@@ -200,9 +200,7 @@ class Look:
         "Length of the arrowheads in pixels, which is at least 3",
         label="Arrowhead Size",
         is_pixel_length=True,
-        panel="streaks",
-        stage=Stage.SHADING,
-        applies=lambda look: look.arrows > 0,
+        **_shading("streaks", lambda look: look.arrows > 0),
     )
     flow: float = number(
         0.0,
@@ -301,8 +299,7 @@ class Look:
             "color map",
         },
         option_labels={"one": "Single"},
-        panel="colour",
-        stage=Stage.SHADING,
+        **_shading("colour"),
     )
     values_low: float = number(
         0.0,
@@ -311,9 +308,7 @@ class Look:
         "Number at the bottom of the color map. Above the number at the top, the map is inverted. Both 0: "
         "the range of the numbers",
         label="Bottom Value",
-        panel="colour",
-        stage=Stage.SHADING,
-        applies=colors_values,
+        **_shading("colour", colors_values),
     )
     values_high: float = number(
         0.0,
@@ -321,9 +316,7 @@ class Look:
         1e30,
         "Number at the top of the color map. Both 0: the range of the numbers",
         label="Top Value",
-        panel="colour",
-        stage=Stage.SHADING,
-        applies=colors_values,
+        **_shading("colour", colors_values),
     )
     seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
     gain: float = number(
@@ -331,10 +324,8 @@ class Look:
         0.0,
         16.0,
         "Contrast of the streaks. 1: as with a single direction",
-        panel="streaks",
         panel_before="high_pass",
-        stage=Stage.SHADING,
-        applies=lambda look: not is_hatched(look),
+        **_shading("streaks", lambda look: not is_hatched(look)),
     )
     guiding_angle: float = number(
         0.0,
@@ -390,17 +381,14 @@ class Look:
             "magma": "Black through red to pale yellow",
             "grey": "Black to white",
         },
-        panel="colour",
-        stage=Stage.SHADING,
-        applies=uses_color_map,
+        **_shading("colour", lambda look: colors_magnitude(look) or colors_values(look)),
     )
     shading: float = number(
         0.7,
         0.0,
         1.0,
         "Strength of the diffuse shading in the picture",
-        panel="light",
-        stage=Stage.SHADING,
+        **_shading("light"),
     )
     light: str = choice(
         "headlight",
@@ -411,17 +399,13 @@ class Look:
             "scene": "The lights of the scene",
         },
         label="Light Source",
-        panel="light",
         panel_label="Source",
-        stage=Stage.SHADING,
-        applies=_is_lit,
+        **_shading("light", _is_lit),
     )
     shadows: bool = switch(
         False,
         "Cast shadows. The headlight casts none",
-        panel="light",
-        stage=Stage.SHADING,
-        applies=lambda look: _is_lit(look) and look.light != "headlight",
+        **_shading("light", lambda look: _is_lit(look) and look.light != "headlight"),
     )
     tone: str = choice(
         "light",
@@ -433,44 +417,38 @@ class Look:
             "picture": "A picture of the scene through its camera, such as a render",
         },
         label="Tone Source",
-        panel="tone",
         panel_label="Source",
-        stage=Stage.SHADING,
+        **_shading("tone"),
     )
     tone_lit: bool = switch(
         False,
         "Multiply the tone by the light",
         label="Multiply by Light",
-        panel="tone",
-        stage=Stage.SHADING,
-        applies=lambda look: look.tone != "light",
+        **_shading("tone", lambda look: look.tone != "light"),
     )
     tone_black: float = number(
         0.0,
         -1e6,
         1e6,
         "Input value that becomes black",
-        panel="tone",
         panel_label="Black",
-        stage=Stage.SHADING,
+        **_shading("tone"),
     )
     tone_white: float = number(
         1.0,
         -1e6,
         1e6,
         "Input value that becomes white. Below the value for black, the tone is inverted",
-        panel="tone",
         panel_label="White",
-        stage=Stage.SHADING,
+        **_shading("tone"),
     )
     tone_gamma: float = number(
         1.0,
         0.05,
         20.0,
         "Gamma of the tones between. Above 1 they become lighter, below 1 darker",
-        panel="tone",
         panel_label="Gamma",
-        stage=Stage.SHADING,
+        **_shading("tone"),
     )
     ink: str = choice(
         "soft",
@@ -480,9 +458,8 @@ class Look:
             "hatch": "Lines of ink on paper, whose number and width follow the tone",
         },
         label="Ink Style",
-        panel="ink",
         panel_label="Style",
-        stage=Stage.SHADING,
+        **_shading("ink"),
     )
     lines: str = choice(
         "streaks",

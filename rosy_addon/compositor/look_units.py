@@ -11,7 +11,7 @@ import numpy as np
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.shadow_maps import world_bounds
-from ..settings import Number, pixel_lengths, settings_of
+from ..settings import pixel_lengths, settings_of, switch
 from .look import Look
 
 #: Lengths in Blender units follow the camera in steps of 1 / 32 octave, so that tables made for a
@@ -28,37 +28,25 @@ MIN_DISTANCE_FACTOR = 0.25
 
 
 @dataclass(frozen=True)
-class SupersampledLook(Look):
-    """A look with lengths in pixels of a supersampled frame, which may be out of range."""
+class PixelLook(Look):
+    """A look with its lengths in pixels of the frame that is drawn, which may be out of range."""
+
+    antialiased: bool = switch(
+        False,
+        "Draw streaks more accurately, as pixels have several samples; see `GBuffer.coverage`",
+    )
 
     def __post_init__(self) -> None:
         """Check nothing: the original look was checked."""
 
 
-def supersampled_look(look: Look) -> SupersampledLook:
+def supersampled_look(look: Look) -> PixelLook:
     """Return the look with its lengths in pixels of the supersampled frame."""
     settings = {name: getattr(look, name) for name in settings_of(Look)}
     for setting in pixel_lengths(Look):
         settings[setting.name] *= look.supersampling
     settings["unit_size"] /= look.supersampling
-    return SupersampledLook(**settings)
-
-
-@dataclass(frozen=True)
-class AntialiasedLook(Look):
-    """A look in pixels of a frame whose pixels have several samples; see `GBuffer.coverage`.
-
-    Streaks are drawn more accurately than without supersampling.
-    """
-
-    def without_antialiasing(self) -> Look:
-        """Return the same look for streaks that need not be accurate."""
-        return Look(**{name: getattr(self, name) for name in settings_of(Look)})
-
-
-def antialiased_look(look: Look) -> AntialiasedLook:
-    """Return the look for a frame of pixels that have several samples."""
-    return AntialiasedLook(**{name: getattr(look, name) for name in settings_of(Look)})
+    return PixelLook(**settings)
 
 
 def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> Look:
@@ -126,9 +114,10 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
 def scaled_look(look: Look, scale: float) -> Look:
     """Multiply the lengths of a look, as far as their ranges allow."""
     scale = float(np.clip(scale, *_scale_limits(look)))
-    lengths = {
-        setting.name: _scaled_length(look, setting, scale) for setting in pixel_lengths(Look)
-    }
+    lengths = {}
+    for setting in pixel_lengths(Look):
+        length = getattr(look, setting.name) * scale
+        lengths[setting.name] = max(round(length), 1) if setting.is_integer else length
     unit_size = float(np.clip(look.unit_size / scale, *_range_of("unit_size")))
     return replace(look, **lengths, unit_size=unit_size)
 
@@ -217,9 +206,3 @@ def _scale_limits(look: Look) -> tuple[float, float]:
     )
     min_scale = max(1.0, settings_of(Look)["grain"].low) / look.grain
     return min(min_scale, 1.0), max(max_scale, 1.0)
-
-
-def _scaled_length(look: Look, setting: Number, scale: float) -> float:
-    """Return a length of a look times a scale, rounded to at least 1 if it is an integer."""
-    value = getattr(look, setting.name) * scale
-    return max(round(value), 1) if setting.is_integer else value

@@ -11,12 +11,18 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress, report
-from ..projection.pixel_blocks import pixel_blocks
-from .lic_images import LicImages, LineTracer, convolve_members
+from ..progress import progress
+from .lic_images import LicImages
 from .look import Look
-from .per_pixel_lic import direction_table, interpolate_direction
+from .per_pixel_lic import (
+    DirectionSampler,
+    convolve_members,
+    direction_table,
+    interpolate_direction,
+    members_on_screen,
+)
 from .pixel_field import PixelField, all_members, blend_weights, neighbor_table
+from .reported_blocks import reported_blocks
 
 
 def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
@@ -41,21 +47,19 @@ def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> Li
     with progress(0.0):
         neighbors = neighbor_table(field)
     angle = look.guiding_angle
-    draw_first = partial(_one_set, field, look, noise, neighbors, angle)
-    if field.degree == 1 or look.weights == "none":
-        return draw_first()
-    with progress(0.0, 0.5):
-        first = draw_first()
+    is_single = field.degree == 1 or look.weights == "none"
+    with progress(0.0, 1.0 if is_single else 0.5):
+        first = _one_set(field, look, noise, neighbors, angle)
+    if is_single:
+        return first
     with progress(0.5, 1.0):
         second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
-    for block in pixel_blocks(len(field.pixel)):
-        report(1.0, "blending lines")
+    for block in reported_blocks(len(field.pixel), "blending lines", 1.0, 1.0):
         weight = _first_set_weight(field.part(block), look)
         second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
         second.effective_samples[block] += weight * (
             first.effective_samples[block] - second.effective_samples[block]
         )
-        first.first_set_weight[block] = weight
     return replace(first, blend=second.blend, effective_samples=second.effective_samples)
 
 
@@ -64,8 +68,20 @@ def _one_set(
 ) -> LicImages:
     """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
     with progress(0.0):
-        tracers = _tracers(field, look, neighbors, angle)
+        if look.view_plane:
+            members, directions = members_on_screen(field, look, angle, field.line_count)
+        else:
+            members = directions = _screen_space_members(field, angle)
+        tracers = [
+            partial(_member_sampler, direction_table(direction, member, field.degree, neighbors))
+            for member, direction in zip(members, directions, strict=True)
+        ]
     return convolve_members(field, look, noise, neighbors, tracers)
+
+
+def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
+    """Make a sampler of one vector field on screen, given its `direction_table`."""
+    return lambda entry, offset: interpolate_direction(table.take(entry, axis=0), offset)
 
 
 def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
@@ -79,54 +95,21 @@ def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
     return (weight > 0.5).astype(np.float32) if look.weights == "binary" else weight
 
 
-def _tracers(
-    field: PixelField, look: Look, neighbors: np.ndarray, angle: float
-) -> list[LineTracer]:
-    """Make tracers along the M members nearest to `angle` and to its rotations by 2 pi / N."""
-    count = len(field.pixel)
-    members, directions = np.empty((2, field.line_count, count), dtype=np.complex64)
-    for block in pixel_blocks(count):
-        report(block.start / count, "finding directions")
-        part = field.part(block)
-        if look.view_plane:
-            members[:, block] = all_members(part, angle)[: field.line_count]
-            for member, direction in zip(members, directions, strict=True):
-                in_plane = part.member_direction(member[block])
-                direction[block] = part.to_screen(in_plane, look.foreshorten)
-        else:
-            members[:, block] = directions[:, block] = _screen_space_members(part, angle)
-    tracers = []
-    for member, direction in zip(members, directions, strict=True):
-        table = direction_table(direction, member, field.degree, neighbors)
-        tracers.append(_direction_tracer(table))
-    return tracers
-
-
-def _direction_tracer(table: np.ndarray) -> LineTracer:
-    """Make a tracer along one vector field on screen, given its `direction_table`."""
-
-    def forward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        return interpolate_direction(table.take(entry, axis=0), offset)
-
-    def backward(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
-        return -forward(entry, offset)
-
-    return lambda block: (forward, backward)
-
-
-def _screen_space_members(field: PixelField, angle: float) -> list[np.ndarray]:
-    """M times (P,) complex64 directions, chosen among the members after projection to the screen.
+def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
+    """(M, P) complex64 directions, chosen among the members after projection to the screen.
 
     This reproduces the error in Figure 8 of the paper. On a tilted surface the angles between
     projected members are not 2 pi / N. The two sets of breaking points then come close to each
     other, and the weights do not match them.
     """
-    members = np.stack(
-        [field.to_screen(field.member_direction(member)) for member in all_members(field, 0.0)]
-    )
-    screen_members = []
-    for member in range(field.line_count):
-        rotation = np.exp(-1j * (angle + 2 * np.pi * member / field.degree))
-        best_index = np.argmax((members * rotation).real, axis=0)
-        screen_members.append(np.take_along_axis(members, best_index[None], axis=0)[0])
+    screen_members = np.empty((field.line_count, len(field.pixel)), dtype=np.complex64)
+    for block in reported_blocks(len(field.pixel), "finding directions"):
+        part = field.part(block)
+        members = np.stack(
+            [part.to_screen(part.member_direction(member)) for member in all_members(part, 0.0)]
+        )
+        for line, out in enumerate(screen_members):
+            rotation = np.exp(-1j * (angle + 2 * np.pi * line / field.degree))
+            best_index = np.argmax((members * rotation).real, axis=0)
+            out[block] = np.take_along_axis(members, best_index[None], axis=0)[0]
     return screen_members

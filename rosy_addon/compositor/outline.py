@@ -9,7 +9,6 @@ are visible. Marks that are too short are not drawn, unless they are the border 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,11 +19,11 @@ from ..progress import progress, report
 from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.pixel_neighbors import affine_depth, neighbor_masks
 from ..projection.project import project_samples
 from .look import Look
 from .look_units import supersampled_look
+from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
 #: `pixel_neighbors.affine_depth`).
@@ -75,11 +74,11 @@ def outline_coverage(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -
     """
     if gbuffer.samples is None:
         with progress(0.0, 0.8):
-            edges = _find_edges(gbuffer, look, cache)
+            edges = _Edges(gbuffer, look, cache)
         with progress(0.8, 1.0):
-            return _draw_edges(gbuffer, look, edges)
+            return edges.coverage()
     with progress(0.0, 0.3):
-        edges = _find_edges(gbuffer, look, cache)
+        edges = _Edges(gbuffer, look, cache)
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
     report(0.3, STEP_LABEL)
@@ -147,11 +146,10 @@ def _sample_outline(
         samples, home, shown = project_samples(gbuffer, entries, look.display, cache)
     look = supersampled_look(replace(look, supersampling=gbuffer.samples.side))
     with progress(0.4, 0.8):
-        edges = _find_edges(samples, look, cache)
+        edges = _Edges(samples, look, cache)
     edges.line_width[~is_near[home]] = 0
     with progress(0.8, 1.0):
-        coverage = _draw_edges(samples, look, edges)
-    return home, shown, coverage
+        return home, shown, edges.coverage()
 
 
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
@@ -166,237 +164,178 @@ def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray
     return padded[row, column]
 
 
-def _find_edges(gbuffer: GBuffer, look: Look, cache: Cache | None) -> _Edges:
-    """Find the pixels at silhouettes, borders and creases, and how wide lines may be there."""
-    width, height = gbuffer.camera.width, gbuffer.camera.height
-    radius = int(np.ceil(look.outline))
-    # The frame has an empty margin that is wider than the lines.
-    stride = width + 2 * radius + 2
-    entry_of_cell = np.full((height + 2 * radius + 2) * stride, -1, dtype=np.int32)
-    cell = np.empty(len(gbuffer.pixel), dtype=np.int32)
-    for block in pixel_blocks(len(cell)):
-        report(0.1 * block.start / len(cell), STEP_LABEL)
-        row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
-        cell[block] = (row + radius + 1) * np.int32(stride) + column + np.int32(radius + 1)
-        entry_of_cell[cell[block]] = np.arange(block.start, block.stop, dtype=np.int32)
-    grid = _CellGrid(entry_of_cell, cell, stride, (radius + 1) * (stride + 1))
-    # Larger depths are nearer to the eye.
-    depth, tolerance = np.empty((2, len(cell)), dtype=np.float32)
-    for block in pixel_blocks(len(cell)):
-        report(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
-        depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
-    with progress(0.2, 0.6, STEP_LABEL):
-        mask = neighbor_masks(gbuffer, look.crease_angle, True)
-    line_width = np.zeros(len(cell), dtype=np.float32)
-    border = np.zeros(len(cell), dtype=np.uint8)
-    instance_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)) if gbuffer.instances else ()
-    for instance_id in instance_ids:
-        with progress(0.6, 0.7, STEP_LABEL):
-            _creases_and_parts(
-                gbuffer, int(instance_id), look, cache, grid, mask, line_width, border
-            )
-    with progress(0.7, 0.9, STEP_LABEL):
-        _occlusions(gbuffer, look, grid, mask, depth, tolerance, line_width, border)
-    with progress(0.9, 1.0, STEP_LABEL):
-        _steps(gbuffer, look, grid, mask, depth, tolerance, line_width)
-    return _Edges(grid, depth, tolerance, line_width, border)
+class _Edges:
+    """The edges in a G-buffer: the pixels at silhouettes, borders and creases.
 
-
-def _draw_edges(gbuffer: GBuffer, look: Look, edges: _Edges) -> np.ndarray:
-    """(P,) float32 coverage of each pixel by the lines of edges."""
-    grid, depth, tolerance, line_width, border = edges
-    edge_pixels = np.flatnonzero(line_width)
-    with progress(0.0, 0.5, STEP_LABEL):
-        strength = _mark_strength(
-            gbuffer.pixel[edge_pixels],
-            border[edge_pixels],
-            gbuffer.camera.width,
-            look.supersampling,
-        )
-    edge_pixels, strength = edge_pixels[strength > 0], strength[strength > 0]
-    line_width = np.minimum(line_width[edge_pixels], np.float32(look.outline) * strength)
-    depth_slack = np.float32(DEPTH_JUMP) * tolerance[edge_pixels]
-    coverage = np.zeros(len(depth), dtype=np.float32)
-    for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
-        report(0.5, STEP_LABEL)
-        neighbor = grid.entry.take(grid.cell[edge_pixels] + (dy * grid.stride + dx))
-        paintable = (neighbor >= 0) & (
-            gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge_pixels]
-        )
-        paintable &= depth.take(neighbor) >= depth[edge_pixels] - depth_slack * np.float32(
-            max(distance, 1.0)
-        )
-        pixel_coverage = np.clip(line_width[paintable] - np.float32(distance), 0, 1)
-        neighbor = neighbor[paintable]
-        coverage[neighbor] = np.maximum(coverage[neighbor], pixel_coverage)
-    return coverage
-
-
-class _CellGrid(NamedTuple):
-    """The pixels of a G-buffer in a frame with an empty margin.
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    look : Look
+        In its pixels.
+    cache : Cache, optional
 
     Attributes
     ----------
-    entry : (cells,) int32 ndarray
-        Entry of the G-buffer in each cell, or -1.
-    cell : (P,) int32 ndarray
-        Cell of each entry.
-    stride : int
-        Cells in a row.
-    origin : int
-        Cell of the lower left pixel of the frame.
-    """
-
-    entry: np.ndarray
-    cell: np.ndarray
-    stride: int
-    origin: int
-
-
-class _Edges(NamedTuple):
-    """The edges in a G-buffer.
-
-    Attributes
-    ----------
-    grid : _CellGrid
-    depth, tolerance : (P,) float32 ndarray
-        From `pixel_neighbors.affine_depth`.
     line_width : (P,) float32 ndarray
         Largest width of lines that begin at a pixel; 0 where there is no edge.
-    border : (P,) uint8 ndarray
-        Bits `PART_BORDER` and `EMPTY_BORDER`.
     """
 
-    grid: _CellGrid
-    depth: np.ndarray
-    tolerance: np.ndarray
-    line_width: np.ndarray
-    border: np.ndarray
+    def __init__(self, gbuffer: GBuffer, look: Look, cache: Cache | None) -> None:
+        self._gbuffer, self._look = gbuffer, look
+        self._count = count = len(gbuffer.pixel)
+        self._defined = gbuffer.representation != 0
+        # The pixels are cells of a frame with an empty margin that is wider than the lines.
+        width, height = gbuffer.camera.width, gbuffer.camera.height
+        margin = int(np.ceil(look.outline)) + 1
+        self._stride = width + 2 * margin
+        self._entry_of_cell = np.full((height + 2 * margin) * self._stride, -1, dtype=np.int32)
+        self._cell = np.empty(count, dtype=np.int32)
+        # Larger depths are nearer to the eye.
+        self._depth, self._tolerance = np.empty((2, count), dtype=np.float32)
+        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.2):
+            row, column = np.divmod(gbuffer.pixel[block], np.int32(width))
+            cell = (row + margin) * np.int32(self._stride) + column + np.int32(margin)
+            self._cell[block] = cell
+            self._entry_of_cell[cell] = np.arange(block.start, block.stop, dtype=np.int32)
+            self._depth[block], self._tolerance[block] = affine_depth(gbuffer.part(block))
+        with progress(0.2, 0.6, STEP_LABEL):
+            #: The `neighbor_masks` without creases.
+            self._mask = neighbor_masks(gbuffer, look.crease_angle, True)
+        self.line_width = np.zeros(count, dtype=np.float32)
+        #: (P,) bits `PART_BORDER` and `EMPTY_BORDER`.
+        self._border = np.zeros(count, dtype=np.uint8)
+        instance_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)) if gbuffer.instances else ()
+        for instance_id in instance_ids:
+            with progress(0.6, 0.7, STEP_LABEL):
+                self._find_creases_and_parts(int(instance_id), cache, margin * (self._stride + 1))
+        with progress(0.7, 0.9, STEP_LABEL):
+            self._find_occlusions()
+        with progress(0.9, 1.0, STEP_LABEL):
+            self._find_steps()
 
-
-def _creases_and_parts(
-    gbuffer: GBuffer,
-    instance_id: int,
-    look: Look,
-    cache: Cache | None,
-    grid: _CellGrid,
-    mask: np.ndarray,
-    line_width: np.ndarray,
-    border: np.ndarray,
-) -> None:
-    """Set the width of lines along the creases of an instance, and along borders of its parts.
-
-    There is a line where two parts of a mesh intersect if their normals differ by the crease angle.
-    `mask` is that of `neighbor_masks`, without creases.
-    `border` becomes `PART_BORDER` wherever another part begins.
-    """
-    instance = gbuffer.instances[instance_id]
-    crease_angle = None if look.cross_creases else look.crease_angle
-    with progress(0.0, 0.5):
-        mesh = cached_outline_mesh(instance.surface, instance.matrix, crease_angle, cache)
-    defined = gbuffer.representation != 0
-    if len(mesh.crease_ends):
-        points = mesh.crease_points(instance.surface, instance.matrix)
-        points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
-        with progress(0.5, 0.8):
-            marks = crease_pixels(
-                gbuffer, instance_id, points, grid.entry, grid.origin, grid.stride
+    def coverage(self) -> np.ndarray:
+        """Return the (P,) float32 coverage of each pixel by the lines of edges."""
+        gbuffer, look, depth = self._gbuffer, self._look, self._depth
+        edge = np.flatnonzero(self.line_width)
+        with progress(0.0, 0.5, STEP_LABEL):
+            strength = _mark_strength(
+                gbuffer.pixel[edge], self._border[edge], gbuffer.camera.width, look.supersampling
             )
-        line_width[marks & defined] = look.outline / 2
-    if mesh.triangle_part is None:
-        return
-    min_cosine = -2.0 if crease_angle is None else np.float32(np.cos(crease_angle))
-    for block in pixel_blocks(len(grid.cell)):
-        report(0.8 + 0.2 * block.start / len(grid.cell), STEP_LABEL)
-        entry = np.flatnonzero(gbuffer.instance_id[block] == instance_id) + block.start
-        part = mesh.triangle_part.take(gbuffer.triangle[entry])
-        for dx, dy, bit in NEIGHBORS_4:
-            neighbor = grid.entry.take(grid.cell[entry] + (dy * grid.stride + dx))
-            pair = np.flatnonzero(neighbor >= 0)
-            pair = pair[gbuffer.instance_id[neighbor[pair]] == instance_id]
-            other = mesh.triangle_part.take(gbuffer.triangle[neighbor[pair]])
-            pair = pair[other != part[pair]]
-            a, b = entry[pair], neighbor[pair]
-            border[a] |= PART_BORDER
-            meet = (mask[a] >> np.uint16(bit) & 1 == 1) & defined[a] & defined[b]
-            meet &= dot(gbuffer.normal[a], gbuffer.normal[b]) < min_cosine
-            line_width[a[meet]] = look.outline / 2
+        edge, strength = edge[strength > 0], strength[strength > 0]
+        line_width = np.minimum(self.line_width[edge], np.float32(look.outline) * strength)
+        depth_slack = np.float32(DEPTH_JUMP) * self._tolerance[edge]
+        coverage = np.zeros(self._count, dtype=np.float32)
+        for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
+            report(0.5, STEP_LABEL)
+            neighbor = self._neighbor(edge, dx, dy)
+            paintable = neighbor >= 0
+            paintable &= gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
+            slack = depth_slack * np.float32(max(distance, 1.0))
+            paintable &= depth.take(neighbor) >= depth[edge] - slack
+            pixel_coverage = np.clip(line_width[paintable] - np.float32(distance), 0, 1)
+            neighbor = neighbor[paintable]
+            coverage[neighbor] = np.maximum(coverage[neighbor], pixel_coverage)
+        return coverage
 
+    def _neighbor(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
+        """Return the entries of the pixels beside those of some entries; -1 where there is none."""
+        return self._entry_of_cell.take(self._cell[entry] + (dy * self._stride + dx))
 
-def _occlusions(
-    gbuffer: GBuffer,
-    look: Look,
-    grid: _CellGrid,
-    mask: np.ndarray,
-    depth: np.ndarray,
-    tolerance: np.ndarray,
-    line_width: np.ndarray,
-    border: np.ndarray,
-) -> None:
-    """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
+    def _is_linked(self, entry: np.ndarray | slice, bit: int) -> np.ndarray:
+        """Return whether the surface continues from pixels to a neighbor."""
+        return self._mask[entry] >> np.uint16(bit) & 1 == 1
 
-    `mask` is that of `neighbor_masks`, without creases.
-    There is no edge at the border of the frame, and none where the surface continues but the field
-    ends. `border` is set where another instance or no surface follows.
-    """
-    defined = gbuffer.representation != 0
-    for block in pixel_blocks(len(grid.cell)):
-        report(block.start / len(grid.cell), STEP_LABEL)
-        row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
-        for dx, dy, bit in NEIGHBORS_4:
-            inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
-            inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
-            is_edge = inside & defined[block] & (mask[block] >> np.uint16(bit) & 1 == 0)
-            edge = np.flatnonzero(is_edge) + block.start
-            neighbor = grid.entry.take(grid.cell[edge] + (dy * grid.stride + dx))
-            jump_limit = np.float32(DEPTH_JUMP) * tolerance[edge]
-            jump = (depth.take(neighbor) - depth[edge]) / jump_limit
-            is_empty = neighbor < 0
-            same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
-            width = np.where(
-                np.abs(jump) <= 1, np.float32(look.outline / 2), np.float32(look.outline)
-            )
-            width[jump > 1] = 0
-            width[same_instance & ~defined.take(neighbor)] = 0
-            width[is_empty] = look.outline
-            line_width[edge] = np.maximum(line_width[edge], width)
-            border[edge[is_empty]] |= EMPTY_BORDER
-            border[edge[~is_empty & ~same_instance]] |= PART_BORDER
+    def _find_creases_and_parts(self, instance_id: int, cache: Cache | None, origin: int) -> None:
+        """Set the width of lines along the creases of an instance, and along borders of its parts.
 
+        There is a line where two parts of a mesh intersect if their normals differ by the crease angle.
+        The border becomes `PART_BORDER` wherever another part begins. `origin` is the cell of the lower
+        left pixel of the frame.
+        """
+        gbuffer, look, defined = self._gbuffer, self._look, self._defined
+        instance = gbuffer.instances[instance_id]
+        crease_angle = None if look.cross_creases else look.crease_angle
+        with progress(0.0, 0.5):
+            mesh = cached_outline_mesh(instance.surface, instance.matrix, crease_angle, cache)
+        if len(mesh.crease_ends):
+            points = mesh.crease_points(instance.surface, instance.matrix)
+            points += np.asarray(instance.matrix, dtype=np.float64)[:3, 3]
+            with progress(0.5, 0.8):
+                marks = crease_pixels(
+                    gbuffer, instance_id, points, self._entry_of_cell, origin, self._stride
+                )
+            self.line_width[marks & defined] = look.outline / 2
+        if mesh.triangle_part is None:
+            return
+        min_cosine = -2.0 if crease_angle is None else np.float32(np.cos(crease_angle))
+        for block in reported_blocks(self._count, STEP_LABEL, 0.8, 1.0):
+            entry = np.flatnonzero(gbuffer.instance_id[block] == instance_id) + block.start
+            part = mesh.triangle_part.take(gbuffer.triangle[entry])
+            for dx, dy, bit in NEIGHBORS_4:
+                neighbor = self._neighbor(entry, dx, dy)
+                pair = np.flatnonzero(neighbor >= 0)
+                pair = pair[gbuffer.instance_id[neighbor[pair]] == instance_id]
+                other = mesh.triangle_part.take(gbuffer.triangle[neighbor[pair]])
+                pair = pair[other != part[pair]]
+                a, b = entry[pair], neighbor[pair]
+                self._border[a] |= PART_BORDER
+                meet = self._is_linked(a, bit) & defined[a] & defined[b]
+                meet &= dot(gbuffer.normal[a], gbuffer.normal[b]) < min_cosine
+                self.line_width[a[meet]] = look.outline / 2
 
-def _steps(
-    gbuffer: GBuffer,
-    look: Look,
-    grid: _CellGrid,
-    mask: np.ndarray,
-    depth: np.ndarray,
-    tolerance: np.ndarray,
-    line_width: np.ndarray,
-) -> None:
-    """Set the width of lines at the nearer pixel of steps in the depth of a surface.
+    def _find_occlusions(self) -> None:
+        """Set the width of lines at pixels where their surface ends, unless the neighbor occludes them.
 
-    A surface that is seen edge-on predicts any difference in depth, so `mask`, that of
-    `neighbor_masks`, does not tell it from a silhouette. At a step, the depth changes much more
-    than from either pixel on to the next.
-    """
-    defined = gbuffer.representation != 0
-    for block in pixel_blocks(len(grid.cell)):
-        report(block.start / len(grid.cell), STEP_LABEL)
-        for offset, bit in ((1, 5), (grid.stride, 7)):
-            first = np.flatnonzero(mask[block] >> np.uint16(bit) & 1) + block.start
-            second = grid.entry.take(grid.cell[first] + offset)
-            jump = np.abs(depth[second] - depth[first])
-            steep = jump > np.float32(MIN_STEP) * np.minimum(tolerance[first], tolerance[second])
-            first, second, jump = first[steep], second[steep], jump[steep]
-            is_step = np.ones(len(first), dtype=bool)
-            for near, beyond in ((first, -offset), (second, offset)):
-                neighbor = grid.entry.take(grid.cell[near] + beyond)
-                change = np.abs(depth.take(neighbor) - depth[near])
-                change[neighbor < 0] = 0
-                is_step &= jump > np.float32(STEP_RATIO) * change
-            first, second = first[is_step], second[is_step]
-            nearer = np.where(depth[first] > depth[second], first, second)
-            line_width[nearer[defined[first] & defined[second]]] = look.outline
+        There is no edge at the border of the frame, and none where the surface continues but the field
+        ends. The border is set where another instance or no surface follows.
+        """
+        gbuffer, depth, outline = self._gbuffer, self._depth, np.float32(self._look.outline)
+        for block in reported_blocks(self._count, STEP_LABEL):
+            row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
+            for dx, dy, bit in NEIGHBORS_4:
+                inside = (column + dx >= 0) & (column + dx < gbuffer.camera.width)
+                inside &= (row + dy >= 0) & (row + dy < gbuffer.camera.height)
+                is_edge = inside & self._defined[block] & ~self._is_linked(block, bit)
+                edge = np.flatnonzero(is_edge) + block.start
+                neighbor = self._neighbor(edge, dx, dy)
+                jump_limit = np.float32(DEPTH_JUMP) * self._tolerance[edge]
+                jump = (depth.take(neighbor) - depth[edge]) / jump_limit
+                is_empty = neighbor < 0
+                same_instance = gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
+                width = np.where(np.abs(jump) <= 1, outline / 2, outline)
+                width[jump > 1] = 0
+                width[same_instance & ~self._defined.take(neighbor)] = 0
+                width[is_empty] = outline
+                self.line_width[edge] = np.maximum(self.line_width[edge], width)
+                self._border[edge[is_empty]] |= EMPTY_BORDER
+                self._border[edge[~is_empty & ~same_instance]] |= PART_BORDER
+
+    def _find_steps(self) -> None:
+        """Set the width of lines at the nearer pixel of steps in the depth of a surface.
+
+        A surface that is seen edge-on predicts any difference in depth, so the neighbor masks do not
+        tell it from a silhouette. At a step, the depth changes much more than from either pixel on to
+        the next.
+        """
+        depth, tolerance, defined = self._depth, self._tolerance, self._defined
+        for block in reported_blocks(self._count, STEP_LABEL):
+            for dx, dy, bit in ((1, 0, 5), (0, 1, 7)):
+                first = np.flatnonzero(self._is_linked(block, bit)) + block.start
+                second = self._neighbor(first, dx, dy)
+                jump = np.abs(depth[second] - depth[first])
+                steep = jump > np.float32(MIN_STEP) * np.minimum(
+                    tolerance[first], tolerance[second]
+                )
+                first, second, jump = first[steep], second[steep], jump[steep]
+                is_step = np.ones(len(first), dtype=bool)
+                for near, side in ((first, -1), (second, 1)):
+                    neighbor = self._neighbor(near, side * dx, side * dy)
+                    change = np.abs(depth.take(neighbor) - depth[near])
+                    change[neighbor < 0] = 0
+                    is_step &= jump > np.float32(STEP_RATIO) * change
+                first, second = first[is_step], second[is_step]
+                nearer = np.where(depth[first] > depth[second], first, second)
+                self.line_width[nearer[defined[first] & defined[second]]] = self._look.outline
 
 
 def _mark_strength(

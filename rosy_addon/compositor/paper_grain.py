@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from ..progress import progress, report
-from ..projection.pixel_blocks import pixel_blocks
-from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits_2d
+from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
 from .look import Look
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
+from .reported_blocks import reported_blocks
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
 #: grains, and its minimum in pixels.
@@ -76,8 +76,7 @@ def picture_paper_grain(
     rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
     tiles = cached_tiles(_grain_tiles, rectangle, grain, seed)
     heights = np.empty((line_count, len(pixel)), dtype=np.float32)
-    for block in pixel_blocks(len(pixel)):
-        report(block.start / len(pixel), STEP_LABEL)
+    for block in reported_blocks(len(pixel), STEP_LABEL):
         row, column = np.divmod(pixel[block], np.int32(width))
         index = rectangle.index(row // subpixels, column // subpixels)
         for line in range(line_count):
@@ -128,7 +127,7 @@ def _grain_tiles(rectangle: TileRectangle, grain: float, seed: int) -> np.ndarra
     for start in range(0, len(row), BLOCK_ROWS):
         report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
-        bits = hash_bits_2d(column, row[block], seed ^ SEED_SALT, 0, 0.5)
+        bits = hash_bits((column, row[block]), seed ^ SEED_SALT, 0, 0.5)
         white[block] = bits.astype(np.float32) - np.float32(0.5)
     heights = _band_noise(white, sigmas)[margin:-margin, margin:-margin]
     return np.ascontiguousarray(heights / np.float32(_band_noise_std(*sigmas))).reshape(-1)

@@ -1,17 +1,184 @@
-"""LIC with one streamline per pixel, traced for a block of pixels at once."""
+"""LIC with one streamline per pixel, traced for a block of pixels at once.
+
+Brute-force LIC is the reference that the paper compares its method with: at each step, a streamline
+follows the best match among the N members.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
-from ..progress import report
+from ..progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
-from .pixel_field import NEIGHBOR_OFFSETS, normalized
+from .contrast import normalize_variance
+from .filter_kernel import WEIGHT_SLOPES, kernel_of, kernel_weights
+from .lic_images import LicImages, lic_images, magnitude_step_limits
+from .look import Look
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField, all_members, neighbor_table, normalized
+from .reported_blocks import reported_blocks
 
 #: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+#: Takes a block of pixels, and returns a sampler for one half of the streamlines of one member.
+LineTracer = Callable[[slice], DirectionSampler]
+
+
+def brute_force(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
+    """Compute one LIC image for each of the M lines.
+
+    There are no breaking points and no second set of images, but every step of every streamline
+    compares all N members.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the frame.
+    noise : (P, K) float32 ndarray
+
+    Returns
+    -------
+    LicImages
+    """
+    count, degree = len(field.pixel), field.degree
+    with progress(0.0):
+        neighbors = neighbor_table(field)
+        members, directions = members_on_screen(field, look, look.guiding_angle, degree)
+        tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
+        for index, (member, direction) in enumerate(zip(members, directions, strict=True)):
+            tables[:, index] = direction_table(direction, member, degree, neighbors)
+    candidates = np.zeros((count + 1, degree), dtype=np.complex64)
+    candidates[:-1] = members.T
+    tracers = [
+        partial(_best_match_sampler, candidates, tables, line) for line in range(field.line_count)
+    ]
+    return convolve_members(field, look, noise, neighbors, tracers)
+
+
+def _best_match_sampler(
+    candidates: np.ndarray, direction_tables: np.ndarray, line: int, block: slice
+) -> DirectionSampler:
+    """Make a sampler that starts along one member and then follows the best match.
+
+    It stores the current member of each streamline between calls.
+
+    Parameters
+    ----------
+    candidates : (P + 1, N) complex64 ndarray
+        Members in the view plane, where they are matched. Row P is 0.
+    direction_tables : (P + 1, N, 4) float32 ndarray
+        The table of `direction_table` of each member, on screen.
+    line : int
+    block : slice
+        Where the streamlines start.
+    """
+    degree = candidates.shape[1]
+    flat_members, flat_tables = candidates.reshape(-1), direction_tables.reshape(-1, 4)
+    heading = candidates[block, line]
+
+    def direction_at(entry: np.ndarray, offset: np.ndarray) -> np.ndarray:
+        nonlocal heading
+        rows = candidates.take(entry, axis=0)
+        # The maximum is taken member by member. numpy is slow at reducing many short rows.
+        x, y = heading.real.copy(), heading.imag.copy()
+        best_match = np.full(len(entry), -np.inf, dtype=np.float32)
+        best_index = np.zeros(len(entry), dtype=np.int32)
+        for index in range(degree):
+            match = rows[:, index].real * x
+            match += rows[:, index].imag * y
+            closer = match > best_match
+            np.maximum(match, best_match, out=best_match)
+            np.copyto(best_index, np.int32(index), where=closer)
+        best_entry = entry * degree + best_index
+        heading = flat_members.take(best_entry)
+        return interpolate_direction(flat_tables.take(best_entry, axis=0), offset)
+
+    return direction_at
+
+
+def members_on_screen(
+    field: PixelField, look: Look, angle: float, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first members of a field, and their directions on screen.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        Its `foreshorten` is used.
+    angle : float
+        The first member is nearest to it, in radians.
+    count : int
+        Number of members.
+
+    Returns
+    -------
+    members, directions : (count, P) complex64 ndarray
+    """
+    members, directions = np.empty((2, count, len(field.pixel)), dtype=np.complex64)
+    for block in reported_blocks(len(field.pixel), "finding directions"):
+        part = field.part(block)
+        members[:, block] = all_members(part, angle)[:count]
+        for member, direction in zip(members, directions, strict=True):
+            in_plane = part.member_direction(member[block])
+            direction[block] = part.to_screen(in_plane, look.foreshorten)
+    return members, directions
+
+
+def convolve_members(
+    field: PixelField,
+    look: Look,
+    noise: np.ndarray,
+    neighbors: np.ndarray,
+    tracers: Sequence[LineTracer],
+) -> LicImages:
+    """Trace a streamline of each member through every pixel, and average the noise along it.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : Look
+        In pixels of the frame. Its `length`, `step`, kernel and `magnitude` are used.
+    noise : (P, K) float32 ndarray
+    neighbors : (9, P + 1) int32 ndarray
+        From `pixel_field.neighbor_table`.
+    tracers : sequence of M functions
+        One per member image.
+
+    Returns
+    -------
+    LicImages
+    """
+    count, channels = noise.shape
+    with progress(0.0):
+        step_limit = magnitude_step_limits(field, look)
+    padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
+    members = np.empty((len(tracers), count, channels), dtype=np.float32)
+    effective_samples = np.zeros(count, dtype=np.float32)
+    kernel = kernel_of(look)
+    for member, tracer in enumerate(tracers):
+        for block in pixel_blocks(count):
+            block_limit = None if step_limit is None else step_limit[block]
+            (forward_sum, forward), (backward_sum, backward) = (
+                integrate_noise(
+                    block, neighbors, tracer(block), padded_noise, look, side, block_limit
+                )
+                for side in (1, -1)
+            )
+            full_length = look.length if block_limit is None else block_limit
+            weights = kernel_weights(forward, backward, full_length, kernel)
+            mean = (noise[block] + forward_sum + backward_sum) / weights.total[:, None]
+            members[member, block] = normalize_variance(mean, weights.effective_samples, look)
+            effective_samples[block] += weights.effective_samples
+            fraction = (member + block.stop / count) / len(tracers)
+            report(fraction, "tracing streamlines")
+    effective_samples /= len(tracers)
+    with progress(1.0):
+        return lic_images(members, effective_samples)
 
 
 def direction_table(
@@ -43,13 +210,11 @@ def direction_table(
     table = np.zeros((count + 1, 4), dtype=np.float32)
     table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
     unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
-    for block in pixel_blocks(count):
-        report(0.3 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.0, 0.3):
         unit_direction[block] = normalized(direction[block])
         unit_member[block] = normalized(member[block])
     min_cosine = np.cos(np.pi / max(degree, 2))
-    for block in pixel_blocks(count):
-        report(0.3 + 0.7 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.3, 1.0):
         conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()
         gradient_sines = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
@@ -92,10 +257,9 @@ def integrate_noise(
     neighbors: np.ndarray,
     direction_at: DirectionSampler,
     noise: np.ndarray,
-    length: int,
-    step: float,
+    look: Look,
+    side: int,
     step_limit: np.ndarray | None,
-    weight_slope: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
@@ -116,15 +280,12 @@ def integrate_noise(
         between calls.
     noise : (P + 1, K) float32 ndarray
         0 in row P.
-    length : int
-        Maximum number of steps.
-    step : float
-        Length of a step in pixels, at most 1.
+    look : Look
+        In pixels of the frame. Its `length`, `step` and kernel are used.
+    side : {1, -1}
+        The half of the streamline: forward or backward.
     step_limit : (B,) ndarray or None
-        Number of steps after which each streamline ends. None for `length`.
-    weight_slope : float
-        How much the weight of the samples falls over the whole length; negative if it rises. See
-        `filter_kernel`.
+        Number of steps after which each streamline ends. None for the length of the look.
 
     Returns
     -------
@@ -133,7 +294,8 @@ def integrate_noise(
     samples : (B,) float32 ndarray
         Number of these samples.
     """
-    end = neighbors.shape[1] - 1
+    end, step = neighbors.shape[1] - 1, side * look.step
+    weight_slope = WEIGHT_SLOPES[kernel_of(look)][0 if side > 0 else 1]
     neighbors = neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
     offset = np.zeros((len(entry), 2), dtype=np.float32)
@@ -141,9 +303,9 @@ def integrate_noise(
     samples = np.zeros(len(entry), dtype=np.float32)
     previous_direction = None
     weight_step = weight_slope / (
-        1 + np.asarray(length if step_limit is None else step_limit, dtype=np.float32)
+        1 + np.asarray(look.length if step_limit is None else step_limit, dtype=np.float32)
     )
-    for step_index in range(1, length + 1):
+    for step_index in range(1, look.length + 1):
         direction = direction_at(entry, offset)
         if previous_direction is None:
             offset += np.float32(step) * direction

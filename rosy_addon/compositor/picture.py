@@ -1,4 +1,4 @@
-"""The finished picture, and the layers that it was composed of."""
+"""The finished picture."""
 
 from __future__ import annotations
 
@@ -8,28 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation.singularity_marks import SingularityMarks
-from .lic_images import LicImages
-
-
-@dataclass(frozen=True, eq=False)
-class DegreeLayer:
-    """Images of the fields of one degree, at the resolution of the supersampled frame.
-
-    Attributes
-    ----------
-    degree : int
-    pixel : (P,) int32 ndarray
-        Flat indices into the supersampled frame.
-    images : LicImages
-        LIC images before contrast correction, with values around 0.5.
-    tone : (P, K) float32 ndarray
-        The blend after contrast correction and gain. Display values, not clipped.
-    """
-
-    degree: int
-    pixel: np.ndarray
-    images: LicImages
-    tone: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +19,6 @@ class Picture:
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied. Alpha is the fraction of the pixel in which a field is visible
         or, with clear paper, the coverage by ink.
-    layers : tuple of DegreeLayer
-        One per visible degree, in ascending order. Empty if the picture is from a graphics card, or was
-        drawn in strips.
     spread : (H, W) float32 ndarray or None
         If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
         is the fraction of the pixel in which a field is visible.
@@ -57,7 +32,6 @@ class Picture:
     """
 
     rgba: np.ndarray
-    layers: tuple[DegreeLayer, ...]
     spread: np.ndarray | None = None
     color_range: tuple[float, float] | None = None
     marks: SingularityMarks | None = None

@@ -9,15 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..deterministic_trig import unit_phasor
 from ..field.directional_field import evaluate_harmonics
-from ..field.rosy_field import check_degree
 from ..field.symmetry import FieldSymmetry
 from ..progress import progress, report
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
+from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) of the 3 x 3 neighbors, in the order of the bits of `neighbor_masks`.
 NEIGHBOR_OFFSETS = tuple((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1))
@@ -71,9 +70,9 @@ class PixelField:
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
         z = rho exp(i N t), where t is the angle of a member in the view plane. 0 is undefined.
-    screen_jacobian : (P, 2) complex64 ndarray or None
+    screen_jacobian : (P, 2) complex64 ndarray
         The axes of the frame of the view plane, projected to the screen along the surface. Pixels,
-        x + i y. None in the plane, where they are 1 and i.
+        x + i y.
     neighbor_mask : (P,) uint16 ndarray
         Neighbors that streamlines may step to. Bit i stands for `NEIGHBOR_OFFSETS[i]`. No bit is
         set where the field is undefined.
@@ -95,7 +94,7 @@ class PixelField:
     height: int
     pixel: np.ndarray
     representation: np.ndarray
-    screen_jacobian: np.ndarray | None
+    screen_jacobian: np.ndarray
     neighbor_mask: np.ndarray
     channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
     gbuffer_index: slice | np.ndarray = dataclass_field(default_factory=lambda: slice(None))
@@ -126,22 +125,23 @@ class PixelField:
         """Number of families of lines. 1 if the field does not distinguish its lines."""
         return next((number for kind, number in self.channels if kind == "family"), 1)
 
-    def part(self, extent: slice) -> PixelField:
+    def part(self, extent: slice | np.ndarray) -> PixelField:
         """Return the field at some of the pixels, without its `seam_steps`.
 
         Its `neighbor_mask` is that of all pixels.
         """
         index = self.gbuffer_index
-        if isinstance(index, slice):
-            first = index.start or 0
-            index = slice(first + extent.start, first + extent.stop)
-        else:
+        if not isinstance(index, slice):
             index = index[extent]
+        elif isinstance(extent, slice):
+            index = slice((index.start or 0) + extent.start, (index.start or 0) + extent.stop)
+        else:
+            index = (index.start or 0) + extent
         return replace(
             self,
             pixel=self.pixel[extent],
             representation=self.representation[extent],
-            screen_jacobian=None if self.screen_jacobian is None else self.screen_jacobian[extent],
+            screen_jacobian=self.screen_jacobian[extent],
             neighbor_mask=self.neighbor_mask[extent],
             channels={channel: values[extent] for channel, values in self.channels.items()},
             gbuffer_index=index,
@@ -182,8 +182,6 @@ class PixelField:
         (P,) complex64 ndarray
             Pixels.
         """
-        if self.screen_jacobian is None:
-            return member.astype(np.complex64)
         # Double precision makes the float32 result the same with all versions of numpy.
         x, y = (
             self.screen_jacobian[:, 0].astype(np.complex128),
@@ -214,8 +212,7 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     entry = np.full(field.height * field.width, count, dtype=np.int32)
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        report(block.start / count, "finding neighbors")
+    for block in reported_blocks(count, "finding neighbors"):
         pixel, mask = field.pixel[block], field.neighbor_mask[block]
         for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
             linked = np.flatnonzero(mask >> bit & 1)
@@ -249,8 +246,7 @@ def surface_pixel_field(
     jacobians = np.empty((2, count), dtype=np.complex64).T
     instance_selected = np.asarray(gbuffer.instance_degrees) == degree
     selected = np.empty(count, dtype=bool)
-    for block in pixel_blocks(count):
-        report(0.5 + 0.4 * block.start / count, "finding directions")
+    for block in reported_blocks(count, "finding directions", 0.5, 0.9):
         jacobians[block] = screen_jacobians(gbuffer.part(block))
         selected[block] = instance_selected[gbuffer.instance_id[block]]
     selected = slice(None) if selected.all() else np.flatnonzero(selected)
@@ -258,7 +254,7 @@ def surface_pixel_field(
     pixel, camera, mask = gbuffer.pixel[selected], gbuffer.camera, mask[selected]
     if not z.all():
         with progress(0.9, 1.0):
-            mask = _mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
+            mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
     report(1.0, "finding directions")
     return PixelField(
         degree=degree,
@@ -291,46 +287,13 @@ def _channels_of_degree(channels: dict[FieldChannel, np.ndarray]) -> dict[FieldC
     return {channel: values for channel, values in channels.items() if channel in present}
 
 
-def planar_pixel_field(
-    angles: np.ndarray, degree: int, magnitude: np.ndarray | float | None = None
-) -> PixelField:
-    """Make the pixel field of a field in the plane, given the angle of a member at each pixel.
-
-    Parameters
-    ----------
-    angles : (H, W) ndarray
-        Radians, counter-clockwise from the direction of the rows. Rows from the bottom. The field
-        is undefined where the angle is not finite or the magnitude is not above 0.
-    degree : int
-    magnitude : (H, W) ndarray or float, optional
-        rho, by default 1.
-
-    Returns
-    -------
-    PixelField
-        All pixels of the image.
-    """
-    degree = check_degree(degree)
-    angles = np.asarray(angles, dtype=np.float64)
-    height, width = angles.shape
-    rho = np.broadcast_to(np.float32(1) if magnitude is None else magnitude, angles.shape)
-    defined = np.isfinite(angles) & (rho > 0)
-    z = unit_phasor(np.where(defined, degree * angles, 0.0).ravel())
-    z *= np.where(defined, rho, 0).astype(np.float32).ravel()
-    pixel = np.arange(height * width, dtype=np.int32)
-    all_neighbors = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
-    return PixelField(
-        degree=degree,
-        width=width,
-        height=height,
-        pixel=pixel,
-        representation=z,
-        screen_jacobian=None,
-        neighbor_mask=_mask_undefined(all_neighbors, pixel, width, height, z != 0),
-    )
+def entries_of_rows(pixel: np.ndarray, width: int, rows: tuple[int, int]) -> slice:
+    """Return the range of ascending flat pixels, (P,), that are in some rows of a frame."""
+    first_pixels = np.array([max(rows[0], 0) * width, rows[1] * width])
+    return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
 
 
-def _mask_undefined(
+def mask_undefined(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
 ) -> np.ndarray:
     """Clear the bits of neighbor masks that lead from or to undefined pixels.
@@ -355,8 +318,7 @@ def _mask_undefined(
         row_bits = padded[:, :-2] | padded[:, 1:-1] << 1 | padded[:, 2:] << 2
         open_bits = row_bits[:-2] | row_bits[1:-1] << 3 | row_bits[2:] << 6
         open_bits *= padded[1:-1, 1:-1]
-        first_pixels = np.array([start, start + band_rows], dtype=np.int64) * width
-        band = slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
+        band = entries_of_rows(pixel, width, (start, start + band_rows))
         result[band] = mask[band] & open_bits[row[band] - start, column[band]]
     return result
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -83,30 +83,23 @@ class ComposeStages:
         have no strips.
         """
 
-        def compute() -> list[LicImages]:
-            if looks[0].method == "ibfv" and has_flow(looks[0]):
-                return wave_images(self._streak_waves(field, looks), looks)
+        def convolved(convolve: Callable[..., Any]) -> Any:
             with progress(0.0, NOISE_SHARE):
                 noise = self.noise(field, looks[0])
             with progress(NOISE_SHARE, 1.0):
-                return lic_lengths(field, looks, noise, strip)
+                return convolve(field, looks, noise)
+
+        def compute() -> list[LicImages]:
+            if looks[0].method != "ibfv" or not has_flow(looks[0]):
+                return convolved(partial(lic_lengths, strip=strip))
+            # The waves of the streaks of a flow serve all frames; see `ibfv`.
+            still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
+            key = "streak waves", self._gbuffer, field.degree, *still
+            waves = self._cache.get_or_create(key, partial(convolved, streak_waves))
+            return wave_images(waves, looks)
 
         key = "LIC images", self._gbuffer, field.degree, strip, *map(lic_key, looks)
         return self._cache.get_or_create(key, compute)
-
-    def _streak_waves(self, field: PixelField, looks: Sequence[Look]) -> Any:
-        """The waves of the streaks of a flow, which serve all frames; see `ibfv`."""
-
-        def compute() -> Any:
-            with progress(0.0, NOISE_SHARE):
-                noise = self.noise(field, looks[0])
-            with progress(NOISE_SHARE, 1.0):
-                return streak_waves(field, looks, noise)
-
-        still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
-        return self._cache.get_or_create(
-            ("streak waves", self._gbuffer, field.degree, *still), compute
-        )
 
     def undirected_texture(self, field: PixelField, look: Look) -> np.ndarray | None:
         """Compute the texture where the field is undefined; see `undirected_texture`."""

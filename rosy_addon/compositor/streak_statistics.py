@@ -7,7 +7,6 @@ straight lines.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,67 +50,11 @@ STEP_LABEL = "measuring streaks"
 STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 
-class NoiseSettings(NamedTuple):
-    """Settings of noise on surfaces; see `surface_noise`."""
-
-    grain: float
-    density: float
-    high_pass: float
-
-    def scaled(self, factor: float) -> NoiseSettings:
-        """Return the settings with all lengths multiplied by a factor."""
-        return NoiseSettings(factor * self.grain, self.density, factor * self.high_pass)
-
-
-@dataclass(frozen=True)
-class StreakSettings:
-    """The settings that the statistics of streaks depend on. Lengths are in pixels of the frame.
-
-    Attributes
-    ----------
-    length : float
-        Length of the streamlines.
-    grain, density, high_pass : float
-        Settings of the noise; see `image_noise`.
-    crispness, breaks, wobble : float
-        Settings of the look, 0 to 1.
-    kernel : {"box", "taper", "ramp"}
-        The weights of the samples; see `filter_kernel`.
-    anchored : bool
-        Whether the noise is anchored to surfaces.
-    break_length : float
-        Length of the pieces of broken lines.
-    paper_grain_amplitude : float
-        Standard deviation of the paper grain that is added to the streaks, in standard deviations
-        of the streaks.
-    surface_paper_grain : NoiseSettings or None
-        Noise of a paper grain that is anchored to surfaces.
-    """
-
-    length: float
-    grain: float
-    density: float
-    high_pass: float
-    crispness: float
-    kernel: Kernel = "box"
-    anchored: bool = False
-    break_length: float = 1.0
-    breaks: float = 0.0
-    wobble: float = 0.0
-    paper_grain_amplitude: float = 0.0
-    surface_paper_grain: NoiseSettings | None = None
-
-    def scaled(self, factor: float) -> StreakSettings:
-        """Return the settings with all lengths multiplied by a factor."""
-        paper = self.surface_paper_grain
-        return replace(
-            self,
-            length=factor * self.length,
-            grain=factor * self.grain,
-            high_pass=factor * self.high_pass,
-            break_length=factor * self.break_length,
-            surface_paper_grain=paper and paper.scaled(factor),
-        )
+#: The settings of a look that the statistics depend on.
+STATISTICS_SETTINGS = (
+    *("length", "step", "grain", "density", "high_pass", "taper", "oriented", "anchor"),
+    *("crispness", "breaks", "wobble", "paper_grain", "supersampling"),
+)
 
 
 class StreakStatistics(NamedTuple):
@@ -145,72 +88,64 @@ class StreakStatistics(NamedTuple):
 
 
 def look_streak_statistics(look: Look) -> StreakStatistics:
-    """Return the statistics of streaks, from the cache if they are there."""
-    surface_paper_grain = None
-    if look.anchor != "picture":
-        args = surface_paper_grain_args(look)
-        surface_paper_grain = NoiseSettings(args["grain"], args["density"], args["high_pass"])
-    settings = StreakSettings(
-        length=(2 * look.length + 1) * look.step,
-        grain=look.grain,
-        density=look.density,
-        high_pass=look.high_pass,
-        crispness=look.crispness,
-        kernel=kernel_of(look),
-        anchored=look.anchor == "surface",
-        break_length=(2 * break_steps(look) + 1) * look.step,
-        breaks=look.breaks,
-        wobble=look.wobble,
-        paper_grain_amplitude=PAPER_GRAIN_STRENGTH * look.paper_grain,
-        surface_paper_grain=surface_paper_grain,
-    )
-    statistics = STATISTICS_CACHE.get(settings)
+    """Return the statistics of streaks, from the cache if they are there.
+
+    Parameters
+    ----------
+    look : Look
+        In pixels of the frame.
+    """
+    key = tuple(getattr(look, name) for name in STATISTICS_SETTINGS)
+    statistics = STATISTICS_CACHE.get(key)
     if statistics is None:
-        statistics = STATISTICS_CACHE.put(settings, streak_statistics(settings))
+        statistics = STATISTICS_CACHE.put(key, _measured(look))
         STATISTICS_CACHE.evict_over_limit()
     return statistics
 
 
-def streak_statistics(settings: StreakSettings) -> StreakStatistics:
+def _measured(look: Look) -> StreakStatistics:
     """Measure the statistics of streaks in a sample of noise."""
     report(0.0, STEP_LABEL)
-    settings = settings.scaled(min(MAX_SAMPLE_GRAIN / settings.grain, 1.0))
-    side = max(int(SAMPLE_GRAINS * settings.grain), MIN_SAMPLE_PIXELS)
-    length_pixels = max(round(settings.length), 1)
+    scale = min(MAX_SAMPLE_GRAIN / look.grain, 1.0)
+    grain, kernel = scale * look.grain, kernel_of(look)
+    side = max(int(SAMPLE_GRAINS * grain), MIN_SAMPLE_PIXELS)
+    length_pixels, break_pixels = (
+        max(round(scale * ((2 * steps + 1) * look.step)), 1)
+        for steps in (look.length, break_steps(look))
+    )
     width = side + length_pixels
-    noise = _noise_sample(
-        (side, width), settings.grain, settings.density, settings.high_pass, settings.anchored
-    )
+    anchored = look.anchor == "surface"
+    noise = _noise_sample((side, width), grain, look.density, scale * look.high_pass, anchored)
     report(0.2, STEP_LABEL)
-    streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, settings.kernel))
-    break_pixels = min(max(round(settings.break_length), 1), length_pixels)
+    streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, kernel))
     report(0.3, STEP_LABEL)
-    break_streaks, break_std = _standardized(
-        _line_means(noise, break_pixels, side, settings.kernel)
-    )
+    break_means = _line_means(noise, min(break_pixels, length_pixels), side, kernel)
+    break_streaks, break_std = _standardized(break_means)
     report(0.4, STEP_LABEL)
-    spots, disc_std = _standardized(disc_means(noise[:, :side], settings.grain))
+    spots, disc_std = _standardized(disc_means(noise[:, :side], grain))
     report(0.5, STEP_LABEL)
     paper_relief, paper_grain_std = 0.0, 1.0
-    if settings.paper_grain_amplitude and settings.surface_paper_grain is not None:
-        heights = _noise_sample(streaks.shape, *settings.surface_paper_grain, anchored=True)
+    amplitude = PAPER_GRAIN_STRENGTH * look.paper_grain
+    if amplitude and anchored:
+        args = surface_paper_grain_args(look)
+        lengths = scale * args["grain"], scale * args["high_pass"]
+        heights = _noise_sample(streaks.shape, lengths[0], args["density"], lengths[1], True)
         paper_grain_std = float(heights.std())
-        paper_relief = settings.paper_grain_amplitude / paper_grain_std * (heights - heights.mean())
-    elif settings.paper_grain_amplitude:
-        heights = picture_paper_grain(
-            np.arange(streaks.size, dtype=np.int32), len(streaks[0]), settings.grain, 1
-        )
-        paper_relief = settings.paper_grain_amplitude * heights[0].reshape(streaks.shape)
+        paper_relief = amplitude / paper_grain_std * (heights - heights.mean())
+    elif amplitude:
+        pixel = np.arange(streaks.size, dtype=np.int32)
+        heights = picture_paper_grain(pixel, len(streaks[0]), grain, 1)
+        paper_relief = amplitude * heights[0].reshape(streaks.shape)
     report(0.6, STEP_LABEL)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
-    break_amounts = break_amount(coverages, settings.breaks, settings.wobble)
+    break_amounts = break_amount(coverages, look.breaks, look.wobble)
     break_levels = np.linspace(
-        break_amounts.min(), break_amounts.max(), BREAK_LEVELS if settings.breaks else 1
+        break_amounts.min(), break_amounts.max(), BREAK_LEVELS if look.breaks else 1
     )
     samples = [
         streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
     ]
-    half_width = softness(settings.crispness)
+    half_width = softness(look.crispness)
     with progress(0.7, 0.95):
         threshold_tables = _threshold_tables(samples, half_width)
     with progress(0.95, 1.0):

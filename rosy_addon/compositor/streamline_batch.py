@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
-from .drifting_averages import DriftingAverages
+from .drifting_averages import MAX_LEVELS, DriftingAverages, MovingKernel
 from .filter_kernel import kernel_of, kernel_weights
-from .flow import MAX_LEVELS, moving_kernel, streamline_reach
+from .flow import streamline_reach
 from .look import Look, has_flow
 
 #: Steps between compactions, which remove streamlines that have ended.
@@ -89,7 +89,7 @@ class StreamlineBatch:
         self._moving_kernels = []
         if has_flow(look):
             self._moving_kernels = [
-                moving_kernel(each, 1 if limit is None else min(each.length + 1, MAX_LEVELS))
+                MovingKernel(each, 1 if limit is None else min(each.length + 1, MAX_LEVELS))
                 for each, limit in zip(looks, step_limits, strict=True)
             ]
         step_scale, noise_scale, slope_scale = covering.state_scales
@@ -165,7 +165,7 @@ class StreamlineBatch:
                 if self._kernel == "box":
                     last = np.minimum(step + length, last_step)
                     first = np.maximum(step - length, -last_step)
-                    noise_sum = self._prefix_sums_through(last, lanes)
+                    noise_sum = self._rows(last, lanes)
                     noise_sum = noise_sum - self._prefix_sums_before(first, lanes)
                 else:
                     if is_along is None:
@@ -293,11 +293,19 @@ class StreamlineBatch:
             elif step <= self._half_window:
                 lateral = _lateral_offset(position, direction)
             total += record[:, 1:]
-            self._record_step(step, active, lanes, state, lateral, total)
-            if self._axial_offset is not None and step <= self._half_window:
-                self._axial_offset[step, :lanes] = 0
-                axial = _axial_steps(position, direction, step_scale)
-                self._axial_offset[step, slice(lanes) if active is None else active] = axial
+            lane = slice(lanes) if active is None else active
+            self._totals[lane] = total
+            self._sums[step, :lanes] = self._totals[:lanes]
+            if self._has_second_sums and step:
+                self._sums[step, :lanes] += self._sums[step - 1, :lanes]
+            if step <= self._half_window:
+                records = [(self._states, state), (self._lateral_offset, lateral)]
+                if self._axial_offset is not None:
+                    axial = _axial_steps(position, direction, step_scale)
+                    records.append((self._axial_offset, axial))
+                for buffer, values in records:
+                    buffer[step, :lanes] = SINK_CELL  # and 0, of lanes that have ended
+                    buffer[step, lane] = values
             if step == self._max_steps:
                 break
             # Two-step Adams-Bashforth method, 3/2 d - 1/2 d_previous.
@@ -325,7 +333,9 @@ class StreamlineBatch:
             if len(crossing):
                 steps = covering.seams.steps
                 reached = steps.displaced(seam, position[crossing]) + steps.offset.take(seam)
-                position[crossing] = _within_reach(reached)
+                axes = reached.view(np.float32)
+                np.clip(axes, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=axes)
+                position[crossing] = reached
                 direction[crossing] = steps.displaced(seam, direction[crossing])
                 target_phase[crossing] += covering.seams.sheet_shift.take(seam)
             packed_phase = covering.packed_phase.take(cell, mode="clip")
@@ -342,17 +352,15 @@ class StreamlineBatch:
                         self._extend_sums(step, lanes)
                         return step_counts, step
                     active, active_counts, cell, sheet = (
-                        active[remaining],
-                        active_counts[remaining],
-                        cell[remaining],
-                        sheet[remaining],
+                        values[remaining] for values in (active, active_counts, cell, sheet)
                     )
-                    packed_phase, target_phase, position = (
-                        packed_phase[remaining],
-                        target_phase[remaining],
+                    packed_phase, target_phase, total = (
+                        values[remaining] for values in (packed_phase, target_phase, total)
+                    )
+                    position, previous_direction = (
                         position[remaining],
+                        previous_direction[remaining],
                     )
-                    previous_direction, total = previous_direction[remaining], total[remaining]
                     loops.keep(remaining)
         if active is not None:
             step_counts[active] = active_counts
@@ -387,31 +395,6 @@ class StreamlineBatch:
         if len(crossing):
             cell[crossing] = seams.target_cell.take(seam)
         return ended, crossing, seam
-
-    def _record_step(
-        self,
-        step: int,
-        active: np.ndarray | None,
-        lanes: int,
-        state: np.ndarray,
-        lateral: np.ndarray | None,
-        total: np.ndarray,
-    ) -> None:
-        """Write row `step` of the buffers, for all lanes or the active ones."""
-        self._totals[slice(lanes) if active is None else active] = total
-        self._sums[step, :lanes] = self._totals[:lanes]
-        if self._has_second_sums and step:
-            self._sums[step, :lanes] += self._sums[step - 1, :lanes]
-        if step > self._half_window:
-            return
-        if active is None:
-            self._states[step, :lanes] = state
-            self._lateral_offset[step, :lanes] = lateral
-        else:
-            self._states[step, :lanes] = SINK_CELL
-            self._states[step, active] = state
-            self._lateral_offset[step, :lanes] = 0
-            self._lateral_offset[step, active] = lateral
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
         """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""
@@ -455,31 +438,19 @@ class StreamlineBatch:
 
     def _second_prefix_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""
-        half, seed = lanes // 2, self._sums[0, :lanes]
+        seed = self._sums[0, :lanes]
         if np.ndim(step) == 0:
             if step >= 0:
-                return self._sums[step, :lanes]
+                return self._rows(step, lanes)
             if step == -1:
                 return np.zeros_like(seed)
-            opposite_sums = self._sums[-step - 2, :lanes]
-            return (step + 1) * seed + np.concatenate(
-                [opposite_sums[half:], opposite_sums[:half]]
-            ).conj()
-        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
-        lane, same_side = np.arange(lanes), (step >= 0)[:, None]
-        row = np.where(step >= 0, step, np.maximum(-step - 2, 0)) * stride
-        gathered = flat.take(row + np.where(same_side[:, 0], lane, (lane + half) % lanes), axis=0)
+            return (step + 1) * seed + self._rows(-step - 2, lanes, True).conj()
+        same_side = step >= 0
+        rows = np.where(same_side, step, np.maximum(-step - 2, 0))
+        gathered = self._rows(rows, lanes, ~same_side)
         mirrored = (step + 1)[:, None] * seed + gathered.conj()
-        return np.where(
-            same_side, gathered, np.where((step == -1)[:, None], np.complex64(0), mirrored)
-        )
-
-    def _prefix_sums_through(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
-        """(2 n, K) complex64 prefix sums up to a step, including it."""
-        if np.ndim(step) == 0:
-            return self._sums[step, :lanes]
-        flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
-        return flat.take(step * stride + np.arange(lanes), axis=0)
+        mirrored[step == -1] = 0
+        return np.where(same_side[:, None], gathered, mirrored)
 
     def _prefix_sums_before(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
         """(2 n, K) complex64 prefix sums up to a step, excluding it.
@@ -487,18 +458,26 @@ class StreamlineBatch:
         Negative steps are on the opposite half of the streamline. Its sums run away from the seed,
         and its derivatives to the left have the opposite sign.
         """
-        half, seed = lanes // 2, self._sums[0, :lanes]
+        seed, same_side = self._sums[0, :lanes], step > 0
         if np.ndim(step) == 0:
-            if step > 0:
-                return self._sums[step - 1, :lanes]
-            opposite_sums = self._sums[-step, :lanes]
-            return seed - np.concatenate([opposite_sums[half:], opposite_sums[:half]]).conj()
+            if same_side:
+                return self._rows(step - 1, lanes)
+            return seed - self._rows(-step, lanes, True).conj()
+        gathered = self._rows(np.where(same_side, step - 1, -step), lanes, ~same_side)
+        return np.where(same_side[:, None], gathered, seed - gathered.conj())
+
+    def _rows(
+        self, row: int | np.ndarray, lanes: int, is_opposite: bool | np.ndarray = False
+    ) -> np.ndarray:
+        """(2 n, K) complex64 `_sums` of a row, or of a row of each lane, or of the opposite lane."""
+        half = lanes // 2
+        if np.ndim(row) == 0:
+            rows = self._sums[row, :lanes]
+            return np.concatenate([rows[half:], rows[:half]]) if is_opposite else rows
         flat, stride = self._sums.reshape(-1, self._sums.shape[2]), self._sums.shape[1]
         lane = np.arange(lanes)
-        same_side = step > 0
-        row = np.where(same_side, step - 1, -step) * stride
-        gathered = flat.take(row + np.where(same_side, lane, (lane + half) % lanes), axis=0)
-        return np.where(same_side[:, None], gathered, seed - gathered.conj())
+        lane = np.where(is_opposite, (lane + half) % lanes, lane)
+        return flat.take(row * stride + lane, axis=0)
 
 
 class _LoopFinder:
@@ -529,13 +508,6 @@ class _LoopFinder:
         """Forget the streamlines that have ended; those with these indices remain."""
         if len(self._past_state):
             self._past_state = self._past_state[remaining]
-
-
-def _within_reach(position: np.ndarray) -> np.ndarray:
-    """(n,) complex64 offsets from the centers of cells, at most `MAX_SEAM_OFFSET` along each axis."""
-    offset = position.view(np.float32)
-    np.clip(offset, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=offset)
-    return position
 
 
 def _lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -59,12 +59,6 @@ def streamline_margin(look: Look) -> int:
     return int(streamline_reach(look) * look.step) + 2
 
 
-def entries_of_rows(pixel: np.ndarray, width: int, rows: tuple[int, int]) -> slice:
-    """Return the range of ascending flat pixels, (P,), that are in some rows of a frame."""
-    first_pixels = np.array([max(rows[0], 0) * width, rows[1] * width])
-    return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
-
-
 def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.ndarray:
     """Join the pictures of strips, from the bottom.
 

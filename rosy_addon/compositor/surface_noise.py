@@ -16,9 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..progress import progress, report
+from ..progress import progress
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
 from .image_noise import (
     BLUR_FACTOR,
@@ -27,8 +26,9 @@ from .image_noise import (
     STEP_LABEL,
     box_radius,
     gaussian_blur,
-    hash_bits_nd,
+    hash_bits,
 )
+from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
 SUBPIXEL_OFFSETS = ((-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375))
@@ -107,8 +107,7 @@ def surface_noise(
     units = instance_units(gbuffer, pixel)
     instance_hash = instance_hashes(gbuffer.instance_names)
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
-    for block in pixel_blocks(len(gbuffer.pixel)):
-        report(0.3 + 0.3 * block.start / len(gbuffer.pixel), STEP_LABEL)
+    for block in reported_blocks(len(gbuffer.pixel), STEP_LABEL, 0.3, 0.6):
         block_rest = rest.block(block)
         instance_id = gbuffer.instance_id[block]
         scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
@@ -125,8 +124,7 @@ def surface_noise(
         with progress(0.6, 1.0):
             _high_pass(gbuffer, total, BLUR_FACTOR * high_pass)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
-    for block in pixel_blocks(len(noise)):
-        report(1.0, STEP_LABEL)
+    for block in reported_blocks(len(noise), STEP_LABEL, 1.0, 1.0):
         noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
     return noise
 
@@ -154,10 +152,24 @@ def solid_noise(
     out : (K, n) float32 ndarray
         Independent channels with the mean 0. The standard deviation of single cells is `NOISE_STD`.
     """
+    # Base-2 logarithm of the size of cells.
     level = np.log2(cell_size * np.float32(LATTICE_SCALE))
     lattice = [_to_lattice_space(rest.at_offset(*tap)) for tap in SUBPIXEL_OFFSETS]
+    # Finer cells than float32 can tell apart would have indices too large for integers.
+    farthest = max(float(np.abs(position).max(initial=0)) for position in lattice)
+    level = np.maximum(level, np.float32(np.log2(max(farthest, 1e-30)) - MAX_CELL_BITS))
+    finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
     out[...] = 0
-    _accumulate_octaves(out, lattice, level, instance_hash, seed, density)
+    for index in range(OCTAVES):
+        octave = finest + np.float32(index)
+        weight = octave_weights(octave - level)
+        scale = np.exp2(-octave)
+        octave_index = (octave + OCTAVE_OFFSET).astype(np.int32)
+        for position in lattice:
+            cell = np.floor(position * scale).astype(np.int32)
+            for channel, total in enumerate(out):
+                bits = hash_bits((*cell, octave_index, instance_hash), seed, channel, density)
+                total += weight * (bits - np.float32(density))
     out *= np.float32(NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS))
 
 
@@ -233,45 +245,6 @@ def feature_scale(
     return 1 / np.clip(bend, 1, np.float32(1 / (1 - detail)))
 
 
-def _accumulate_octaves(
-    total: np.ndarray,
-    lattice: Sequence[np.ndarray],
-    level: np.ndarray,
-    instance_hash: np.ndarray,
-    seed: int,
-    density: float,
-) -> None:
-    """Add the weighted bits of the cells of all octaves to `total`.
-
-    Parameters
-    ----------
-    total : (K, n) float32 ndarray
-        Modified in place.
-    lattice : sequence of (3, n) float32 ndarray
-        Sample positions in the space of the lattice.
-    level : (n,) float32 ndarray
-        Base-2 logarithm of the size of cells at each pixel, in the units of that space.
-    instance_hash : (n,) uint32 ndarray
-        Hashes of the mesh instances.
-    seed, density
-        As for `surface_noise`.
-    """
-    # Finer cells than float32 can tell apart would have indices too large for integers.
-    farthest = max(float(np.abs(position).max(initial=0)) for position in lattice)
-    level = np.maximum(level, np.float32(np.log2(max(farthest, 1e-30)) - MAX_CELL_BITS))
-    finest = np.floor(level - np.float32(OCTAVES / 2 - 1))
-    for index in range(OCTAVES):
-        octave = finest + np.float32(index)
-        weight = octave_weights(octave - level)
-        scale = np.exp2(-octave)
-        octave_index = (octave + OCTAVE_OFFSET).astype(np.int32)
-        for position in lattice:
-            cell = np.floor(position * scale).astype(np.int32)
-            for channel, out in enumerate(total):
-                bits = hash_bits_nd((*cell, octave_index, instance_hash), seed, channel, density)
-                out += weight * (bits - np.float32(density))
-
-
 def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
     """Compute the weights of octaves, given their distance from the octave of a pixel's level.
 
@@ -324,26 +297,22 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     image_width = int(column.max()) - left + 1 + margin
     # Index of each pixel in the image that is blurred.
     index = np.empty(count, dtype=np.int32)
-    for block in pixel_blocks(count):
-        report(0.0, STEP_LABEL)
+    for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
         row = gbuffer.pixel[block] // width - np.int32(bottom)
         index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
 
-    def blurred_image(values: np.ndarray | None, part: int) -> np.ndarray:
+    def blurred_image(values: np.ndarray | None) -> np.ndarray:
         """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
         image = np.zeros((height, image_width), dtype=np.float32)
-        for block in pixel_blocks(count):
-            report(part / (len(channels) + 1), STEP_LABEL)
+        for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
             image.reshape(-1)[index[block]] = 1 if values is None else values[block]
-        start, stop = part / (len(channels) + 1), (part + 1) / (len(channels) + 1)
-        with progress(start, stop):
-            image = gaussian_blur(image, sigma)
-        return image.reshape(-1)
+        return gaussian_blur(image, sigma).reshape(-1)
 
-    weight = blurred_image(None, 0)
-    weight = np.maximum(weight.take(index), 1e-3)
-    for part, channel in enumerate(channels, start=1):
-        blurred = blurred_image(channel, part)
-        for block in pixel_blocks(count):
-            report((part + 1) / (len(channels) + 1), STEP_LABEL)
-            channel[block] -= blurred.take(index[block]) / weight[block]
+    images = len(channels) + 1
+    with progress(0.0, 1 / images):
+        weight = np.maximum(blurred_image(None).take(index), 1e-3)
+    for number, channel in enumerate(channels, start=1):
+        with progress(number / images, (number + 1) / images):
+            blurred = blurred_image(channel)
+            for block in reported_blocks(count, STEP_LABEL, 1.0, 1.0):
+                channel[block] -= blurred.take(index[block]) / weight[block]

@@ -10,13 +10,12 @@ import numpy as np
 
 from ..cache import Cache
 from ..errors import RosyError
-from ..progress import report
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.mip_map import MipMap
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import surface_tones
 from .look import Look
+from .reported_blocks import reported_blocks
 from .shading import Light, diffuse, light_visibility
 
 #: Minimum difference between the tones that become white and black.
@@ -120,31 +119,20 @@ def target_tone(
         check_tone(look, [instance.tone for instance in gbuffer.instances], reference)
     visibility = light_visibility(gbuffer, look, lights, cache)
     tone = np.empty((len(gbuffer.pixel), 3), dtype=np.float32)
-    for block in pixel_blocks(len(tone)):
-        report(block.start / len(tone), "finding tones")
-        block_visibility = [of_light[block] for of_light in visibility]
-        part = gbuffer.part(block)
-        tone[block] = _block_tone(part, look, lights, reference, block_visibility)
-    return tone
-
-
-def _block_tone(
-    gbuffer: GBuffer,
-    look: Look,
-    lights: Sequence[Light],
-    reference: ReferenceRender | None,
-    visibility: Sequence[np.ndarray],
-) -> np.ndarray:
-    """Compute `target_tone` for a part of the pixels, with the `light_visibility` there."""
-    if look.tone == "light":
-        return apply_tone_curve(diffuse(gbuffer, look, lights, visibility), look)
-    source_tone = reference.sample(gbuffer) if look.tone == "picture" else surface_tones(gbuffer)
-    missing = np.isnan(source_tone)
-    tone = np.repeat(apply_tone_curve(source_tone, look)[:, None], 3, axis=1)
-    if look.tone_lit or missing.any():
-        light = diffuse(gbuffer, look, lights, visibility)
-        tone = tone * light if look.tone_lit else tone
-        tone[missing] = light[missing]
+    for block in reported_blocks(len(tone), "finding tones"):
+        part, part_visibility = gbuffer.part(block), [of_light[block] for of_light in visibility]
+        if look.tone == "light":
+            light = diffuse(part, look, lights, part_visibility)
+            tone[block] = apply_tone_curve(light, look)
+            continue
+        source_tone = reference.sample(part) if look.tone == "picture" else surface_tones(part)
+        tone[block] = apply_tone_curve(source_tone, look)[:, None]
+        missing = np.isnan(source_tone)
+        if look.tone_lit or missing.any():
+            light = diffuse(part, look, lights, part_visibility)
+            if look.tone_lit:
+                tone[block] *= light
+            tone[block][missing] = light[missing]
     return tone
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import report
-from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
+from ..projection.pixel_blocks import BLOCK_PIXELS
 from .image_noise import NOISE_MEAN
-from .pixel_field import PixelField
+from .pixel_field import PixelField, entries_of_rows
+from .reported_blocks import reported_blocks
 
 #: Radius of the disc in grains: spots are then about as wide as lines.
 DISC_GRAINS = 1.0
@@ -26,20 +26,13 @@ GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 STEP_LABEL = "drawing undirected texture"
 
 
-def _unit_disc() -> np.ndarray:
-    """(SAMPLE_COUNT, 2) float32 points that are spread evenly over the unit disc."""
-    index = np.arange(SAMPLE_COUNT)
-    radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32)
-
-
-#: The samples of a disc of radius 1.
-UNIT_DISC = _unit_disc()
-
-
 def disc_offsets(grain: float) -> np.ndarray:
     """Return the (SAMPLE_COUNT, 2) int32 pixel offsets (dx, dy) of the samples of a disc."""
-    return np.floor(np.float32(DISC_GRAINS * grain) * UNIT_DISC + np.float32(0.5)).astype(np.int32)
+    # A sunflower spiral is spread evenly over the unit disc.
+    index = np.arange(SAMPLE_COUNT)
+    radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE
+    disc = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32)
+    return np.floor(np.float32(DISC_GRAINS * grain) * disc + np.float32(0.5)).astype(np.int32)
 
 
 def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np.ndarray | None:
@@ -70,19 +63,21 @@ def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np
     # Rows are padded with the pixels that a disc can reach.
     band_rows = max(BLOCK_PIXELS // field.width, 2 * margin, 1)
     for first_row in range(0, field.height, band_rows):
-        rows = first_row, first_row + band_rows
-        band = undefined[slice(*_entries(field, field.pixel[undefined], *rows))]
+        stop_row = first_row + band_rows
+        band = undefined[
+            entries_of_rows(field.pixel[undefined], field.width, (first_row, stop_row))
+        ]
         if not len(band):
             continue
-        report(first_row / field.height, STEP_LABEL)
-        around = slice(*_entries(field, field.pixel, rows[0] - margin, rows[1] + margin))
+        around_rows = first_row - margin, stop_row + margin
+        around = entries_of_rows(field.pixel, field.width, around_rows)
         # Sums of noise and of samples, as complex numbers.
         samples = np.zeros((band_rows + 2 * margin) * stride, dtype=np.complex64)
         first_cell = (first_row - margin) * stride - margin
         mean = noise[around].mean(axis=1) - np.float32(NOISE_MEAN)
         samples[_padded(field, field.pixel[around], stride) - first_cell] = mean + 1j
-        for block in pixel_blocks(len(band)):
-            report(first_row / field.height, STEP_LABEL)
+        share = first_row / field.height
+        for block in reported_blocks(len(band), STEP_LABEL, share, share):
             cell = _padded(field, field.pixel[band[block]], stride) - first_cell
             total = np.zeros(len(cell), dtype=np.complex64)
             for dx, dy in offsets.tolist():
@@ -90,12 +85,6 @@ def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np
             # The disc around a lone pixel may have no samples.
             texture[band[block]] = total.real / np.maximum(total.imag, 1)
     return texture
-
-
-def _entries(field: PixelField, pixel: np.ndarray, first_row: int, stop_row: int) -> list[int]:
-    """Range of the entries of ascending flat pixels that are in some rows."""
-    borders = np.clip([first_row, stop_row], 0, field.height) * field.width
-    return np.searchsorted(pixel, borders.astype(pixel.dtype)).tolist()
 
 
 def _padded(field: PixelField, pixel: np.ndarray, stride: int) -> np.ndarray:

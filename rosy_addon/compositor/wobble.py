@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..deterministic_trig import cos_sin, unit_phasor
-from ..progress import progress, report
+from ..progress import progress
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import rest_coordinates
 from .look import Look, is_hatched
 from .look_units import cell_size_args
 from .pixel_field import PixelField, product
+from .reported_blocks import reported_blocks
 from .surface_noise import cell_scale, instance_units
 
 #: Number of plane waves in the sum.
@@ -82,8 +82,7 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
         with progress(0.0, 0.5):
             rest = rest_coordinates(gbuffer)
     angle = np.empty(count, dtype=np.float32)
-    for block in pixel_blocks(count):
-        report(0.5 + 0.5 * block.start / count, "bending lines")
+    for block in reported_blocks(count, "bending lines", 0.5, 1.0):
         if rest is None:
             row, column = np.divmod(gbuffer.pixel[block], np.int32(gbuffer.camera.width))
             position = np.stack([column, row, 0 * row]).astype(np.float32)
@@ -111,9 +110,20 @@ def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
     (n,) float32 ndarray
         Radians.
     """
+    # The base-2 logarithm of the mean wavelength.
     level = np.log2(grain * np.float32(MEAN_WAVELENGTH_GRAINS))
     level = np.broadcast_to(level, position.shape[1:])
-    return np.float32(WOBBLE_STD) * _wave_sum(position, level)
+    octave = np.floor(level)
+    blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
+    total = np.zeros(len(level), dtype=np.float32)
+    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
+    for index, weight in enumerate(cos_sin(blend_angle)):
+        x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
+        for frequency_x, frequency_y, frequency_z, phase in wave_table():
+            cycle = frequency_x * x + frequency_y * y + frequency_z * z + phase
+            cycle = 2 * (cycle - np.floor(cycle)) - 1
+            total += weight * (4 * cycle * (1 - np.abs(cycle)))
+    return np.float32(WOBBLE_STD) * (total * np.float32(UNIT_VARIANCE_SCALE))
 
 
 def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
@@ -134,8 +144,7 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
         channel: np.empty(len(angle), np.complex64) if channel[0] == "deviation" else values
         for channel, values in field.channels.items()
     }
-    for block in pixel_blocks(len(angle)):
-        report(block.start / len(angle), "bending lines")
+    for block in reported_blocks(len(angle), "bending lines"):
         block_angle = angle[block].astype(np.float64)
         phase = unit_phasor(field.degree * block_angle)
         representation[block] = product(field.representation[block], phase)
@@ -145,29 +154,3 @@ def rotate_pixel_field(field: PixelField, angle: np.ndarray) -> PixelField:
                 phase = unit_phasor(-channel[1] * block_angle)
                 channels[channel][block] = product(values[block], phase)
     return replace(field, representation=representation, channels=channels)
-
-
-def _wave_sum(position: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Sum the waves at positions, with a standard deviation of about 1.
-
-    Parameters
-    ----------
-    position : (3, n) float32 ndarray
-    level : (n,) ndarray
-        Base-2 logarithm of the mean wavelength, in the units of `position`.
-
-    Returns
-    -------
-    (n,) float32 ndarray
-    """
-    octave = np.floor(level)
-    blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
-    total = np.zeros(len(level), dtype=np.float32)
-    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
-    for index, weight in enumerate(cos_sin(blend_angle)):
-        x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
-        for frequency_x, frequency_y, frequency_z, phase in wave_table():
-            cycle = frequency_x * x + frequency_y * y + frequency_z * z + phase
-            cycle = 2 * (cycle - np.floor(cycle)) - 1
-            total += weight * (4 * cycle * (1 - np.abs(cycle)))
-    return total * np.float32(UNIT_VARIANCE_SCALE)

@@ -99,7 +99,7 @@ class GpuRenderer:
         rgba = self.read(texture, camera.width, camera.height)
         if not rgba[..., 3].any():
             raise_nothing_in_view(instances, view.sample_camera)
-        picture = Picture(rgba, (), color_range=self._color_range(view))
+        picture = Picture(rgba, color_range=self._color_range(view))
         if has_marks(look):
             return (yield Call(with_marks, (picture, view), 0.98, 1.0, "drawing marks"))
         return picture

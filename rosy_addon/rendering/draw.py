@@ -111,7 +111,7 @@ def _draw_fields(
         if pictures[index] is None:
             pictures[index] = np.zeros((stop - start, view.camera.width, 4), dtype=np.float32)
     rgba = join_strips(pictures, parts)
-    return Picture(rgba, (), color_range=fixed_color_range(view.look, view.instances))
+    return Picture(rgba, color_range=fixed_color_range(view.look, view.instances))
 
 
 def picture_groups(view: ViewInput, workers: int) -> list[Sequence[Strip]]:

@@ -119,7 +119,7 @@ def _draw(
         return None
     rgba = np.zeros((height, width, 4), dtype=np.float32)
     draw_key(rgba, layout, scale, fonts.triangles, _key_colors(scene))
-    return Picture(rgba, ())
+    return Picture(rgba)
 
 
 def _lines(text: str) -> str:

@@ -15,7 +15,7 @@ from ..compositor.color_values import (
     value_range,
     value_scale,
 )
-from ..compositor.compose import colorize, degree_layer
+from ..compositor.compose import colorize, streak_tone
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import noise_channel_count, with_cycle_distance
 from ..compositor.lic import lic_lengths
@@ -294,7 +294,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
     with progress(0.95, 0.97):
-        layer = degree_layer(field, look, images)
+        tone = streak_tone(field, look, images)
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if colors_values(look):
@@ -305,7 +305,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     color = np.ones((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(color)):
         report(0.97 + 0.03 * block.start / len(color), "drawing the colors")
-        part = field.part(block), images.part(block), layer.tone[block]
+        part = field.part(block), images.part(block), tone[block]
         color[block, :3] = colorize(*part, look)
     return color
 

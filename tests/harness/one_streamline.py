@@ -20,7 +20,7 @@ import numpy as np
 #: The modules of `compositor` that are used here.
 MODULES = (
     *(
-        "brute_force",
+        "per_pixel_lic",
         "lic",
         "covering",
         "flow",
@@ -50,7 +50,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
     def draw_lengths(field, looks, noise, _strip):
         results = []
         for look in looks:
-            images = rosy.brute_force.brute_force(field, look, noise)
+            images = rosy.per_pixel_lic.brute_force(field, look, noise)
             if _is_antialiased(rosy, look) and rosy.hatching.is_hatched(look):
                 images = _smoothed(
                     rosy, rosy.covering.build_covering(field, look, noise), field, images
@@ -58,7 +58,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
             results.append(images)
         return results
 
-    convolve_still = rosy.brute_force.convolve_members
+    convolve_still = rosy.per_pixel_lic.convolve_members
 
     def convolve(field, look, *arguments):
         if look.flow or _is_antialiased(rosy, look):
@@ -67,14 +67,14 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
 
     with (
         mock.patch.object(rosy.lic, "fast_lic", draw_lengths),
-        mock.patch.object(rosy.brute_force, "convolve_members", convolve),
+        mock.patch.object(rosy.per_pixel_lic, "convolve_members", convolve),
     ):
         yield
 
 
 def _is_antialiased(rosy: SimpleNamespace, look: Any) -> bool:
     """Whether a look is that of pixels with several samples."""
-    return isinstance(look, rosy.look_units.AntialiasedLook)
+    return isinstance(look, rosy.look_units.PixelLook) and look.antialiased
 
 
 def _smoothed(rosy: SimpleNamespace, covering: Any, field: Any, images: Any) -> Any:
@@ -109,7 +109,7 @@ def _members(
     neighbors: np.ndarray,
     tracers: Any,
 ) -> Any:
-    """Do the same as `lic_images.convolve_members`, by kernels that move or with interpolated noise."""
+    """Do the same as `per_pixel_lic.convolve_members`, by kernels that move or with interpolated noise."""
     count = len(field.pixel)
     limit = rosy.lic_images.magnitude_step_limits(field, look)
     length = np.full(count, look.length) if limit is None else limit
@@ -141,8 +141,10 @@ def _members(
         start = weights_at(0)
         total, weight_sum = start * centered, start.sum(axis=1)
         available, full = (start**2).sum(axis=1), (start**2).sum(axis=1)
-        for side, direction_at in zip((1, -1), tracer(slice(0, count)), strict=True):
-            for step, entry, offset in _traced(neighbors, direction_at, count, reach, look.step):
+        for side in (1, -1):
+            direction_at = tracer(slice(0, count))
+            step_length = side * look.step
+            for step, entry, offset in _traced(neighbors, direction_at, count, reach, step_length):
                 weight = weights_at(side * step)
                 energy = (weight**2).sum(axis=1)
                 total += weight * sample(entry, offset)

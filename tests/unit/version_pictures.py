@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 if __name__ == "__main__":  # started by another interpreter, without pytest's search path
-    sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+    sys.path[:0] = [str(folder) for folder in Path(__file__).resolve().parents[1:3]]
 
+from harness.planar import compose_planar
 from planar_fields import pair_angle, pixel_centers
 from shapes import icosphere, torus
 
-from rosy_addon.compositor.compose import compose, compose_planar
+from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.image_io.png import to_srgb_uint8

@@ -58,7 +58,7 @@ def write() -> None:
 
 def _measured(index: int, degree: int) -> list[object]:
     field = one_direction(index) if degree == 1 else singularity(index)
-    tone = channel(compose_field(field, degree, SIZE, MEASURED).layers[0].tone, SIZE)
+    tone = channel(compose_field(field, degree, SIZE, MEASURED).layer.tone, SIZE)
     row = [f"{'one direction' if degree == 1 else 'all six'}, index {signed(index)}/6"]
     middle, columns = SIZE // 2, slice(SIZE // 2 + 52, SIZE // 2 + 180)
     for rows in (slice(middle + 2, middle + 66), slice(middle - 66, middle - 2)):

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rosy_addon.compositor.compose import compose_planar
-from rosy_addon.compositor.picture import DegreeLayer
-from rosy_addon.compositor.pixel_field import blend_weights, planar_pixel_field
+from rosy_addon.compositor.pixel_field import blend_weights
+from tests.harness.planar import DegreeLayer, compose_planar, planar_pixel_field
 
 from .looks import MEASURED, RED
 from .measure import correlation
@@ -28,8 +27,8 @@ def write() -> None:
     page = Page("figure-05", "From a 3-RoSy field to a picture, step by step")
     angles = np.angle(singularity(1)(points(FIELD_SIZE, SUPERSAMPLING))) / DEGREE
     first, second = _set(angles, 0.0), _set(angles, np.pi / DEGREE)
-    blend = compose_planar(angles, DEGREE, LOOK).layers[0]
-    brute = compose_planar(angles, DEGREE, LOOK.with_settings({"method": "brute"})).layers[0]
+    blend = compose_planar(angles, DEGREE, LOOK).layer
+    brute = compose_planar(angles, DEGREE, LOOK.with_settings({"method": "brute"})).layer
 
     page.text(
         """This page shows how the paper's method draws a 3-RoSy field with a singularity of index
@@ -122,7 +121,7 @@ def _measure(
 def _set(angles: np.ndarray, guiding_angle: float) -> DegreeLayer:
     """Return one set of member images."""
     look = LOOK.with_settings({"weights": "none", "guiding_angle": guiding_angle})
-    return compose_planar(angles, DEGREE, look).layers[0]
+    return compose_planar(angles, DEGREE, look).layer
 
 
 def _shown(values: np.ndarray, size: int) -> np.ndarray:

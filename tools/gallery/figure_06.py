@@ -29,7 +29,7 @@ def constant(angle: float, degree: int) -> PlanarField:
 def write() -> None:
     """Draw and write the page."""
     page = Page("figure-06", "Contrast")
-    layers = compose_field(constant(MEMBER, DEGREE), DEGREE, FIELD_SIZE, LOOK).layers[0]
+    layers = compose_field(constant(MEMBER, DEGREE), DEGREE, FIELD_SIZE, LOOK).layer
     expected = expected_std(LOOK)
     # In the visible part, streamlines have their full length.
     gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
@@ -116,7 +116,7 @@ def _corrected(degree: int, look: Look) -> list[float]:
     deviations = []
     for seed in range(SEEDS):
         seeded = look.with_settings({"seed": seed})
-        tone = compose_field(constant(MEMBER, degree), degree, FIELD_SIZE, seeded).layers[0].tone
+        tone = compose_field(constant(MEMBER, degree), degree, FIELD_SIZE, seeded).layer.tone
         deviations.append(float(_cut(tone).std()))
     factor = float(
         blend_gain(degree if degree % 2 else degree // 2, np.float32([2 * look.length + 1]), look)[

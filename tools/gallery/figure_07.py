@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.compositor.picture import DegreeLayer
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
+from tests.harness.planar import DegreeLayer
 
 from .looks import RED, SOLID
 from .measure import correlation, local_correlation, orientation_spectrum, peaks
 from .page import Page, listed
 from .shapes import plane, sphere
 from .sheet import Panel, display, magnified, outlined
-from .solid import compose_view, frame_of, harmonic_field, view
+from .solid import compose_view, frame_of, harmonic_field, layer_in_view, view
 
 SIZE = 402
 TILTS, TILTED_SIZE = (0, 60, 78), 262
@@ -56,7 +56,7 @@ def _write_plane(page: Page) -> None:
         camera = view(surface, (0, 90 - tilt), (TILTED_SIZE,) * 2, look.supersampling, False)
         picture = compose_view(surface, field, look, camera)
         panels.append(Panel(display(picture.rgba), f"tilted by {tilt}°"))
-        layers = picture.layers[0]
+        layers = layer_in_view(surface, field, look, camera)
         side = look.supersampling * TILTED_SIZE
         tone = frame_of(layers.tone[:, 0], layers.pixel, (side, side))
         half_size = 0.45 * side * np.array([np.cos(np.radians(tilt)), 1.0])
@@ -92,8 +92,9 @@ def _write_sphere(page: Page) -> None:
     )
     camera = view(surface, VIEW, (SIZE, SIZE), SOLID.supersampling)
     pictures = {name: compose_view(surface, field, look, camera) for name, look in LOOKS.items()}
-    tones = {name: _frame(picture.layers[0], 0) for name, picture in pictures.items()}
-    covered_weight = _frame(pictures["on"].layers[0], None)
+    layers = {name: layer_in_view(surface, field, look, camera) for name, look in LOOKS.items()}
+    tones = {name: _frame(layer, 0) for name, layer in layers.items()}
+    covered_weight = _frame(layers["on"], None)
     local_correlations = {
         name: local_correlation(
             tones[name], tones["brute"], covered_weight, 3.0 * SOLID.supersampling

@@ -101,7 +101,7 @@ def _half_lengths(
 ) -> list[str]:
     """Return the distance at which the correlation along streaks has halved, by range of magnitude."""
     look = MEASURED.with_settings({"magnitude": mapping, "weights": "none"})
-    image = compose_field(field, DEGREE, SIZE, look).layers[0].images.members[0, :, 0]
+    image = compose_field(field, DEGREE, SIZE, look).layer.images.members[0, :, 0]
     image = image.reshape(SIZE, SIZE)
     angle = np.angle(z) / DEGREE
     # Leave out the borders, and the breaking points of the image that is measured.

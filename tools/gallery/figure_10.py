@@ -53,7 +53,7 @@ def _spectrum(degree: int) -> np.ndarray:
     total = np.zeros(BINS)
     for seed in range(SEEDS):
         look = MEASURED.with_settings({"seed": seed})
-        tone = compose_field(constant(MEMBER, degree), degree, SIZE, look).layers[0].tone
+        tone = compose_field(constant(MEMBER, degree), degree, SIZE, look).layer.tone
         total += mean_spectrum(channel(tone, SIZE)[40:-40, 40:-40], SIDE, BINS) / SEEDS
     return total
 

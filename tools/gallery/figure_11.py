@@ -6,7 +6,6 @@ import numpy as np
 
 from rosy_addon.compositor.contrast import expected_std
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.picture import Picture
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
@@ -23,6 +22,7 @@ from .solid import (
     compose_view,
     harmonic_field,
     icosahedron_axes,
+    layer_in_view,
     smoothed,
     view,
     visible_points,
@@ -65,12 +65,11 @@ def write() -> None:
     panels, rows = [], []
     for name, look, angles, height, label in shots:
         camera = view(fields[name][0], angles, (WIDTH, height), look.supersampling)
-        picture = compose_view(*fields[name], look, camera)
-        shown = display(picture.rgba)
+        shown = display(compose_view(*fields[name], look, camera).rgba)
         if name == "sphere":
             shown = _marked(shown, *fields[name], camera, look.supersampling)
         panels.append(Panel(shown, label))
-        rows.append([label, *_spread(picture, look)])
+        rows.append([label, *_spread(layer_in_view(*fields[name], look, camera).tone, look)])
     captions = (
         "Suzanne with a 4-RoSy field",
         "A triple torus with a 4-RoSy field",
@@ -130,7 +129,6 @@ def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
     return [name, surface.face_count, field.degree, shown or "none", int(index.sum()), expected]
 
 
-def _spread(picture: Picture, look: Look) -> list[object]:
-    tone = picture.layers[0].tone
+def _spread(tone: np.ndarray, look: Look) -> list[object]:
     theory = look.gain * expected_std(enlarged(look, look.supersampling))
     return [float(tone.mean()), float(tone.std()), theory]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rosy_addon.compositor.compose import compose, compose_planar
+from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.field_io import load_field
@@ -26,6 +26,7 @@ from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
+from tests.harness.planar import compose_planar
 
 from .page import ROOT
 from .plane import PlanarField, points, singularity

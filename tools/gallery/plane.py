@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rosy_addon.compositor.compose import compose_planar
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.picture import Picture
+from tests.harness.planar import PlanarPicture, compose_planar
 
 from .sheet import display
 
@@ -30,8 +29,8 @@ def singularity(index: int) -> PlanarField:
     return lambda p: (p / np.abs(p)) ** index
 
 
-def compose_field(field: PlanarField, degree: int, size: int, look: Look) -> Picture:
-    """Draw the picture of a field and its layers, without supersampling."""
+def compose_field(field: PlanarField, degree: int, size: int, look: Look) -> PlanarPicture:
+    """Draw the picture of a field and its layer, without supersampling."""
     z = field(points(size))
     return compose_planar(np.angle(z) / degree, degree, look, np.abs(z))
 

@@ -24,6 +24,7 @@ from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
+from tests.harness.planar import DegreeLayer, degree_layers
 
 
 def harmonic_field(surface: Surface, degree: int, axes: np.ndarray) -> RosyField:
@@ -80,6 +81,13 @@ def view(
 def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> Picture:
     """Draw a field; the resolution of the camera includes the supersampling of the look."""
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
+
+
+def layer_in_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> DegreeLayer:
+    """Return the images that `compose_view` draws a field with."""
+    instance = MeshInstance(surface, np.eye(4), field)
+    (layer,) = degree_layers(project([instance], camera, look.display), look)
+    return layer
 
 
 def render_view(

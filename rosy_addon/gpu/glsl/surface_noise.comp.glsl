@@ -1,6 +1,6 @@
 // Noise that moves with the surface, before the high pass: `surface_noise.surface_noise`.
 
-// The random bit of a cell, as `image_noise.hash_bits_nd`.
+// The random bit of a cell, as `image_noise.hash_bits`.
 float random_bit(ivec3 cell, int octave, int channel)
 {
   uint h = uint(cell.x) * HASH_X;

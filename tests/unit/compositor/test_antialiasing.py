@@ -13,7 +13,7 @@ from shapes import icosphere, torus
 from rosy_addon.compositor import outline
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import antialiased_look, supersampled_look
+from rosy_addon.compositor.look_units import supersampled_look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.preset_files.store import load_preset
@@ -95,7 +95,7 @@ def test_outlines_are_those_of_samples(width, max_samples, monkeypatch):
     monkeypatch.setattr(outline, "MAX_OUTLINE_SAMPLES", max_samples)
     instance, look = torus_instance(), Look(outline=width)
     pixels, samples = project([instance], CAMERA, samples=2), project([instance], CAMERA.scaled(2))
-    coverage = outline_coverage(pixels, antialiased_look(look))
+    coverage = outline_coverage(pixels, replace(supersampled_look(look), antialiased=True))
     actual = np.zeros(SIZE * SIZE)
     actual[pixels.pixel] = coverage * pixels.coverage.own
     shown = coverage[pixels.coverage.entry] * pixels.coverage.share

@@ -8,18 +8,18 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long
+from harness.planar import planar_pixel_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_fields import pair_angle, pixel_centers
 from scipy import ndimage
 
 from rosy_addon.compositor import fast_lic
-from rosy_addon.compositor.brute_force import brute_force
 from rosy_addon.compositor.covering import build_covering
 from rosy_addon.compositor.filter_kernel import kernel_weights
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import planar_pixel_field
+from rosy_addon.compositor.per_pixel_lic import brute_force
 
 SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
@@ -85,11 +85,11 @@ def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, seco
         field, replace(LOOK, guiding_angle=guide), np.ones((2, 1), dtype=np.float32)
     )
     first, second = covering.cell_of_pixel
-    directions = covering.state_table.reshape(covering.sheets, -1, 4)[..., :2] / 32767.0
+    directions = covering.state_table.reshape(2 * covering.line_count, -1, 4)[..., :2] / 32767.0
     match = directions[:, first] @ directions[:, second].T
-    for sheet in range(covering.sheets):
+    for sheet in range(2 * covering.line_count):
         matching = np.rint(covering.packed_phase[first] - covering.packed_phase[second])
-        chosen = int(sheet + matching) % covering.sheets
+        chosen = int(sheet + matching) % (2 * covering.line_count)
         assert match[sheet, chosen] > match[sheet].max() - 2e-4
 
 
@@ -99,7 +99,7 @@ def test_the_directions_of_states_are_the_members_and_their_opposites():
         uniform_field(angle, degree, 4), LOOK, np.ones((16, 1), dtype=np.float32)
     )
     states = (
-        covering.state_table.reshape(covering.sheets, -1, 4)[:, covering.cell_of_pixel, :2]
+        covering.state_table.reshape(2 * covering.line_count, -1, 4)[:, covering.cell_of_pixel, :2]
         / 32767.0
     )
     expected = np.exp(1j * (angle + 2 * np.pi * np.arange(10) / 10))

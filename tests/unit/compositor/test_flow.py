@@ -7,17 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import long
+from harness.planar import compose_planar
 from scipy import ndimage
 
-from rosy_addon.compositor.compose import compose_planar
-from rosy_addon.compositor.drifting_averages import DriftingAverages
+from rosy_addon.compositor.drifting_averages import DriftingAverages, MovingKernel
 from rosy_addon.compositor.filter_kernel import kernel_of, sample_weights
 from rosy_addon.compositor.flow import (
     channel_shifts,
     channel_weights,
     flow_at,
     forward_share,
-    moving_kernel,
     streamline_reach,
 )
 from rosy_addon.compositor.look import Look, has_flow
@@ -32,7 +31,7 @@ KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
 
 def member(angle, degree, look):
     """Return the image of the first member of a uniform field, around 0."""
-    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look).layers[0]
+    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look).layer
     return layer.images.members[0, :, 0].reshape(SIZE, SIZE) - 0.5
 
 
@@ -58,7 +57,7 @@ def best_shift(first, second, direction, expected, reach=3.0):
 @pytest.mark.parametrize("is_short", [False, True])
 def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
     look = flow_at(Look(flow=1.0, length=12, **KERNELS[kernel]), 4.3)
-    moving = moving_kernel(look, levels=13 if is_short else 1)
+    moving = MovingKernel(look, levels=13 if is_short else 1)
     steps, count = 40, 5
     reach = streamline_reach(look)
     rng = np.random.default_rng(1)

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long, mainly
+from harness.planar import planar_pixel_field
 from scipy.ndimage import gaussian_filter, map_coordinates
 from shapes import cube
 
@@ -29,12 +30,10 @@ from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.compositor.paper_grain import picture_paper_grain
-from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.compositor.shading import diffuse
 from rosy_addon.compositor.streak_statistics import (
-    StreakSettings,
     break_steps,
-    streak_statistics,
+    look_streak_statistics,
 )
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
 from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field, wobble_angle
@@ -175,8 +174,8 @@ def test_presets_reproduce_a_ramp(name):
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Higher coverages have lower thresholds, and half coverage is near the mean."""
-    settings = StreakSettings(81, 2.0, 0.5, 16.0, crispness)
-    threshold, deviation, *_ = streak_statistics(settings)
+    look = Look(length=40, grain=2.0, density=0.5, high_pass=16.0, crispness=crispness)
+    threshold, deviation, *_ = look_streak_statistics(look)
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
     assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric

@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from conftest import long, mainly
+from harness.planar import lic, planar_pixel_field
 from planar_fields import pixel_centers
 from scipy import ndimage
 
@@ -18,10 +19,10 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.filter_kernel import full_sample_count
 from rosy_addon.compositor.flow import flow_at
 from rosy_addon.compositor.ibfv import decay_of_samples
-from rosy_addon.compositor.lic import lic, look_noise
+from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import PixelField, SeamSteps, planar_pixel_field
+from rosy_addon.compositor.pixel_field import PixelField, SeamSteps
 from rosy_addon.projection.project import project
 
 LOOK = Look(method="ibfv")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import mainly
+from harness.planar import planar_pixel_field
 from shapes import torus
 
 from rosy_addon.color import to_linear
@@ -24,7 +25,6 @@ from rosy_addon.compositor.ink_thresholds import (
 from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.paper_grain import picture_paper_grain
-from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.undirected import undirected_texture
 from rosy_addon.field.generate import axis_field

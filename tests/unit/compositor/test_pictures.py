@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import long
+from harness.planar import degree_layers
 from shapes import icosphere, plane, torus
 
 from rosy_addon.color import map_colors, to_display, to_linear
@@ -55,7 +56,7 @@ def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
     sphere = icosphere(5)
     gbuffer = project_surface(sphere, axis_field(sphere, degree, (0.3, 0.9, 0.1)), 384)
     members, brute = (
-        compose(gbuffer, plain(method=method)).layers[0].tone for method in ("members", "brute")
+        degree_layers(gbuffer, plain(method=method))[0].tone for method in ("members", "brute")
     )
     assert correlation(members, brute) > 0.98
 
@@ -65,11 +66,11 @@ def test_decomposition_agrees_with_brute_force_on_a_sphere(degree):
 def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     surface, look = torus(48, 24), plain(method=method)
     field = axis_field(surface, degree, (0.2, 0.3, 1.0))
-    first = compose(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
-    second = compose(
+    (first,) = degree_layers(project_surface(surface, field, 96, (2, 1, 4), 3.2), look)
+    (second,) = degree_layers(
         project_surface(surface, with_other_members(surface, field, 1), 96, (2, 1, 4), 3.2), look
     )
-    difference = np.abs(first.layers[0].tone - second.layers[0].tone)
+    difference = np.abs(first.tone - second.tone)
     assert np.mean(difference > 1e-5) < 0.005
 
 
@@ -82,9 +83,10 @@ def test_two_degrees_in_one_picture():
         MeshInstance(left, np.eye(4), axis_field(left, 4)),
         MeshInstance(right, moved, axis_field(right, 3, (0, 1, 0))),
     ]
-    picture = compose(project(instances, camera), PLAIN)
-    assert [layers.degree for layers in picture.layers] == [3, 4]
-    covered = sum(len(layers.pixel) for layers in picture.layers)
+    gbuffer = project(instances, camera)
+    picture, layers = compose(gbuffer, PLAIN), degree_layers(gbuffer, PLAIN)
+    assert [layer.degree for layer in layers] == [3, 4]
+    covered = sum(len(layer.pixel) for layer in layers)
     assert covered == np.count_nonzero(picture.rgba[..., 3])
 
 
@@ -96,7 +98,7 @@ def test_streaks_of_a_tilted_plane_follow_the_projected_direction():
     eye = (0, -4 * np.sin(np.pi / 3), 4 * np.cos(np.pi / 3))
     gbuffer = project_surface(surface, field, 256, eye, 1.6, (0, 0, 1))
     tone = np.zeros(256 * 256)
-    tone[gbuffer.pixel] = compose(gbuffer, PLAIN).layers[0].tone[:, 0] - 0.5
+    tone[gbuffer.pixel] = degree_layers(gbuffer, PLAIN)[0].tone[:, 0] - 0.5
     power = np.abs(np.fft.fft2(tone.reshape(256, 256))) ** 2
     autocorrelation = np.fft.fftshift(np.fft.ifft2(power).real)
     on_screen = gbuffer.camera.view[:2, :3] @ direction
@@ -120,12 +122,10 @@ def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane(
     tilt = np.radians(65)
     eye = (0, -4 * np.sin(tilt), 4 * np.cos(tilt))
     gbuffer = project_surface(surface, field, 300, eye, 1.5, (0, 0, 1))
-    brute = compose(gbuffer, plain(method="brute")).layers[0].tone
+    brute = degree_layers(gbuffer, plain(method="brute"))[0].tone
     error = [
         1
-        - correlation(
-            compose(gbuffer, plain(method="members", view_plane=on)).layers[0].tone, brute
-        )
+        - correlation(degree_layers(gbuffer, plain(method="members", view_plane=on))[0].tone, brute)
         for on in (True, False)
     ]
     assert error[0] < 0.02
@@ -172,7 +172,7 @@ def test_contrast_at_borders_is_that_of_the_center():
     for seed in range(4):
         gbuffer = project_surface(sphere, axis_field(sphere, 2, (0.2, 1, 0)))
         image = np.full(256 * 256, np.nan)
-        image[gbuffer.pixel] = compose(gbuffer, plain(seed=seed)).layers[0].tone[:, 0]
+        image[gbuffer.pixel] = degree_layers(gbuffer, plain(seed=seed))[0].tone[:, 0]
         image = image.reshape(256, 256)
         rim.append(np.nanstd(image[(radius > 0.93) & (radius < 0.99)]))
         inner.append(np.nanstd(image[radius < 0.5]))
@@ -184,12 +184,12 @@ def test_undefined_faces_have_no_excess_contrast():
     vectors = np.tile([1.0, 0, 0], (surface.face_count, 1))
     vectors[surface.face_center[:, 0] > 0] = 0
     gbuffer = project_surface(surface, RosyField(4, vectors), 96, display="flat")
-    picture = compose(gbuffer, Look(shading=0.0))
-    assert np.isfinite(picture.rgba).all()
+    look = Look(shading=0.0)
+    assert np.isfinite(compose(gbuffer, look).rgba).all()
     undefined = gbuffer.representation == 0
     assert undefined.any()
     # A streamline of one sample has about the standard deviation of a full one.
-    tone = picture.layers[0].tone[:, 0]
+    tone = degree_layers(gbuffer, look)[0].tone[:, 0]
     assert tone[undefined].std() < 1.6 * tone[~undefined].std()
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import mainly
+from harness.planar import degree_layers
 from scipy.ndimage import gaussian_filter
 from shapes import from_quads, grid_of_quads, icosphere, plane
 
@@ -186,9 +187,9 @@ def test_lic_images_do_not_depend_on_the_tone():
         [make_instance(BALL, tone=tone_from_vertices(BALL, BALL.vertices[:, 0]))], make_camera(96)
     )
     cache = Cache()
-    first = compose(gbuffer, Look(), cache=cache).layers[0].images
+    first = degree_layers(gbuffer, Look(), cache)[0].images
     for other in ({"tone": "attribute"}, {"tone_gamma": 2.0}, {"shadows": True, "light": "lamp"}):
-        assert compose(gbuffer, Look(**other), cache=cache).layers[0].images is first
+        assert degree_layers(gbuffer, Look(**other), cache)[0].images is first
 
 
 # --- the curve -------------------------------------------------------------------------------------

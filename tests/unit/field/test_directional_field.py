@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import mainly
 from field_helpers import read_field
+from harness.planar import degree_layers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
@@ -196,10 +197,10 @@ def test_streaks_run_along_free_directions(method, angles):
     for face in range(surface.face_count):  # the order must not matter
         directions[face] = np.roll(directions[face], face, axis=0)
     field = field_from_directions(surface, directions)
-    picture = compose(
+    (layer,) = degree_layers(
         project_from_above(surface, field, 256), WEAVE.with_settings({"method": method})
     )
-    tone = picture.layers[0].tone.reshape(256, 256)[32:-32, 32:-32]
+    tone = layer.tone.reshape(256, 256)[32:-32, 32:-32]
     # From -5 to 175 degrees: no direction is near the ends.
     actual = np.sort((np.array(peaks(orientation_spectrum(tone))) + 5) % 180 - 5)
     expected = np.unique(np.mod(angles, 180))
@@ -254,9 +255,9 @@ def drawn_and_stored_angles(surface, field, face, method):
     camera = orthographic_camera(view, 320, 320, scale=1.2 * size, clip=(0.1, 20))
     instance = MeshInstance(surface, np.eye(4), field)
     look = WEAVE.with_settings({"method": method})
-    picture = compose(project([instance], camera), look)
+    (layer,) = degree_layers(project([instance], camera), look)
     frame = np.full(320 * 320, np.nan)
-    frame[picture.layers[0].pixel] = picture.layers[0].tone[:, 0]
+    frame[layer.pixel] = layer.tone[:, 0]
     tone = frame.reshape(320, 320)[96:-96, 96:-96]
     assert np.isfinite(tone).all()
     actual = np.array(peaks(orientation_spectrum(tone)))

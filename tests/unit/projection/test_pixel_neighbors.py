@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from harness.planar import planar_pixel_field
 from shapes import from_quads, from_triangles, icosphere, plane, torus
 
-from rosy_addon.compositor.pixel_field import planar_pixel_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance

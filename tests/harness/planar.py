@@ -1,0 +1,132 @@
+"""Pictures of planar fields, and the layers that pictures are composed of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+from unittest import mock
+
+import numpy as np
+
+import rosy_addon.compositor.compose as compose_module
+from rosy_addon.cache import Cache
+from rosy_addon.compositor.compose import colorize, compose, streak_tone
+from rosy_addon.compositor.filter_kernel import look_for_symmetry
+from rosy_addon.compositor.flow import with_cycle_distance
+from rosy_addon.compositor.lic import lic_lengths, look_noise
+from rosy_addon.compositor.lic_images import LicImages
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.pixel_field import PixelField, mask_undefined
+from rosy_addon.compositor.strips import Strip
+from rosy_addon.deterministic_trig import unit_phasor
+from rosy_addon.projection.gbuffer import GBuffer
+
+
+class DegreeLayer(NamedTuple):
+    """Images of the fields of one degree, at the resolution of the supersampled frame.
+
+    Attributes
+    ----------
+    degree : int
+    pixel : (P,) int32 ndarray
+        Flat indices into the supersampled frame.
+    images : LicImages
+        LIC images before contrast correction, with values around 0.5.
+    tone : (P, K) float32 ndarray
+        The blend after contrast correction and gain. Display values, not clipped.
+    """
+
+    degree: int
+    pixel: np.ndarray
+    images: LicImages
+    tone: np.ndarray
+
+
+class PlanarPicture(NamedTuple):
+    """A picture of a planar field: (H, W, 4) linear colors, and the layer that they show."""
+
+    rgba: np.ndarray
+    layer: DegreeLayer
+
+
+def degree_layers(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> list[DegreeLayer]:
+    """Return the layers of a picture without ink, one per visible degree, in ascending order."""
+    layers = []
+
+    def recorded(field: PixelField, look: Look, images: LicImages) -> np.ndarray:
+        tone = streak_tone(field, look, images)
+        layers.append(DegreeLayer(field.degree, field.pixel, images, tone))
+        return tone
+
+    height = gbuffer.camera.height
+    with mock.patch.object(compose_module, "streak_tone", recorded):
+        compose(gbuffer, look, cache=cache, strips=[Strip(0, height, height)])
+    return layers
+
+
+def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicImages:
+    """Average noise, by default that of the look, along the streamlines of each member."""
+    (images,) = lic_lengths(field, [look], look_noise(field, look) if noise is None else noise)
+    return images
+
+
+def planar_pixel_field(
+    angles: np.ndarray, degree: int, magnitude: np.ndarray | float = 1.0
+) -> PixelField:
+    """Make the pixel field of a field in the plane, given the angle of a member at each pixel.
+
+    Parameters
+    ----------
+    angles : (H, W) ndarray
+        Radians, counter-clockwise from the direction of the rows. Rows from the bottom. The field
+        is undefined where the angle is not finite or the magnitude is not above 0.
+    degree : int
+    magnitude : (H, W) ndarray or float
+        rho.
+    """
+    angles = np.asarray(angles, dtype=np.float64)
+    height, width = angles.shape
+    rho = np.broadcast_to(np.float32(magnitude), angles.shape)
+    defined = np.isfinite(angles) & (rho > 0)
+    z = unit_phasor(np.where(defined, degree * angles, 0.0).ravel())
+    z *= np.where(defined, rho, 0).astype(np.float32).ravel()
+    pixel = np.arange(height * width, dtype=np.int32)
+    all_neighbors = np.full(len(pixel), 0b111_111_111, dtype=np.uint16)
+    return PixelField(
+        degree=degree,
+        width=width,
+        height=height,
+        pixel=pixel,
+        representation=z,
+        screen_jacobian=np.tile(np.array([1, 1j], dtype=np.complex64), (len(pixel), 1)),
+        neighbor_mask=mask_undefined(all_neighbors, pixel, width, height, z != 0),
+    )
+
+
+def compose_planar(
+    angles: np.ndarray,
+    degree: int,
+    look: Look,
+    magnitude: np.ndarray | float = 1.0,
+    noise: np.ndarray | None = None,
+) -> PlanarPicture:
+    """Draw a field in the plane, without mesh, camera, light and supersampling.
+
+    Parameters
+    ----------
+    angles, degree, magnitude
+        As for `planar_pixel_field`.
+    look : Look
+        Lengths are in pixels.
+    noise : (H, W) or (H, W, 3) ndarray, optional
+        Values from 0 to 1. By default the noise of the look in image space.
+    """
+    pixels = planar_pixel_field(angles, degree, magnitude)
+    if noise is not None:
+        noise = np.asarray(noise, dtype=np.float32).reshape(len(pixels.pixel), -1)
+    look = look_for_symmetry(with_cycle_distance(replace(look, supersampling=1)), pixels.symmetry)
+    images = lic(pixels, look, noise)
+    tone = streak_tone(pixels, look, images)
+    rgba = np.ones((*np.shape(angles), 4), dtype=np.float32)
+    rgba[..., :3] = colorize(pixels, images, tone, look).reshape(*rgba.shape[:2], -1)
+    return PlanarPicture(rgba, DegreeLayer(degree, pixels.pixel, images, tone))

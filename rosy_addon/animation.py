@@ -28,7 +28,7 @@ from .file_io import check_folder, check_writable, read_bytes, remove_leftovers,
 from .gpu.image_steps import image_steps
 from .gpu.select import select_device
 from .projection.camera import Camera
-from .rendering.singularities import sequence_key
+from .rendering.marks import sequence_key
 from .rendering.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom

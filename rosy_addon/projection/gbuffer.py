@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
 from .field_channel import FieldChannel
+from .pixel_blocks import pixel_blocks
 from .surface_tone import SurfaceTone
 
 
@@ -39,10 +41,14 @@ class MeshInstance:
     tone: SurfaceTone | None = None
     color_values: np.ndarray | None = None
 
+    def to_world(self, points: np.ndarray) -> np.ndarray:
+        """Return (..., 3) points of object space in world space."""
+        matrix = np.asarray(self.matrix, dtype=np.float64)
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
+
     def world_points(self) -> np.ndarray:
         """Return the (V, 3) float64 vertices in world space."""
-        matrix = np.asarray(self.matrix, dtype=np.float64)
-        return self.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        return self.to_world(self.surface.vertices)
 
     def face_points(self) -> np.ndarray:
         """Return the (n, 3) float64 vertices that have a face, in world space."""
@@ -81,8 +87,8 @@ class PixelSamples(NamedTuple):
         The samples that show the triangle of the entry: bit ``row * S + column``.
     other : (E,) int32 ndarray
         The samples that show another triangle, as flat indices into the frame of all samples.
-    other_instance, other_triangle : (E,) int32 ndarray
-        That triangle, and its mesh instance.
+    other_triangle : (E,) int32 ndarray
+        That triangle, counted over all mesh instances.
     other_entry : (E,) int32 ndarray
         The entry whose surface they show: that of their own pixel, or of one beside it.
     """
@@ -90,7 +96,6 @@ class PixelSamples(NamedTuple):
     side: int
     own: np.ndarray
     other: np.ndarray
-    other_instance: np.ndarray
     other_triangle: np.ndarray
     other_entry: np.ndarray
 
@@ -181,3 +186,26 @@ class GBuffer:
         }
         channels = {channel: values[extent] for channel, values in self.channels.items()}
         return replace(self, **arrays, channels=channels, coverage=None, samples=None)
+
+    def instance_blocks(
+        self,
+    ) -> Iterator[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
+        """Yield the visible mesh instances in their order, with their pixels.
+
+        Yields
+        ------
+        instance_id : int
+        blocks : list of slice or of (n,) intp ndarray
+            Blocks of its pixels; see `pixel_blocks`.
+        progress : (float, float)
+            The fractions of all pixels that are those of instances before it, and of these and its own.
+        """
+        counts = np.bincount(self.instance_id)
+        ends = np.cumsum(counts) / len(self.pixel)
+        for instance_id in np.flatnonzero(counts).tolist():
+            blocks: list[slice | np.ndarray] = [*pixel_blocks(counts[instance_id])]
+            if counts[instance_id] < len(self.pixel):
+                pixels = np.flatnonzero(self.instance_id == instance_id)
+                blocks = [pixels[block] for block in blocks]
+            start = ends[instance_id - 1] if instance_id else 0.0
+            yield instance_id, blocks, (start, ends[instance_id])

@@ -11,7 +11,7 @@ from ..cache import Cache, content_hash
 from ..field.creases import find_creases
 from ..field.surface import Surface, connected_components
 from ..progress import progress, report
-from .face_values import SIMILARITY_EPS
+from .face_values import similarity_scale
 
 
 class OutlineMesh(NamedTuple):
@@ -57,7 +57,7 @@ def outline_mesh(surface: Surface, matrix: np.ndarray, crease_angle: float | Non
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
         shape, linear = surface.in_rest_shape(), np.asarray(matrix, dtype=np.float64)[:3, :3]
-        if not _is_similarity(linear):
+        if similarity_scale(linear) is None:
             shape = shape.with_vertices(shape.vertices @ linear.T)
         with progress(0.0, 0.6):
             ends = find_creases(shape, crease_angle).ends
@@ -79,17 +79,10 @@ def cached_outline_mesh(
     if cache is None:
         return outline_mesh(surface, matrix, crease_angle)
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    if _is_similarity(linear):
+    if similarity_scale(linear) is not None:
         linear = np.eye(3)
     shape_key = surface.rest_shape_key, content_hash(surface.corner_fan)
     return cache.get_or_create(
         ("outline mesh", *shape_key, linear.tobytes(), crease_angle),
         partial(outline_mesh, surface, linear, crease_angle),
     )
-
-
-def _is_similarity(linear: np.ndarray) -> bool:
-    """Return whether a matrix keeps all angles."""
-    gram = linear.T @ linear
-    scale = np.trace(gram) / 3
-    return bool(np.abs(gram - scale * np.eye(3)).max() <= SIMILARITY_EPS * scale)

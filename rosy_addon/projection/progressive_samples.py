@@ -101,7 +101,7 @@ def progressive_samples(
     rank : (P,) float64 ndarray
         The points up to a rank are an even sample of the surface. In points per square unit.
     """
-    clip, triangles, _ = all_triangles([instance], camera)
+    clip, triangles = all_triangles([instance], camera)
     shuffle = _random_bits(len(triangles))
     offset = _random_offsets(shuffle)
     index, of_piece = [], []

@@ -14,7 +14,6 @@ from ..field.surface import Surface, box_corners
 from ..progress import report
 from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
-from .pixel_blocks import pixel_blocks
 
 #: Label of the progress.
 LABEL = "finding points on the surface"
@@ -97,21 +96,13 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
         rest_corners=tuple(np.empty((3, count), dtype=np.float32) for _ in range(3)),
         pixel_size=np.empty(count, dtype=np.float32),
     )
-    done = 0
-    present = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
-    for instance_id in present:
+    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
         screen = _screen_vertices(gbuffer.camera, instance)
-        pixels = None
-        if len(present) > 1:
-            pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
-        instance_count = count if pixels is None else len(pixels)
-        for block in pixel_blocks(instance_count):
-            report((done + block.start) / count, LABEL)
-            part = block if pixels is None else pixels[block]
-            _fill_pixels(coordinates, gbuffer, instance, rest, screen, part)
-        done += instance_count
+        for number, block in enumerate(blocks):
+            report(start + (stop - start) * number / len(blocks), LABEL)
+            _fill_pixels(coordinates, gbuffer, instance, rest, screen, block)
     return coordinates
 
 
@@ -126,7 +117,7 @@ def rest_positions(surface: Surface) -> np.ndarray:
         In object space. If the mesh is farther than `FAR_RATIO` times its size from the origin,
         relative to a point at the mesh.
     """
-    rest = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    rest = surface.in_rest_shape().vertices
     corners = box_corners(rest[surface.used_vertices])
     size = np.ptp(corners, axis=0).max()
     if np.abs(corners).max() <= FAR_RATIO * size:

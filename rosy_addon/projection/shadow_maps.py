@@ -149,7 +149,7 @@ def _point_cameras(
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
     """(H, W) float32 depth of the nearest surface along the camera axis; inf if there is none."""
-    fragments, _ = rasterize_instances(instances, camera)
+    fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
     m_z, m_w = camera.projection[2, 2:]
     if camera.is_perspective:

@@ -21,9 +21,8 @@ from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_patte
 from ..field.surface import Surface, build_surface
 from ..memory import check_memory
 from ..progress import progress, report
-from .corner_field import CornerField, field_at_corners
-from .face_values import SIMILARITY_EPS
-from .fan_values import transport_phase
+from .corner_field import CornerField, field_at_corners, transport_phase
+from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import rotation_order
 from .rest_coordinates import matrix_scale
 from .vector_components import tangent_frame_components
@@ -66,11 +65,9 @@ def rest_matrix(matrix: np.ndarray) -> np.ndarray:
     turns keeps its lines.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    gram = linear.T @ linear
-    squared_scale = np.trace(gram) / 3
-    if np.abs(gram - squared_scale * np.eye(3)).max() <= 4 * SIMILARITY_EPS * squared_scale:
+    if similarity_scale(linear, 4 * SIMILARITY_EPS) is not None:
         return np.eye(3) * matrix_scale(matrix)
-    values, axes = np.linalg.eigh(gram)
+    values, axes = np.linalg.eigh(linear.T @ linear)
     return (axes * np.sqrt(np.maximum(values, 0))) @ axes.T
 
 

@@ -166,7 +166,7 @@ class _Scene:
         cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
     ) -> _Scene:
         """Return the scene of some instances, all of which hide points."""
-        clip, triangles, _ = all_triangles(instances, camera)
+        clip, triangles = all_triangles(instances, camera)
         world = np.concatenate([instance.world_points() for instance in instances])
         return cls(clip, world, triangles, camera, clip_planes)
 

@@ -20,9 +20,8 @@ from ..errors import NothingInViewError, RosyError
 from ..progress import progress
 from ..projection.project import cached_project, check_instances, project, raise_nothing_in_view
 from ..worker.pool import POOL, core_count
-from .arrowheads import with_arrowheads
+from .marks import with_marks
 from .picture_memory import check_picture_memory
-from .singularities import with_singularities
 from .view_input import ViewInput
 
 #: Share of the progress bar that projecting takes.
@@ -61,10 +60,8 @@ def draw_picture(
     """
     with progress(0.0, 0.97):
         picture = _draw_fields(view, cache, cache if keep_gbuffers else None, workers)
-    with progress(0.97, 0.99):
-        picture = with_arrowheads(picture, view, cache)
-    with progress(0.99, 1.0):
-        return with_singularities(picture, view, cache)
+    with progress(0.97, 1.0):
+        return with_marks(picture, view, cache)
 
 
 def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) -> Picture:
@@ -87,19 +84,17 @@ def _draw_fields(
     check_instances(view.instances, view.sample_camera, view.look.display)
     workers = workers or core_count()
     groups = picture_groups(view, workers)
-    while workers > 1:  # fewer processes need less memory
+    while True:
         try:
             check_picture_memory(view, groups, workers)
             break
         except RosyError:
-            workers -= 1
-    try:
-        check_picture_memory(view, groups, workers)
-    except RosyError:
-        if not cache:
-            raise
-        cache.clear()
-        check_picture_memory(view, groups, workers)
+            if workers > 1:  # fewer processes need less memory
+                workers -= 1
+            elif cache:
+                cache.clear()
+            else:
+                raise
     if len(groups) == 1:
         return _draw_strips(view, groups[0], cache, gbuffer_cache)
     draw_here = partial(draw_rows, cache=Cache() if cache is None else cache)
@@ -153,17 +148,16 @@ def _draw_strips(
 ) -> Picture:
     """Draw neighboring strips of a picture."""
     camera, look = view.shaded_camera, view.look
-    arguments = view.instances, camera, look.display
-    whole = _whole(strips)
+    scene = view.instances, camera, look.display
+    whole, rows = _whole(strips), None
+    if (whole.start, whole.stop) != (0, camera.height):
+        context = context_rows(look, camera, view.instances)
+        rows = max(whole.start - context, 0), min(whole.stop + context, camera.height)
     with progress(0.0, PROJECTION_SHARE):
-        if (whole.start, whole.stop) != (0, camera.height):
-            context = context_rows(look, camera, view.instances)
-            rows = max(whole.start - context, 0), min(whole.stop + context, camera.height)
-            gbuffer = project(*arguments, cache, view.samples_per_side, rows)
-        elif gbuffer_cache is None:
-            gbuffer = project(*arguments, cache, view.samples_per_side)
+        if rows is None and gbuffer_cache is not None:
+            gbuffer = cached_project(*scene, gbuffer_cache, view.samples_per_side)
         else:
-            gbuffer = cached_project(*arguments, gbuffer_cache, view.samples_per_side)
+            gbuffer = project(*scene, cache, view.samples_per_side, rows)
     with progress(PROJECTION_SHARE, 1.0):
         return compose(
             gbuffer,

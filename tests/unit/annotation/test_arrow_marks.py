@@ -171,7 +171,7 @@ def test_undefined_faces_have_no_arrowheads():
 def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
     instance = instance_of(torus(96, 48), 1)
     marks = [
-        arrows([instance], orbit_camera(instance.surface, azimuth, 40, 480, 400))
+        arrows([instance], orbit_camera(instance.surface.vertices, azimuth, 40, 480, 400))
         for azimuth in (20.0, 20.0, 20.5)
     ]
     np.testing.assert_array_equal(marks[0].position, marks[1].position)

@@ -112,8 +112,7 @@ def _with_level(
     distance = np.concatenate([places.distance, np.full(len(triangle), finest)])
     triangle = np.concatenate([places.triangle, triangle])
     barycentric = np.concatenate([places.barycentric, barycentric])
-    vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
-    corners = vertices[surface.triangle_vertex[triangle]]
+    corners = surface.in_rest_shape().vertices[surface.triangle_vertex[triangle]]
     chosen = spaced_points(np.einsum("nk,nki->ni", barycentric, corners), finest)
     return SurfacePlaces(
         triangle[chosen], barycentric[chosen], distance[chosen], level, places.extent

@@ -16,7 +16,6 @@ from .shadow_maps import (
     render_depth_map,
     sun_camera,
     visibility_from,
-    world_bounds,
 )
 from .vector_components import cofactor_matrix
 
@@ -62,8 +61,8 @@ def ambient_occlusion(
     if direction_count < 1:
         raise RosyError(f"{direction_count} directions of light: choose 1 or more")
     instance = instances[instance_id]
-    receiver_points = world_bounds(instance)
-    caster_points = np.concatenate([world_bounds(caster) for caster in instances])
+    receiver_points = instance.world_bounds()
+    caster_points = np.concatenate([caster.world_bounds() for caster in instances])
     pixel_size = float(np.ptp(receiver_points, axis=0).max()) / resolution
     points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
     visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
@@ -98,14 +97,12 @@ def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np
 
     Both are in world space. `inset` is a distance in world units; `MAX_INSET_FRACTION` limits it.
     """
-    surface, matrix = instance.surface, np.asarray(instance.matrix, dtype=np.float64)
-    linear, translation = matrix[:3, :3], matrix[:3, 3]
-    vertex, center = _fan_positions(surface)
-    position, center = vertex @ linear.T + translation, center @ linear.T + translation
+    linear = np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+    position, center = map(instance.to_world, _fan_positions(instance.surface))
     offset = center - position
     length = np.sqrt(dot(offset, offset))
     fraction = np.minimum(MAX_INSET_FRACTION, inset / np.maximum(length, 1e-30))
-    normals = normalize(surface.fan_normal @ cofactor_matrix(linear).T)
+    normals = normalize(instance.surface.fan_normal @ cofactor_matrix(linear).T)
     return position + fraction[:, None] * offset, normals
 
 

@@ -106,6 +106,10 @@ class Camera:
             return np.broadcast_to(self.view[2, :3], points.shape)
         return normalize(self.eye - points)
 
+    def depths(self, points: np.ndarray) -> np.ndarray:
+        """Return the (...) distances of (..., 3) points in world space along the axis of this camera."""
+        return -(points @ self.view[2, :3] + self.view[2, 3])
+
     def resized(self, width: int, height: int) -> Camera:
         """Return the same camera with another picture size in pixels."""
         return Camera(self.view, self.projection, width, height, self.name)

@@ -50,6 +50,18 @@ class MeshInstance:
         """Return the (V, 3) float64 vertices in world space."""
         return self.to_world(self.surface.vertices)
 
+    def world_bounds(self) -> np.ndarray:
+        """Return the (8, 3) corners of the bounding box in world space.
+
+        The box is aligned to the axes of object space.
+        """
+        return self.to_world(self.surface.box_corners)
+
+    def points_in_triangles(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Return (n, 3) points in world space, given (n,) triangles and (n, 3) coordinates in them."""
+        corners = self.to_world(self.surface.vertices[self.surface.triangle_vertex[triangle]])
+        return np.einsum("nk,nki->ni", barycentric, corners)
+
     def face_points(self) -> np.ndarray:
         """Return the (n, 3) float64 vertices that have a face, in world space."""
         return self.world_points()[self.surface.used_vertices]

@@ -227,7 +227,7 @@ def matrix_scale(instance: MeshInstance) -> float:
 
 def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:
     """Return the (n,) areas of triangles, by default of all, before they deform."""
-    vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    vertices = surface.in_rest_shape().vertices
     corners = surface.triangle_vertex if triangle is None else surface.triangle_vertex[triangle]
     a, b, c = (np.ascontiguousarray(vertices[corner].T) for corner in corners.T)
     (x, y, z), (u, v, w) = b - a, c - a

@@ -135,7 +135,7 @@ def project_samples(
     side = pixel_samples.side
     camera = gbuffer.camera.scaled(side)
     width = np.int32(gbuffer.camera.width)
-    first_triangle = _first_triangles(instances)
+    first_triangle = first_triangles(instances)
     # The samples, the entries of `gbuffer`, and the triangles, counted over all instances.
     columns = []
     row, column = np.divmod(gbuffer.pixel[entries], width)
@@ -201,7 +201,7 @@ def surface_points(
     """
     report(0.0, "finding directions")
     clip, triangles = all_triangles(instances, camera)
-    triangle = points.triangle + _first_triangles(instances)[points.instance_id]
+    triangle = points.triangle + first_triangles(instances)[points.instance_id]
     corners = clip[triangles[triangle]]
     a, b, c = np.moveaxis(corners[..., (0, 1, 3)], 1, 0)
     front_facing = (a * np.cross(b, c)).sum(axis=1) > 0
@@ -330,7 +330,7 @@ def _triangles_with_field(instances: Sequence[MeshInstance]) -> np.ndarray:
     )
 
 
-def _first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
+def first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
     """(B,) int32: the first triangle of each instance, counted over all instances."""
     counts = [len(instance.surface.triangles) for instance in instances]
     return np.cumsum([0, *counts[:-1]]).astype(np.int32)
@@ -342,7 +342,7 @@ def _split_triangles(
     """Return the instances of (n,) triangles, and the triangles counted within them, as int32."""
     if len(instances) == 1:
         return np.zeros(len(triangle), dtype=np.int32), triangle
-    first_triangle = _first_triangles(instances)
+    first_triangle = first_triangles(instances)
     instance_id = np.empty(len(triangle), dtype=np.int32)
     for block in pixel_blocks(len(triangle)):
         instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1

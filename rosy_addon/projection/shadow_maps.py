@@ -65,9 +65,9 @@ def light_cameras(
         One camera, or six in all directions for a point light near or among the receivers.
     """
     camera_to_world = camera.view[:3, :3].T
-    caster_points = np.concatenate([world_bounds(instance) for instance in instances])
+    caster_points = np.concatenate([instance.world_bounds() for instance in instances])
     receiver_points = np.concatenate(
-        [world_bounds(instance) for instance in instances if instance.field is not None]
+        [instance.world_bounds() for instance in instances if instance.field is not None]
     )
     vector = np.asarray(vector, dtype=np.float64)
     if kind == "sun":
@@ -75,15 +75,6 @@ def light_cameras(
     return _point_cameras(
         camera_to_world @ (vector - camera.view[:3, 3]), caster_points, receiver_points, resolution
     )
-
-
-def world_bounds(instance: MeshInstance) -> np.ndarray:
-    """Return the (8, 3) corners of an instance's bounding box, in world space.
-
-    The box is aligned to the axes of object space.
-    """
-    matrix = np.asarray(instance.matrix, dtype=np.float64)
-    return instance.surface.box_corners @ matrix[:3, :3].T + matrix[:3, 3]
 
 
 def sun_camera(
@@ -129,20 +120,20 @@ def _point_cameras(
     radius = float(np.linalg.norm(receiver_points - center, axis=1).max())
     distance = float(np.linalg.norm(center - light_position))
     far = float(np.linalg.norm(caster_points - light_position, axis=1).max()) * 1.01 + 1e-9
-    clip = (1e-3 * far, far)
-    if distance > SINGLE_VIEW_MIN_RADII * radius:
-        up = np.eye(3)[np.argmin(np.abs(center - light_position))]
-        fov = 2 * np.arcsin(radius / distance) * (1 + 4 * NORMAL_BIAS_PIXELS / resolution)
-        view = look_at(light_position, center, up)
-        return [perspective_camera(view, resolution, resolution, fov=fov, clip=clip, name="lamp")]
+    fov = np.pi / 2
     views = [
         look_at(light_position, light_position + sign * np.eye(3)[axis], np.eye(3)[axis - 2])
         for axis in range(3)
         for sign in (1, -1)
     ]
-    fov = np.pi / 2
+    if distance > SINGLE_VIEW_MIN_RADII * radius:
+        up = np.eye(3)[np.argmin(np.abs(center - light_position))]
+        fov = 2 * np.arcsin(radius / distance) * (1 + 4 * NORMAL_BIAS_PIXELS / resolution)
+        views = [look_at(light_position, center, up)]
     return [
-        perspective_camera(view, resolution, resolution, fov=fov, clip=clip, name="lamp")
+        perspective_camera(
+            view, resolution, resolution, fov=fov, clip=(1e-3 * far, far), name="lamp"
+        )
         for view in views
     ]
 

@@ -21,13 +21,13 @@ from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.pixel_blocks import pixel_blocks
-from ..projection.pixel_neighbors import affine_depth, neighbor_masks
+from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
 from ..projection.project import project_samples
 from .look import Look
 from .look_units import supersampled_look
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
-#: `pixel_neighbors.affine_depth`).
+#: `pixel_neighbors.depth_slopes`).
 DEPTH_JUMP = 2.0
 
 #: Minimum depth difference at a step, in multiples of the depth tolerance, and relative to the changes
@@ -184,7 +184,7 @@ def _find_edges(gbuffer: GBuffer, look: Look, cache: Cache | None) -> _Edges:
     depth, tolerance = np.empty((2, len(cell)), dtype=np.float32)
     for block in pixel_blocks(len(cell)):
         report(0.1 + 0.1 * block.start / len(cell), STEP_LABEL)
-        depth[block], tolerance[block] = affine_depth(gbuffer.part(block))
+        depth[block], _, _, tolerance[block] = depth_slopes(gbuffer, block)
     with progress(0.2, 0.6, STEP_LABEL):
         mask = neighbor_masks(gbuffer, look.crease_angle, True)
     line_width = np.zeros(len(cell), dtype=np.float32)
@@ -260,7 +260,7 @@ class _Edges(NamedTuple):
     ----------
     grid : _CellGrid
     depth, tolerance : (P,) float32 ndarray
-        From `pixel_neighbors.affine_depth`.
+        From `pixel_neighbors.depth_slopes`.
     line_width : (P,) float32 ndarray
         Largest width of lines that begin at a pixel; 0 where there is no edge.
     border : (P,) uint8 ndarray

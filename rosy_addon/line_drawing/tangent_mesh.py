@@ -283,7 +283,7 @@ def build_tangent_mesh(
             f"{counted(surface.face_count, 'face')}"
         )
     with progress(0.0, 0.3):
-        corner_field = cached_corner_field(surface, instance.matrix, field, display, cache)
+        corner_field = cached_corner_field(instance, display, cache)
     label = "preparing the surface"
     report(0.3, label)
     matrix = np.asarray(instance.matrix, dtype=np.float64)

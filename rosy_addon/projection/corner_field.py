@@ -29,6 +29,7 @@ from ..field.surface import Surface
 from ..progress import report
 from .face_values import TangentValues, face_values
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
+from .gbuffer import MeshInstance
 from .vector_components import (
     BLOCK_SIZE,
     VectorComponents,
@@ -145,19 +146,18 @@ def field_at_corners(
 
 
 def cached_corner_field(
-    surface: Surface, matrix: np.ndarray, field: RosyField, display: str, cache: Cache | None = None
+    instance: MeshInstance, display: str, cache: Cache | None = None
 ) -> CornerField:
-    """Do the same as `field_at_corners`, with results stored in a cache if one is given.
+    """Return `field_at_corners` of an instance with a field, stored in a cache if one is given.
 
     All cameras, and instances that differ only in their location, share one corner field.
     """
+    surface, field = instance.surface, instance.field
+    create = partial(field_at_corners, surface, instance.matrix, field, display)
     if cache is None:
-        return field_at_corners(surface, matrix, field, display)
-    linear = np.ascontiguousarray(np.asarray(matrix, dtype=np.float64)[:3, :3])
-    return cache.get_or_create(
-        ("corner field", surface, field, linear.tobytes(), display),
-        partial(field_at_corners, surface, matrix, field, display),
-    )
+        return create()
+    linear = np.ascontiguousarray(np.asarray(instance.matrix, dtype=np.float64)[:3, :3])
+    return cache.get_or_create(("corner field", surface, field, linear.tobytes(), display), create)
 
 
 def _fan_values(

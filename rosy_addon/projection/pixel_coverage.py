@@ -35,7 +35,7 @@ class _OtherSamples(NamedTuple):
     x, y : (E,) float32 ndarray
         Position in pixels.
     depth : (E,) float32 ndarray
-        Linear on screen for planes, as of `pixel_neighbors.affine_depth`.
+        Linear on screen for planes, as of `pixel_neighbors.depth_slopes`.
     instance_id : (E,) int32 ndarray
         Mesh instance of the visible triangle.
     normal : (3, E) float32 ndarray

@@ -128,23 +128,6 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
     return masks
 
 
-def affine_depth(gbuffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
-    """Return the depth of pixels in the quantity that `neighbor_masks` uses, and its tolerance.
-
-    Parameters
-    ----------
-    gbuffer : GBuffer
-
-    Returns
-    -------
-    depth, tolerance : (P,) float32 ndarray
-        Depth: z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
-        Tolerance: permitted deviation from the prediction of the tangent plane, one pixel away.
-    """
-    depth, _, _, tolerance = depth_slopes(gbuffer, slice(None))
-    return depth, tolerance
-
-
 class _PixelGrid(NamedTuple):
     """Some rows of the frame as 2D arrays, limited to the columns that the G-buffer covers.
 
@@ -211,15 +194,15 @@ def depth_slopes(
 
     Returns
     -------
-    depth, slope_x, slope_y, tolerance : (n,) float32 ndarray
-        Depth and tolerance as of `affine_depth`. The slopes are the changes of the depth to the next
-        column and to the next row, on the tangent plane.
+    depth : (n,) float32 ndarray
+        z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
+    slope_x, slope_y : (n,) float32 ndarray
+        Changes of the depth to the next column and to the next row, on the tangent plane.
+    tolerance : (n,) float32 ndarray
+        Permitted deviation from the prediction of the tangent plane, one pixel away.
     """
-    camera, normal, z = (
-        gbuffer.camera,
-        gbuffer.geometric_normal[pixels].T,
-        gbuffer.position[pixels, 2],
-    )
+    camera, z = gbuffer.camera, gbuffer.position[pixels, 2]
+    normal = gbuffer.geometric_normal[pixels].T
     pixel_to_camera = (camera.clip_to_camera_xy * (2.0 / camera.width, 2.0 / camera.height)).astype(
         np.float32
     )

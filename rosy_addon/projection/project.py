@@ -221,9 +221,7 @@ def surface_points(
         chosen = np.flatnonzero(points.instance_id == instance_id)
         instance = instances[instance_id]
         with progress(0.1, 1.0):
-            corner_field = cached_corner_field(
-                instance.surface, instance.matrix, instance.field, display, cache
-            )
+            corner_field = cached_corner_field(instance, display, cache)
         corner_field = corner_field.part(points.triangle[chosen]).rotated(camera.view[:3, :3])
         _fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field, instance.field.degree)
     return gbuffer
@@ -477,9 +475,7 @@ def _fill_instances(gbuffer: GBuffer, display: str, cache: Cache | None) -> dict
     for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
         instance, middle = gbuffer.instances[instance_id], (start + stop) / 2
         with progress(start, middle):
-            corner_field = cached_corner_field(
-                instance.surface, instance.matrix, instance.field, display, cache
-            )
+            corner_field = cached_corner_field(instance, display, cache)
         corner_field = corner_field.rotated(gbuffer.camera.view[:3, :3])
         geometric_normals[instance_id] = corner_field.geometric_normal
         for number, block in enumerate(blocks):

@@ -23,8 +23,7 @@ from ..projection.progressive_samples import matrix_scale, progressive_samples
 from ..projection.project import surface_points
 from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points
-from .even_spacing import spaced_points
-from .surface_places import surface_places
+from .surface_places import spaced_points, surface_places
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -86,12 +85,7 @@ class ArrowMarks:
     @property
     def outline(self) -> float:
         """Width of their outlines, pixels."""
-        return outline_width(self.size)
-
-
-def outline_width(size: float) -> float:
-    """Return the width of the outlines of arrowheads of a length, pixels."""
-    return max(OUTLINE * size, MIN_OUTLINE)
+        return max(OUTLINE * self.size, MIN_OUTLINE)
 
 
 def has_arrows(instance: MeshInstance) -> bool:

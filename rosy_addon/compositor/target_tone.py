@@ -13,9 +13,9 @@ from ..errors import RosyError
 from ..progress import report
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
-from ..projection.mip_map import MipMap
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import surface_tones
+from ..projection.surface_tone import MipMap
 from .look import Look
 from .shading import Light, diffuse, light_visibility
 

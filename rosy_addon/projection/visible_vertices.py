@@ -16,7 +16,6 @@ import numpy as np
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..progress import report
 from .camera import Camera
-from .clip_planes import is_cut_away
 from .gbuffer import MeshInstance
 from .project import all_triangles, first_triangles
 from .surface_points import SurfacePoints
@@ -296,3 +295,21 @@ class _Scene:
 def _grid_rows(y: np.ndarray, row_count: int) -> np.ndarray:
     """Return the rows of (n,) heights from -1 to 1, of a grid of so many rows."""
     return np.clip((0.5 * (y + 1) * row_count).astype(np.intp), 0, row_count - 1)
+
+
+def is_cut_away(points: np.ndarray, clip_planes: np.ndarray | None) -> np.ndarray:
+    """Return which points are on the negative side of a plane.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    clip_planes : (6, 4) ndarray or None
+        In the space of the points. None cuts nothing away.
+
+    Returns
+    -------
+    (n,) bool ndarray
+    """
+    if clip_planes is None:
+        return np.zeros(len(points), dtype=bool)
+    return ((points @ clip_planes[:, :3].T + clip_planes[:, 3]) < 0).any(axis=1)

@@ -16,8 +16,7 @@ from rosy_addon.annotation.arrow_marks import (
     arrow_marks,
 )
 from rosy_addon.annotation.draw_arrows import draw_arrows
-from rosy_addon.annotation.even_spacing import spaced_points
-from rosy_addon.annotation.surface_places import surface_places
+from rosy_addon.annotation.surface_places import spaced_points, surface_places
 from rosy_addon.cache import Cache
 from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.look import Look

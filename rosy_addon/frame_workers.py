@@ -56,16 +56,14 @@ def parse_frames(text: str) -> Sequence[int]:
 def _parse_range(part: str, text: str) -> range:
     """Parse one ``A``, ``A-B`` or ``A-B:STEP``; `text` is the whole option, for the message."""
     match = re.fullmatch(r"(?a)(-?\d{1,7})(?:-(-?\d{1,7}))?(?::(\d{1,7}))?", part)
-    first = int(match[1]) if match else 0
-    last = int(match[2]) if match and match[2] else first
-    step = int(match[3]) if match and match[3] else 1
-    in_range = -MAX_FRAME <= first <= last <= MAX_FRAME
-    if match is None or not in_range or not step:
-        raise RosyError(
-            f"frames {reprlib.repr(text)}: expected A, A-B or A-B:STEP, such as 1-250 or 1-250:10, "
-            f"with B from A to {MAX_FRAME}"
-        )
-    return range(first, last + 1, step)
+    if match:
+        first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+        if -MAX_FRAME <= first <= last <= MAX_FRAME and step:
+            return range(first, last + 1, step)
+    raise RosyError(
+        f"frames {reprlib.repr(text)}: expected A, A-B or A-B:STEP, such as 1-250 or 1-250:10, "
+        f"with B from A to {MAX_FRAME}"
+    )
 
 
 def run_local(command: Sequence[str], frames: Sequence[int], process_count: int) -> Iterator[str]:

@@ -190,7 +190,11 @@ def video_steps(
         for index, view in enumerate(views):
             width, height = view.camera.width, view.camera.height
             if is_gif(path) and not index:
-                check_gif_memory(count, width, height)
+                check_memory(
+                    GIF_BYTES * count * width * height,
+                    f"a .gif of {count} pictures of {width} x {height} pixels",
+                    "choose a smaller size or fewer pictures, or write an .mp4",
+                )
             start, stop = (ENCODING_START * done / count for done in (index, index + 1))
             frame = yield from part(draw(view), start, stop, f"picture {index + 1} of {count}")
             if is_gif(path):
@@ -209,15 +213,6 @@ def video_steps(
 def is_gif(path: Path) -> bool:
     """Return whether a video is a .gif."""
     return path.suffix.lower() == ".gif"
-
-
-def check_gif_memory(count: int, width: int, height: int) -> None:
-    """Raise a `RosyError` if a .gif of a number of pictures needs more than `available_memory`."""
-    check_memory(
-        GIF_BYTES * count * width * height,
-        f"a .gif of {count} pictures of {width} x {height} pixels",
-        "choose a smaller size or fewer pictures, or write an .mp4",
-    )
 
 
 def draw_frame(view: ViewInput, as_gif: bool, keep_gbuffers: bool, workers: int) -> Any:
@@ -252,17 +247,11 @@ def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
         Display values for a .gif, with the top row first. Otherwise a PNG file. An .mp4 needs even sides, so
         it lacks the last row or column of an odd one.
     """
-    if as_gif:
-        return np.rint(to_display(_over_white(rgba)[::-1]) * 255).astype(np.uint8)
-    rgba = rgba[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2]
     opaque = np.ones_like(rgba)
-    opaque[..., :3] = _over_white(rgba)
-    return png_bytes(opaque)
-
-
-def _over_white(rgba: np.ndarray) -> np.ndarray:
-    """Return a picture on white paper as (H, W, 3) float32, linear."""
-    return 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
+    opaque[..., :3] = 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
+    if as_gif:
+        return np.rint(to_display(opaque[::-1, :, :3]) * 255).astype(np.uint8)
+    return png_bytes(opaque[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2])
 
 
 def _swept_hull(points: np.ndarray) -> np.ndarray:

@@ -166,7 +166,7 @@ def _places_in_order(
 
     The places do not depend on the view. The points are where the view is so near that it needs more.
     """
-    parts = [SurfacePoints(np.empty(0, np.int32), np.empty(0, np.int32), np.empty((0, 3)))]
+    parts = [SurfacePoints.of(0, np.empty(0, np.int32), np.empty((0, 3)))]
     # Places come first, those with the largest distances before others; then points by their ranks.
     is_between, keys = [np.empty(0, dtype=bool)], [np.empty(0)]
     for number, instance in enumerate(instances):
@@ -175,9 +175,7 @@ def _places_in_order(
             continue
         smallest = NEAREST_PLACES * spacing * _smallest_pixel(instance, camera) / scale
         places = surface_places(instance.surface, smallest, cache)
-        points = SurfacePoints(
-            np.full(len(places.triangle), number, np.int32), places.triangle, places.barycentric
-        )
+        points = SurfacePoints.of(number, places.triangle, places.barycentric)
         needed = _needed_distances(instance, camera, points, spacing)
         kept = np.flatnonzero(places.distance * scale >= needed)
         parts.append(points.part(kept))
@@ -185,10 +183,11 @@ def _places_in_order(
         keys.append(-places.distance[kept] * scale)
         if places.finest <= smallest:
             continue
-        points, rank = progressive_samples(instance, camera, spacing)
+        *samples, rank = progressive_samples(instance, camera, spacing)
+        points = SurfacePoints.of(number, *samples)
         needed = _needed_distances(instance, camera, points, spacing)
         kept = np.flatnonzero(needed < places.finest * scale)
-        parts.append(points._replace(instance_id=points.instance_id + np.int32(number)).part(kept))
+        parts.append(points.part(kept))
         is_between.append(np.ones(len(kept), dtype=bool))
         keys.append(rank[kept])
     order = np.lexsort([np.concatenate(keys), np.concatenate(is_between)])

@@ -92,13 +92,13 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     """
     process_count = max(min(process_count, len(frames)), 1)
     workers: list[_Worker] = []
-    stack = ExitStack()
-    folder = Path(stack.enter_context(GuardedFolder()))
-    try:
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(GuardedFolder()))
         for index in range(process_count):
-            log = folder / f"{index}.log"
-            workers.append(_Worker(command, frames[index::process_count], log))
-            stack.enter_context(Guarded(workers[-1].process))
+            worker = _Worker(command, frames[index::process_count], folder / f"{index}.log")
+            workers.append(worker)
+            stack.enter_context(Guarded(worker.process))
+            stack.callback(worker.stop)
         running = list(workers)
         while running:
             # A process that has ended prints no more, so what it printed is read after that.
@@ -107,10 +107,6 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
                 yield from worker.new_lines()
             running = [worker for worker in running if worker not in ended]
             time.sleep(POLL_SECONDS if running else 0.0)
-    finally:
-        for worker in workers:
-            worker.stop()
-        stack.close()
     failures = [
         f"frames {format_frames(worker.frames)}: {error_line(worker.lines)}"
         for worker in workers

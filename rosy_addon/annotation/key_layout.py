@@ -215,8 +215,7 @@ class _Arrangement:
 
     def _fits(self) -> bool:
         """Whether all plates are inside the frame, and apart."""
-        low = np.array([plate[:2] for plate in self.result.plates]).reshape(-1, 2)
-        high = np.array([plate[2:] for plate in self.result.plates]).reshape(-1, 2)
+        low, high = np.array(self.result.plates).reshape(-1, 2, 2).transpose(1, 0, 2)
         meets = ((low[:, None] < high[None]) & (high[:, None] > low[None])).all(axis=2)
         return bool((low >= 0).all() and (high <= self.frame).all()) and meets.sum() == len(low)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..field.directional_field import field_harmonics
 from ..field.frames import dot_components, transform_components
-from ..field.representation import power, signed_power
+from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
@@ -105,10 +105,10 @@ def face_values(
         rho = np.abs(member)
         member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)
-        faces.channels[REPRESENTATION][block] = power(member, field.degree) * (rho * has_area)
-        for channel, values in relative_channels.items():
+        for channel, out in faces.channels.items():
             rotation = signed_power(member, rotation_order(channel, field.degree))
-            faces.channels[channel][block] = values[block] * rotation * has_area
+            values = rho if channel == REPRESENTATION else relative_channels[channel][block]
+            out[block] = values * rotation * has_area
         if with_angles:
             for corner, angle in enumerate(polygon_angles(points)):
                 corner_angle[first_corner + corner] = angle

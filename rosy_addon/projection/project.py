@@ -91,6 +91,8 @@ def project(
             fragments, sampled = _visible_samples(instances, camera, samples, rows)
         else:
             fragments = _visible_pixels(instances, camera, rows)
+    if not len(fragments.pixel):
+        raise_nothing_in_view(instances, camera)
     with progress(0.3, 0.4):
         gbuffer = _new_gbuffer(instances, camera, fragments)
     with progress(0.4, 1.0 if sampled is None else 0.9):
@@ -278,41 +280,25 @@ def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: 
 def _visible_pixels(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None
 ) -> Fragments:
-    """Find the pixels of some rows where the nearest surface has a field.
-
-    Raises
-    ------
-    NothingInViewError
-        If there is none.
-    """
+    """Find the pixels of some rows where the nearest surface has a field."""
     fragments = rasterize_instances(instances, camera, rows)
     has_field = _triangles_with_field(instances)
     if not has_field.all():
         kept = np.flatnonzero(has_field.take(fragments.triangle))
         fragments = Fragments(*(values[kept] for values in fragments))
-    if not len(fragments.pixel):
-        raise_nothing_in_view(instances, camera)
     return fragments
 
 
 def _visible_samples(
     instances: Sequence[MeshInstance], camera: Camera, samples: int, rows: tuple[int, int] | None
 ) -> tuple[Fragments, SampledTriangles]:
-    """Find what is visible at the center of each pixel, and the visible triangles at all samples.
-
-    Raises
-    ------
-    NothingInViewError
-        If no surface with a field is visible.
-    """
+    """Find what is visible at the center of each pixel, and the visible triangles at all samples."""
     clip, triangles = all_triangles(instances, camera)
     has_field = _triangles_with_field(instances)
     with progress(0.0, 0.8):
         sampled = rasterize_samples(
             clip, triangles, has_field, camera.width, camera.height, samples, rows
         )
-    if not len(sampled.pixel):
-        raise_nothing_in_view(instances, camera)
     pixel, triangle = sampled.pixel, sampled.triangle
     with progress(0.8, 1.0):
         weights, front_facing = barycentrics(

@@ -20,7 +20,7 @@ from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
 from .project import rasterize_instances
 
-#: Default width and height of a shadow map, in pixels.
+#: Width and height of the shadow maps of lights, in pixels.
 SHADOW_MAP_SIZE = 2048
 
 #: Width of the percentage-closer filter, in pixels of the shadow map.
@@ -43,7 +43,6 @@ def light_cameras(
     camera: Camera,
     kind: str,
     vector: np.ndarray,
-    resolution: int = SHADOW_MAP_SIZE,
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a light.
 
@@ -56,8 +55,6 @@ def light_cameras(
     kind : {"sun", "point"}
     vector : (3,) ndarray
         Camera space: the unit direction to a sun, or the position of a point light.
-    resolution : int
-        Width and height of each shadow map in pixels.
 
     Returns
     -------
@@ -71,10 +68,10 @@ def light_cameras(
     )
     vector = np.asarray(vector, dtype=np.float64)
     if kind == "sun":
-        return [sun_camera(camera_to_world @ vector, caster_points, receiver_points, resolution)]
-    return _point_cameras(
-        camera_to_world @ (vector - camera.view[:3, 3]), caster_points, receiver_points, resolution
-    )
+        direction = camera_to_world @ vector
+        return [sun_camera(direction, caster_points, receiver_points, SHADOW_MAP_SIZE)]
+    light_position = camera_to_world @ (vector - camera.view[:3, 3])
+    return _point_cameras(light_position, caster_points, receiver_points)
 
 
 def sun_camera(
@@ -110,10 +107,7 @@ def sun_camera(
 
 
 def _point_cameras(
-    light_position: np.ndarray,
-    caster_points: np.ndarray,
-    receiver_points: np.ndarray,
-    resolution: int,
+    light_position: np.ndarray, caster_points: np.ndarray, receiver_points: np.ndarray
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a point light, all arguments in world space."""
     center = (receiver_points.min(axis=0) + receiver_points.max(axis=0)) / 2
@@ -128,14 +122,10 @@ def _point_cameras(
     ]
     if distance > SINGLE_VIEW_MIN_RADII * radius:
         up = np.eye(3)[np.argmin(np.abs(center - light_position))]
-        fov = 2 * np.arcsin(radius / distance) * (1 + 4 * NORMAL_BIAS_PIXELS / resolution)
+        fov = 2 * np.arcsin(radius / distance) * (1 + 4 * NORMAL_BIAS_PIXELS / SHADOW_MAP_SIZE)
         views = [look_at(light_position, center, up)]
-    return [
-        perspective_camera(
-            view, resolution, resolution, fov=fov, clip=(1e-3 * far, far), name="lamp"
-        )
-        for view in views
-    ]
+    size, clip = SHADOW_MAP_SIZE, (1e-3 * far, far)
+    return [perspective_camera(view, size, size, fov=fov, clip=clip, name="lamp") for view in views]
 
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
@@ -208,11 +198,7 @@ def visibility_from(
     clip = position @ camera.projection[:3, :3].T + camera.projection[:3, 3]
     # Positive in front of the camera. Points behind it stay visible.
     axial_depth = -position[:, 2]
-    divisor = (
-        np.where(axial_depth > 0, axial_depth, 1.0)
-        if camera.is_perspective
-        else np.ones(len(position))
-    )
+    divisor = np.where(axial_depth > 0, axial_depth, 1.0) if camera.is_perspective else 1.0
     x, y = clip[:, 0] / divisor, clip[:, 1] / divisor
     in_frustum = np.flatnonzero((np.abs(x) <= 1) & (np.abs(y) <= 1) & (axial_depth > 0))
     visibility = np.ones(len(points), dtype=np.float32)

@@ -89,30 +89,15 @@ def cached_surface_lines(
     # Rounded, as rotated matrices have rounding errors.
     spacing = float(f"{spacing / scale:.5g}")
     stretch = np.round(stretch / scale, 5)
-    args = surface, stretch, field, display, spacing, max_triangles
+    create = partial(surface_lines, surface, stretch, field, display, spacing, max_triangles)
     if cache is None:
-        return surface_lines(*args)
-    content = _content(surface, field), stretch.tobytes()
+        return create()
+    # Deformations do not change what the lines depend on.
+    normals = surface.corner_normal if surface.rest_vertices is None else None
+    field_parts = field.degree, field.vectors, field.direction_ratios
+    content = content_hash(surface.corner_fan, normals, *field_parts, stretch)
     return cache.get_or_create(
-        ("surface lines", *content, display, spacing, max_triangles),
-        partial(surface_lines, *args),
-    )
-
-
-def _content(surface: Surface, field: RosyField) -> bytes:
-    """Return a hash of what the lines of a surface depend on. Deformations do not change it."""
-    shape = (surface.vertices, surface.corner_normal)
-    if surface.rest_vertices is not None:
-        shape = (surface.rest_vertices,)
-    return content_hash(
-        *shape,
-        surface.corner_vertex,
-        surface.face_start,
-        surface.triangles,
-        surface.corner_fan,
-        field.degree,
-        field.vectors,
-        field.direction_ratios,
+        ("surface lines", surface.rest_shape_key, content, display, spacing, max_triangles), create
     )
 
 

@@ -262,20 +262,16 @@ def _swept_hull(points: np.ndarray) -> np.ndarray:
     """
     center = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])
-    slice_position = np.clip(
-        (points[:, 2] - points[:, 2].min()) / np.ptp(points[:, 2]).clip(1e-12) * 31, 0, 31
-    )
+    height = (points[:, 2] - points[:, 2].min()) / np.ptp(points[:, 2]).clip(1e-12)
+    slice_index = np.clip(height * 31, 0, 31).astype(int)
     max_radius = np.zeros(32)
-    np.maximum.at(max_radius, slice_position.astype(int), radius)
+    np.maximum.at(max_radius, slice_index, radius)
     min_z, max_z = np.full(32, np.inf), np.full(32, -np.inf)
-    np.minimum.at(min_z, slice_position.astype(int), points[:, 2])
-    np.maximum.at(max_z, slice_position.astype(int), points[:, 2])
+    np.minimum.at(min_z, slice_index, points[:, 2])
+    np.maximum.at(max_z, slice_index, points[:, 2])
     is_occupied = np.isfinite(min_z)
     angle = np.linspace(0, 2 * np.pi, HULL_SAMPLES, endpoint=False)
-    rings = []
-    for rim_z in (min_z[is_occupied], max_z[is_occupied]):
-        x = center[0] + max_radius[is_occupied, None] * np.cos(angle)
-        y = center[1] + max_radius[is_occupied, None] * np.sin(angle)
-        z = np.broadcast_to(rim_z[:, None], x.shape)
-        rings.append(np.stack([x, y, z], axis=-1).reshape(-1, 3))
-    return np.concatenate(rings)
+    x = center[0] + max_radius[is_occupied, None] * np.cos(angle)
+    y = center[1] + max_radius[is_occupied, None] * np.sin(angle)
+    rims = [np.broadcast_to(rim_z[is_occupied, None], x.shape) for rim_z in (min_z, max_z)]
+    return np.concatenate([np.stack([x, y, z], axis=-1).reshape(-1, 3) for z in rims])

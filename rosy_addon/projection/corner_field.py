@@ -30,6 +30,7 @@ from ..progress import report
 from .face_values import TangentValues, face_values
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .gbuffer import MeshInstance
+from .pixel_blocks import part_of
 from .vector_components import (
     BLOCK_SIZE,
     VectorComponents,
@@ -77,13 +78,8 @@ class CornerField:
 
     def part(self, triangle: np.ndarray) -> CornerField:
         """Return the values of (n,) triangles."""
-        arrays = {
-            name: values[..., triangle]
-            for name, values in vars(self).items()
-            if isinstance(values, np.ndarray)
-        }
         channels = {channel: values[:, triangle] for channel, values in self.channels.items()}
-        return replace(self, **arrays, channels=channels)
+        return replace(part_of(self, (..., triangle)), channels=channels)
 
     def rotated(self, rotation: np.ndarray) -> CornerField:
         """Return the same values with all vectors rotated by a (3, 3) matrix into another space."""

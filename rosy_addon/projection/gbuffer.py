@@ -13,7 +13,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
 from .field_channel import FieldChannel
-from .pixel_blocks import pixel_blocks
+from .pixel_blocks import part_of, pixel_blocks
 from .surface_tone import SurfaceTone
 
 
@@ -191,13 +191,8 @@ class GBuffer:
 
     def part(self, extent: slice) -> GBuffer:
         """Return the G-buffer of some of the pixels, without a copy and without their samples."""
-        arrays = {
-            name: value[extent]
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-        }
         channels = {channel: values[extent] for channel, values in self.channels.items()}
-        return replace(self, **arrays, channels=channels, coverage=None, samples=None)
+        return replace(part_of(self, extent), channels=channels, coverage=None, samples=None)
 
     def instance_blocks(
         self,

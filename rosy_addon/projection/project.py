@@ -354,7 +354,7 @@ def all_triangles(
         Vertices in clip space.
     triangles : (T, 3) int32 ndarray
     """
-    clip = np.concatenate([_to_clip_space(instance, camera) for instance in instances], axis=1)
+    clip = np.concatenate([clip_vertices(instance, camera) for instance in instances], axis=1)
     triangles, vertex_offset = [], 0
     for instance in instances:
         triangles.append(instance.surface.triangle_vertex + np.int32(vertex_offset))
@@ -362,7 +362,7 @@ def all_triangles(
     return clip.T, np.concatenate(triangles)
 
 
-def _to_clip_space(instance: MeshInstance, camera: Camera) -> np.ndarray:
+def clip_vertices(instance: MeshInstance, camera: Camera) -> np.ndarray:
     """Return the (4, V) float64 vertices of an instance in clip space."""
     matrix = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
     return transform_components(
@@ -380,23 +380,17 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
         frame.
     """
     field_instances = [instance for instance in instances if instance.field is not None]
-    fragments = rasterize_instances(field_instances, camera)
     names = ", ".join(instance.surface.name for instance in field_instances)
-    if len(fragments.pixel):
+    clip, triangles = all_triangles(field_instances, camera)
+    if len(rasterize(clip, triangles, camera.width, camera.height).pixel):
         reason = "hidden behind other objects"
-    elif any(_has_vertex_in_frame(instance, camera) for instance in field_instances):
+    elif (np.abs(clip[triangles, :3]).max(axis=2) <= clip[triangles, 3]).any():
         reason = "seen exactly edge-on, or smaller than a pixel: turn the camera, or move it closer"
     else:
         reason = "outside the frame"
     raise NothingInViewError(
         f"no RoSy object is in view of camera '{camera.name}': {names} is {reason}"
     )
-
-
-def _has_vertex_in_frame(instance: MeshInstance, camera: Camera) -> bool:
-    """Return whether a camera has a used vertex of an instance in its frame."""
-    x, y, z, w = _to_clip_space(instance, camera)[:, instance.surface.used_vertices]
-    return bool((np.maximum(np.abs(x), np.maximum(np.abs(y), np.abs(z))) <= w).any())
 
 
 def _new_gbuffer(

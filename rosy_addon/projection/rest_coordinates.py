@@ -5,15 +5,16 @@ Points of the surface keep these positions when the mesh is transformed or defor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..field.frames import transform_components
 from ..field.surface import Surface, box_corners
 from ..progress import report
 from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
+from .pixel_blocks import part_of
+from .project import clip_vertices
 
 #: Label of the progress.
 LABEL = "finding points on the surface"
@@ -51,13 +52,8 @@ class RestCoordinates:
 
     def block(self, pixels: slice) -> RestCoordinates:
         """Return the coordinates of some of the pixels."""
-        return RestCoordinates(
-            self.weights[:, pixels],
-            self.weights_dx[:, pixels],
-            self.weights_dy[:, pixels],
-            tuple(corner[:, pixels] for corner in self.rest_corners),
-            self.pixel_size[pixels],
-        )
+        rest_corners = tuple(corner[:, pixels] for corner in self.rest_corners)
+        return replace(part_of(self, (..., pixels)), rest_corners=rest_corners)
 
     def at_offset(self, dx: float, dy: float) -> np.ndarray:
         """Return the (3, P) float32 rest positions at an offset from the pixel centers.
@@ -129,9 +125,7 @@ def rest_positions(surface: Surface) -> np.ndarray:
 
 def _screen_vertices(camera: Camera, instance: MeshInstance) -> np.ndarray:
     """Return the (3, V) float64 vertices of an instance: x and y in pixels times w, and w."""
-    clip = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
-    points = np.ascontiguousarray(instance.surface.vertices.T)
-    x, y, _, w = transform_components(points, clip[:, :3], clip[:, 3])
+    x, y, _, w = clip_vertices(instance, camera)
     return np.stack([(x + w) * (0.5 * camera.width), (y + w) * (0.5 * camera.height), w])
 
 

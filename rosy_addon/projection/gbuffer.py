@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
 from typing import NamedTuple
 
 import numpy as np
@@ -121,10 +120,8 @@ class GBuffer:
     Attributes
     ----------
     camera : Camera
-    instance_names : tuple of str
-        Name of each mesh instance.
-    instance_degrees : tuple of int
-        Degree of the field of each mesh instance, 0 without a field.
+    instances : tuple of MeshInstance
+        The mesh instances that were projected, in the order of `instance_id`.
     pixel : (P,) int32 ndarray
         Flat index into the frame, row by row from the lower left.
     instance_id : (P,) int32 ndarray
@@ -147,16 +144,13 @@ class GBuffer:
         Zero where the field is undefined.
     geometric_normal : (P, 3) float32 ndarray
         Unit normal of the visible triangle, without smooth shading. It points to the side that the
-        camera sees. Equal to `normal` by default.
+        camera sees.
     front_facing : (P,) bool ndarray
-        Whether the corners of the visible triangle run counter-clockwise in the picture. True at
-        all pixels by default.
+        Whether the corners of the visible triangle run counter-clockwise in the picture.
     channels : dict of FieldChannel to (P,) complex64 ndarray
         Additional values of some fields (see `field_channel.FieldChannel`), in the same frame as
         `representation`. Instances that do not have a channel have the value that it has for a
         plain RoSy field.
-    instances : tuple of MeshInstance
-        The mesh instances that were projected, in the order of `instance_id`. Empty if unknown.
     coverage : PixelCoverage or None
         How much of the pixels the entries cover, if pixels have several samples. None if each entry
         covers its pixel.
@@ -165,8 +159,7 @@ class GBuffer:
     """
 
     camera: Camera
-    instance_names: tuple[str, ...]
-    instance_degrees: tuple[int, ...]
+    instances: tuple[MeshInstance, ...]
     pixel: np.ndarray
     instance_id: np.ndarray
     face: np.ndarray
@@ -176,18 +169,17 @@ class GBuffer:
     normal: np.ndarray
     view_direction: np.ndarray
     representation: np.ndarray
-    geometric_normal: np.ndarray | None = None
-    front_facing: np.ndarray | None = None
-    channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
-    instances: tuple[MeshInstance, ...] = ()
+    geometric_normal: np.ndarray
+    front_facing: np.ndarray
+    channels: dict[FieldChannel, np.ndarray]
     coverage: PixelCoverage | None = None
     samples: PixelSamples | None = None
 
-    def __post_init__(self) -> None:
-        if self.geometric_normal is None:
-            object.__setattr__(self, "geometric_normal", self.normal)
-        if self.front_facing is None:
-            object.__setattr__(self, "front_facing", np.ones(len(self.pixel), dtype=bool))
+    @property
+    def instance_degrees(self) -> list[int]:
+        """The degree of the field of each mesh instance, 0 without a field."""
+        fields = [instance.field for instance in self.instances]
+        return [0 if field is None else field.degree for field in fields]
 
     def part(self, extent: slice) -> GBuffer:
         """Return the G-buffer of some of the pixels, without a copy and without their samples."""

@@ -177,9 +177,7 @@ def _pixel_grid(
         slope_y=scatter(slope_y),
         tolerance=scatter(tolerance),
         normal=tuple(scatter(component) for component in gbuffer.normal[pixels].T),
-        instance_id=scatter(gbuffer.instance_id[pixels])
-        if len(gbuffer.instance_names) > 1
-        else None,
+        instance_id=scatter(gbuffer.instance_id[pixels]) if len(gbuffer.instances) > 1 else None,
         front_facing=None if gbuffer.front_facing.all() else scatter(gbuffer.front_facing[pixels]),
     )
 

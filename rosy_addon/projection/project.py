@@ -119,7 +119,7 @@ def project_samples(
     Parameters
     ----------
     gbuffer : GBuffer
-        Of `project` with several samples, and with its instances.
+        Of `project` with several samples.
     entries : (n,) intp ndarray
         The pixels, as indices into the G-buffer.
     display, cache
@@ -416,10 +416,7 @@ def _new_gbuffer(
         view_direction[:] = (0.0, 0.0, 1.0)
     return GBuffer(
         camera=camera,
-        instance_names=tuple(instance.surface.name for instance in instances),
-        instance_degrees=tuple(
-            instance.field.degree if instance.field else 0 for instance in instances
-        ),
+        instances=tuple(instances),
         pixel=fragments.pixel,
         instance_id=instance_id,
         face=face,
@@ -431,7 +428,7 @@ def _new_gbuffer(
         representation=np.empty(count, dtype=np.complex64),
         geometric_normal=_empty_vectors(count),
         front_facing=fragments.front_facing,
-        instances=tuple(instances),
+        channels={},
     )
 
 

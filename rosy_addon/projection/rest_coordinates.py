@@ -79,7 +79,6 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
 
     Returns
     -------

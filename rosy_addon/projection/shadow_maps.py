@@ -146,7 +146,6 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
     cameras : sequence of Camera
         From `light_cameras`.
 

@@ -23,7 +23,6 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
 
     Returns
     -------
@@ -53,7 +52,6 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
 
     Returns
     -------
@@ -99,7 +97,6 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
     cache : Cache
         Stores the curvatures of the surfaces, which a deformed mesh finds again.
 

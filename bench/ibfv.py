@@ -96,7 +96,7 @@ def _seen_field(path: Path, degree: int) -> PixelField:
     surface = read_mesh(path)
     instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", degree))
     gbuffer = project(
-        [instance], orbit_camera(surface, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
+        [instance], orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     )
     return surface_pixel_field(gbuffer, degree, cases.LOOK.crease_angle, False)
 

@@ -17,8 +17,7 @@ from tempfile import TemporaryDirectory
 
 from rosy_addon.image_io.png import write_png
 from rosy_addon.preset_files.store import load_preset
-from rosy_addon.rendering.draw import draw_picture, picture_groups
-from rosy_addon.rendering.picture_memory import picture_memory
+from rosy_addon.rendering.draw import draw_picture, picture_groups, picture_memory
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.pool import POOL
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,7 +28,7 @@ from .file_io import check_folder, check_writable, read_bytes, remove_leftovers,
 from .gpu.image_steps import image_steps
 from .gpu.select import select_device
 from .projection.camera import Camera
-from .rendering.singularities import sequence_key
+from .rendering.marks import sequence_key
 from .rendering.view_input import ViewInput
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
@@ -127,22 +127,17 @@ def bake_animation(
     check_folder(settings.folder)
     remove_leftovers(settings.folder)
     frames = list(frames)
-    original_frame = scene.frame_current + scene.frame_subframe
-    original_camera = scene.camera
     frame_results: dict[str, list[_FrameResult]] = {}
     start_time, rendered_count = time.monotonic(), 0
     scene_data = None
     warnings: dict[str, None] = {}
-    # What was read; `_frame_steps` evicts what a frame has not used.
-    exit_stack, cache = ExitStack(), Cache()
-    try:
-        depsgraph = scene_depsgraph(scene)
-        targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
-        if show:
-            check_targets(targets, settings)
-        exit_stack.enter_context(
-            temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
-        )
+    depsgraph = scene_depsgraph(scene)
+    targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
+    if show:
+        check_targets(targets, settings)
+    cache = Cache()  # of what was read; `_frame_steps` evicts what a frame has not used
+    attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
+    with _restored_frame(scene), attributes:
         for index, frame in enumerate(frames):
             start, stop = index / len(frames), (index + 1) / len(frames)
             label = f"frame {frame}{_time_left(start_time, rendered_count, len(frames) - index)}"
@@ -190,12 +185,19 @@ def bake_animation(
             update_backdrops(scene)
             update_keys(scene)
         return sequence_results
+
+
+@contextmanager
+def _restored_frame(scene: bpy.types.Scene) -> Iterator[None]:
+    """Restore the frame and the camera of a scene, which markers may change, at the end of a block."""
+    frame, camera = scene.frame_current + scene.frame_subframe, scene.camera
+    try:
+        yield
     finally:
-        exit_stack.close()
         # `frame_set` takes no negative subframes, which frames before 0 have.
-        whole_frame = math.floor(original_frame)
-        scene.frame_set(whole_frame, subframe=original_frame - whole_frame)
-        scene.camera = original_camera  # markers may have changed it
+        whole_frame = math.floor(frame)
+        scene.frame_set(whole_frame, subframe=frame - whole_frame)
+        scene.camera = camera
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,15 +72,22 @@ def open_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     RosyError
         If the file is missing, is not a regular file, or cannot be read.
     """
-    try:
+    with _system_errors(path, "cannot be read"):
         if not stat.S_ISREG(os.stat(path).st_mode) and not os.path.isdir(path):
             raise RosyError(f"{path}: cannot be read: it is not a regular file")
         with open(path, "rb") as file:
             yield file
+
+
+@contextmanager
+def _system_errors(path: str | os.PathLike[str], what: str) -> Iterator[None]:
+    """Raise the errors of the system in a ``with`` block as `RosyError`, which says what fails."""
+    try:
+        yield
     except RosyError:
         raise
     except (OSError, ValueError) as error:
-        raise RosyError(f"{path}: cannot be read: {os_error_text(error)}") from error
+        raise RosyError(f"{path}: {what}: {os_error_text(error)}") from error
 
 
 def check_readable(path: str | os.PathLike[str]) -> None:
@@ -239,7 +246,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         If the path is a folder, a device or anything else but a regular file, its name is too long,
         its folder is missing, or the folder or the file is not writable.
     """
-    try:
+    with _system_errors(path, "cannot be written"):
         target = Path(os.path.realpath(path))
         # From Python 3.14 on, the methods of Path hide errors, such as that of a name that is too long.
         with suppress(FileNotFoundError, NotADirectoryError):
@@ -255,10 +262,6 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             raise RosyError(f"{path}: cannot be written: the folder {folder} does not exist")
         if not os.access(folder, os.W_OK) or (target.exists() and not os.access(target, os.W_OK)):
             raise RosyError(f"{path}: cannot be written: permission denied")
-    except RosyError:
-        raise
-    except (OSError, ValueError) as error:
-        raise RosyError(f"{path}: cannot be written: {os_error_text(error)}") from error
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
@@ -276,22 +279,18 @@ def check_folder(folder: str | os.PathLike[str]) -> None:
         raise RosyError(
             f"{folder}: Blender takes the backslash in its path for a separator: choose another folder"
         )
-    try:
-        if not stat.S_ISDIR(os.stat(folder).st_mode):
-            raise RosyError(f"{folder}: is not a folder")
-    except FileNotFoundError:
-        parent = next(
-            parent for parent in Path(folder).absolute().parents if os.path.exists(parent)
-        )
-        if not os.access(parent, os.W_OK):
-            raise RosyError(
-                f"{folder}: cannot be created: no permission to write to {parent}"
-            ) from None
-        return
-    except RosyError:
-        raise
-    except (OSError, ValueError) as error:
-        raise RosyError(f"{folder}: cannot be written: {os_error_text(error)}") from error
+    with _system_errors(folder, "cannot be written"):
+        try:
+            if not stat.S_ISDIR(os.stat(folder).st_mode):
+                raise RosyError(f"{folder}: is not a folder")
+        except FileNotFoundError:
+            parents = Path(folder).absolute().parents
+            parent = next(parent for parent in parents if os.path.exists(parent))
+            if not os.access(parent, os.W_OK):
+                raise RosyError(
+                    f"{folder}: cannot be created: no permission to write to {parent}"
+                ) from None
+            return
     check_writable(Path(folder) / "picture.png")
 
 
@@ -303,10 +302,8 @@ def make_folder(folder: str | os.PathLike[str]) -> None:
     RosyError
         If that fails.
     """
-    try:
+    with _system_errors(folder, "cannot be created"):
         os.makedirs(folder, exist_ok=True)
-    except (OSError, ValueError) as error:
-        raise RosyError(f"{folder}: cannot be created: {os_error_text(error)}") from error
 
 
 def os_error_text(error: OSError | ValueError) -> str:

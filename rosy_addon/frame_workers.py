@@ -56,16 +56,14 @@ def parse_frames(text: str) -> Sequence[int]:
 def _parse_range(part: str, text: str) -> range:
     """Parse one ``A``, ``A-B`` or ``A-B:STEP``; `text` is the whole option, for the message."""
     match = re.fullmatch(r"(?a)(-?\d{1,7})(?:-(-?\d{1,7}))?(?::(\d{1,7}))?", part)
-    first = int(match[1]) if match else 0
-    last = int(match[2]) if match and match[2] else first
-    step = int(match[3]) if match and match[3] else 1
-    in_range = -MAX_FRAME <= first <= last <= MAX_FRAME
-    if match is None or not in_range or not step:
-        raise RosyError(
-            f"frames {reprlib.repr(text)}: expected A, A-B or A-B:STEP, such as 1-250 or 1-250:10, "
-            f"with B from A to {MAX_FRAME}"
-        )
-    return range(first, last + 1, step)
+    if match:
+        first, last, step = int(match[1]), int(match[2] or match[1]), int(match[3] or 1)
+        if -MAX_FRAME <= first <= last <= MAX_FRAME and step:
+            return range(first, last + 1, step)
+    raise RosyError(
+        f"frames {reprlib.repr(text)}: expected A, A-B or A-B:STEP, such as 1-250 or 1-250:10, "
+        f"with B from A to {MAX_FRAME}"
+    )
 
 
 def run_local(command: Sequence[str], frames: Sequence[int], process_count: int) -> Iterator[str]:
@@ -94,13 +92,13 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
     """
     process_count = max(min(process_count, len(frames)), 1)
     workers: list[_Worker] = []
-    stack = ExitStack()
-    folder = Path(stack.enter_context(GuardedFolder()))
-    try:
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(GuardedFolder()))
         for index in range(process_count):
-            log = folder / f"{index}.log"
-            workers.append(_Worker(command, frames[index::process_count], log))
-            stack.enter_context(Guarded(workers[-1].process))
+            worker = _Worker(command, frames[index::process_count], folder / f"{index}.log")
+            workers.append(worker)
+            stack.enter_context(Guarded(worker.process))
+            stack.callback(worker.stop)
         running = list(workers)
         while running:
             # A process that has ended prints no more, so what it printed is read after that.
@@ -109,10 +107,6 @@ def run_local(command: Sequence[str], frames: Sequence[int], process_count: int)
                 yield from worker.new_lines()
             running = [worker for worker in running if worker not in ended]
             time.sleep(POLL_SECONDS if running else 0.0)
-    finally:
-        for worker in workers:
-            worker.stop()
-        stack.close()
     failures = [
         f"frames {format_frames(worker.frames)}: {error_line(worker.lines)}"
         for worker in workers

@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import bpy
 
 from .file_io import write_bytes
 from .gpu.select import picture_steps, select_device
-from .image_io.gif import gif_bytes
 from .rendering.view_input import ViewInput
 from .scene.look_properties import read_look
 from .scene.read_view import read_turntable, scene_depsgraph
 from .scene.video import encode_video
 from .turntable_video import (
-    check_gif_memory,
     check_still,
     draw_frame,
-    gif_frame,
-    png_frame,
+    is_gif,
     turntable_views,
+    video_frame,
+    video_steps,
 )
-from .worker.job import Call, Step, Steps, job, part
-from .worker.start import GuardedFolder
+from .worker.job import Call, Step, Steps, job
 
 #: Least samples along each side of a pixel: streaks that move must not flicker.
 MIN_SUPERSAMPLING = 2
-
-#: Share of the progress bar after which the pictures are encoded.
-ENCODING_START = 0.97
 
 
 @job
@@ -85,36 +82,18 @@ def render_turntable(
     device = select_device(scene.rosy.device.lower(), look)
     instance, lights = read_turntable(scene, scene_depsgraph(scene), obj, look)
     views = turntable_views(instance, look, count, size, view_angles, lights=lights, still=still)
-    is_gif = path.suffix.lower() == ".gif"
-    if is_gif:
-        check_gif_memory(count, *size)
-    with GuardedFolder() as folder:
-        frames = []
-        for index, view in enumerate(views):
-            start, stop = (ENCODING_START * done / count for done in (index, index + 1))
-            steps = _frame_steps(view, device, is_gif, still, workers)
-            frame = yield from part(steps, start, stop, f"picture {index + 1} of {count}")
-            if is_gif:
-                frames.append(frame)
-            else:
-                write_bytes(Path(folder) / f"{index:05d}.png", frame)
-        label = "encoding the video"
-        if is_gif:
-            contents = yield Call(gif_bytes, (frames, rate), ENCODING_START, label=label)
-        else:
-            video = Path(folder) / "video.mp4"
-            even_size = size[0] // 2 * 2, size[1] // 2 * 2
-            steps = encode_video.begin(Path(folder), count, even_size, rate, video)
-            yield from part(steps, ENCODING_START, 1.0, label)
-            contents = video.read_bytes()
+    draw = partial(_frame_steps, device=device, as_gif=is_gif(path), still=still, workers=workers)
+    contents = yield from video_steps(draw, views, count, path, rate, encode_video.begin)
     yield Step(1.0, "writing the file")
     write_bytes(path, contents)
     return path
 
 
-def _frame_steps(view: ViewInput, device: str, is_gif: bool, still: bool, workers: int) -> Steps:
-    """Draw a frame: an array of colors for a .gif, otherwise the bytes of a PNG file."""
+def _frame_steps(
+    view: ViewInput, device: str, as_gif: bool, still: bool, workers: int
+) -> Steps[Any]:
+    """Draw the `video_frame` of a view."""
     if device == "cpu":
-        return (yield Call(draw_frame, (view, is_gif, still, workers)))
+        return (yield Call(draw_frame, (view, as_gif, still, workers)))
     picture = yield from picture_steps(view, device)
-    return (yield Call(gif_frame if is_gif else png_frame, (picture.rgba,), 1.0))
+    return (yield Call(video_frame, (picture.rgba, as_gif), 1.0))

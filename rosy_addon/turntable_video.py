@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,11 @@ from .file_io import write_bytes
 from .image_io.gif import gif_bytes
 from .image_io.png import png_bytes
 from .memory import check_memory
-from .progress import progress, report
 from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
 from .rendering.draw import bake_picture, draw_picture
 from .rendering.view_input import ViewInput
+from .worker.job import Call, Steps, part, run
 from .worker.start import GuardedFolder
 
 #: Suffixes of videos that can be written.
@@ -125,8 +126,11 @@ def turntable(
         From `turntable_views`.
     count : int
         Number of views.
-    path, fps, encode
-        See `VideoWriter`.
+    path : Path
+        A .gif needs no encoder; an .mp4 does.
+    fps : float
+        Frames per second.
+    encode : Encoder, optional
     on_picture : function, optional
         Called with the number of each picture, from 1, before it is drawn.
 
@@ -134,118 +138,86 @@ def turntable(
     -------
     Path
         The file.
-    """
-    with VideoWriter(path, fps, encode) as writer:
-        for index, view in enumerate(views):
-            if on_picture is not None:
-                on_picture(index + 1)
-            start, stop = (ENCODING_START * done / count for done in (index, index + 1))
-            if not index:
-                writer.check_memory(count, view.camera.width, view.camera.height)
-            label = f"picture {index + 1} of {count}"
-            report(start, label)
-            with progress(start, stop, label):
-                writer.add(draw(view).rgba)
-        with progress(ENCODING_START, 1.0, "encoding the video"):
-            writer.write()
-    return path
-
-
-class VideoWriter:
-    """Collects pictures and writes them as a video, on white paper. A context manager.
-
-    Parameters
-    ----------
-    path : Path
-        A .gif needs no encoder; an .mp4 does.
-    fps : float
-        Frames per second.
-    encode : function, optional
-        Encodes the pictures of a folder as .mp4, given the folder, the number and size of the
-        pictures, the frames per second and the file.
 
     Raises
     ------
     RosyError
-        If an .mp4 has no encoder.
+        If an .mp4 has no encoder, or the video cannot be encoded or written.
     """
+    if encode is None and not is_gif(path):
+        raise RosyError(f"{path}: {NO_ENCODER}")
 
-    def __init__(self, path: Path, fps: float, encode: Encoder | None = None) -> None:
-        self._path, self._fps = path, fps
-        self._encode = encode
-        self._is_gif = path.suffix.lower() == ".gif"
-        if encode is None and not self._is_gif:
-            raise RosyError(f"{path}: {NO_ENCODER}")
-        self._folder = None if self._is_gif else GuardedFolder()
-        self._gif_frames: list[np.ndarray] = []
-        self._count, self._size = 0, (0, 0)
+    def announced() -> Iterator[ViewInput]:
+        for number, view in enumerate(views, 1):
+            if on_picture is not None:
+                on_picture(number)
+            yield view
 
-    def __enter__(self) -> VideoWriter:
-        return self
+    def draw_steps(view: ViewInput) -> Steps[Any]:
+        picture = yield Call(draw, (view,))
+        return video_frame(picture.rgba, is_gif(path))
 
-    def __exit__(self, *_: object) -> None:
-        if self._folder is not None:
-            self._folder.cleanup()
+    def encode_steps(*arguments: Any) -> Steps[None]:
+        assert encode is not None
+        yield Call(encode, arguments)
 
-    def check_memory(self, count: int, width: int, height: int) -> None:
-        """Check that a number of pictures can take the memory that they need as a .gif.
-
-        Raises
-        ------
-        RosyError
-            If they need more than `available_memory`.
-        """
-        if self._is_gif:
-            check_gif_memory(count, width, height)
-
-    def add(self, rgba: np.ndarray) -> None:
-        """Add a picture.
-
-        Parameters
-        ----------
-        rgba : (H, W, 4) float32 ndarray
-            As `Picture.rgba`. All pictures have the same size. An .mp4 needs even sides, so the
-            last row or column of an odd one is cut off.
-        """
-        if self._folder is None:
-            self._gif_frames.append(gif_frame(rgba))
-            return
-        path = Path(self._folder.name) / f"{self._count:05d}.png"
-        write_bytes(path, png_frame(rgba))
-        self._size = rgba.shape[1] // 2 * 2, rgba.shape[0] // 2 * 2
-        self._count += 1
-
-    def write(self) -> None:
-        """Write the video.
-
-        Raises
-        ------
-        RosyError
-            If it cannot be encoded or written.
-        """
-        if self._folder is None:
-            write_bytes(self._path, gif_bytes(self._gif_frames, self._fps))
-            return
-        folder = Path(self._folder.name)
-        video_path = folder / "video.mp4"
-        assert self._encode is not None
-        self._encode(folder, self._count, self._size, self._fps, video_path)
-        write_bytes(self._path, video_path.read_bytes())
+    write_bytes(path, run(video_steps(draw_steps, announced(), count, path, fps, encode_steps)))
+    return path
 
 
-def check_gif_memory(count: int, width: int, height: int) -> None:
-    """Raise a `RosyError` if a .gif of a number of pictures needs more than `available_memory`."""
-    check_memory(
-        GIF_BYTES * count * width * height,
-        f"a .gif of {count} pictures of {width} x {height} pixels",
-        "choose a smaller size or fewer pictures, or write an .mp4",
-    )
+def video_steps(
+    draw: Callable[[ViewInput], Steps[Any]],
+    views: Iterator[ViewInput],
+    count: int,
+    path: Path,
+    fps: float,
+    encode: Callable[..., Steps[None]],
+) -> Steps[bytes]:
+    """Draw views as part of a job, and return the contents of a video of them.
+
+    Parameters
+    ----------
+    draw : function
+        Returns the steps that draw the `video_frame` of a view.
+    views, count, path, fps
+        As for `turntable`. Nothing is written to the path; its suffix says which kind of video is meant.
+    encode : function
+        Returns the steps that encode an .mp4, given the arguments of an `Encoder`.
+    """
+    pictures = []
+    with nullcontext("") if is_gif(path) else GuardedFolder() as name:
+        folder = Path(name)
+        for index, view in enumerate(views):
+            width, height = view.camera.width, view.camera.height
+            if is_gif(path) and not index:
+                check_memory(
+                    GIF_BYTES * count * width * height,
+                    f"a .gif of {count} pictures of {width} x {height} pixels",
+                    "choose a smaller size or fewer pictures, or write an .mp4",
+                )
+            start, stop = (ENCODING_START * done / count for done in (index, index + 1))
+            frame = yield from part(draw(view), start, stop, f"picture {index + 1} of {count}")
+            if is_gif(path):
+                pictures.append(frame)
+            else:
+                write_bytes(folder / f"{index:05d}.png", frame)
+        label = "encoding the video"
+        if is_gif(path):
+            return (yield Call(gif_bytes, (pictures, fps), ENCODING_START, label=label))
+        video, even_size = folder / "video.mp4", (width // 2 * 2, height // 2 * 2)
+        steps = encode(folder, count, even_size, fps, video)
+        yield from part(steps, ENCODING_START, 1.0, label)
+        return video.read_bytes()
 
 
-def draw_frame(view: ViewInput, is_gif: bool, keep_gbuffers: bool, workers: int) -> Any:
-    """Draw a picture as `bake_picture`, and return its `gif_frame` or its `png_frame`."""
-    picture = bake_picture(view, keep_gbuffers, workers)
-    return gif_frame(picture.rgba) if is_gif else png_frame(picture.rgba)
+def is_gif(path: Path) -> bool:
+    """Return whether a video is a .gif."""
+    return path.suffix.lower() == ".gif"
+
+
+def draw_frame(view: ViewInput, as_gif: bool, keep_gbuffers: bool, workers: int) -> Any:
+    """Draw a picture as `bake_picture`, and return its `video_frame`."""
+    return video_frame(bake_picture(view, keep_gbuffers, workers).rgba, as_gif)
 
 
 def check_video_path(path: Path) -> None:
@@ -260,22 +232,26 @@ def check_video_path(path: Path) -> None:
         raise RosyError(f"{path}: the name of the video must end in {' or '.join(VIDEO_SUFFIXES)}")
 
 
-def _over_white(rgba: np.ndarray) -> np.ndarray:
-    """Return a picture on white paper as (H, W, 3) float32, linear."""
-    return 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
+def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
+    """Return a picture on white paper, as a video of it is encoded.
 
+    Parameters
+    ----------
+    rgba : (H, W, 4) float32 ndarray
+        As `Picture.rgba`.
+    as_gif : bool
 
-def png_frame(rgba: np.ndarray) -> bytes:
-    """Return a picture on white paper as a PNG file, without the last row or column of an odd side."""
-    rgba = rgba[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2]
+    Returns
+    -------
+    (H, W, 3) uint8 ndarray or bytes
+        Display values for a .gif, with the top row first. Otherwise a PNG file. An .mp4 needs even sides, so
+        it lacks the last row or column of an odd one.
+    """
     opaque = np.ones_like(rgba)
-    opaque[..., :3] = _over_white(rgba)
-    return png_bytes(opaque)
-
-
-def gif_frame(rgba: np.ndarray) -> np.ndarray:
-    """Return a picture on white paper as (H, W, 3) uint8, with the top row first."""
-    return np.rint(to_display(_over_white(rgba)[::-1]) * 255).astype(np.uint8)
+    opaque[..., :3] = 1 + rgba[..., 3:] * (rgba[..., :3] - 1)
+    if as_gif:
+        return np.rint(to_display(opaque[::-1, :, :3]) * 255).astype(np.uint8)
+    return png_bytes(opaque[: len(rgba) // 2 * 2, : rgba.shape[1] // 2 * 2])
 
 
 def _swept_hull(points: np.ndarray) -> np.ndarray:
@@ -286,20 +262,16 @@ def _swept_hull(points: np.ndarray) -> np.ndarray:
     """
     center = (points.min(axis=0) + points.max(axis=0)) / 2
     radius = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])
-    slice_position = np.clip(
-        (points[:, 2] - points[:, 2].min()) / np.ptp(points[:, 2]).clip(1e-12) * 31, 0, 31
-    )
+    height = (points[:, 2] - points[:, 2].min()) / np.ptp(points[:, 2]).clip(1e-12)
+    slice_index = np.clip(height * 31, 0, 31).astype(int)
     max_radius = np.zeros(32)
-    np.maximum.at(max_radius, slice_position.astype(int), radius)
+    np.maximum.at(max_radius, slice_index, radius)
     min_z, max_z = np.full(32, np.inf), np.full(32, -np.inf)
-    np.minimum.at(min_z, slice_position.astype(int), points[:, 2])
-    np.maximum.at(max_z, slice_position.astype(int), points[:, 2])
+    np.minimum.at(min_z, slice_index, points[:, 2])
+    np.maximum.at(max_z, slice_index, points[:, 2])
     is_occupied = np.isfinite(min_z)
     angle = np.linspace(0, 2 * np.pi, HULL_SAMPLES, endpoint=False)
-    rings = []
-    for rim_z in (min_z[is_occupied], max_z[is_occupied]):
-        x = center[0] + max_radius[is_occupied, None] * np.cos(angle)
-        y = center[1] + max_radius[is_occupied, None] * np.sin(angle)
-        z = np.broadcast_to(rim_z[:, None], x.shape)
-        rings.append(np.stack([x, y, z], axis=-1).reshape(-1, 3))
-    return np.concatenate(rings)
+    x = center[0] + max_radius[is_occupied, None] * np.cos(angle)
+    y = center[1] + max_radius[is_occupied, None] * np.sin(angle)
+    rims = [np.broadcast_to(rim_z[is_occupied, None], x.shape) for rim_z in (min_z, max_z)]
+    return np.concatenate([np.stack([x, y, z], axis=-1).reshape(-1, 3) for z in rims])

@@ -23,8 +23,7 @@ from ..projection.progressive_samples import matrix_scale, progressive_samples
 from ..projection.project import surface_points
 from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points
-from .even_spacing import spaced_points
-from .surface_places import surface_places
+from .surface_places import spaced_points, surface_places
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -86,12 +85,7 @@ class ArrowMarks:
     @property
     def outline(self) -> float:
         """Width of their outlines, pixels."""
-        return outline_width(self.size)
-
-
-def outline_width(size: float) -> float:
-    """Return the width of the outlines of arrowheads of a length, pixels."""
-    return max(OUTLINE * size, MIN_OUTLINE)
+        return max(OUTLINE * self.size, MIN_OUTLINE)
 
 
 def has_arrows(instance: MeshInstance) -> bool:
@@ -143,20 +137,10 @@ def arrow_marks(
     cache = Cache() if cache is None else cache
     with progress(0.0, 0.2):
         points = _places_in_order(instances, camera, spacing, cache)
-    first = np.cumsum([0, *(len(instance.surface.triangles) for instance in instances[:-1])])
     with progress(0.2, 0.6):
-        projected = project_points(
-            instances,
-            camera,
-            points.triangle + first[points.instance_id],
-            points.barycentric,
-            clip_planes,
-            finds_hidden=is_exact,
-        )
+        projected = project_points(instances, camera, points, clip_planes, finds_hidden=is_exact)
     kept = np.flatnonzero(projected.is_visible)
     points, projected = points.part(kept), projected.part(kept)
-    if not len(kept):
-        return _no_marks(size)
     with progress(0.6, 0.9):
         gbuffer = surface_points(instances, camera, display, points, projected.position, cache)
     directions = _screen_directions(gbuffer)
@@ -165,9 +149,14 @@ def arrow_marks(
         is_usable &= ~_seems_hidden(projected, gbuffer, spacing)
     usable = np.flatnonzero(is_usable)
     chosen = usable[spaced_points(projected.position[usable], spacing)]
-    return _marks_at(
-        instances, points.part(chosen), projected.position[chosen], directions[chosen], size
-    )
+    # The arrowheads of a place are one after the other.
+    place, member = np.nonzero(np.abs(directions[chosen]) >= MIN_FORESHORTENING)
+    place = chosen[place]
+    unit = directions[place, member] / np.abs(directions[place, member])
+    direction = np.stack([unit.real, unit.imag], axis=1)
+    reach = np.array([_reach(degree, size) for degree in gbuffer.instance_degrees])
+    position = projected.position[place] + reach[points.instance_id[place], None] * direction
+    return ArrowMarks(projected.world[place], projected.position[place], position, direction, size)
 
 
 def _places_in_order(
@@ -177,62 +166,44 @@ def _places_in_order(
 
     The places do not depend on the view. The points are where the view is so near that it needs more.
     """
-    parts = [SurfacePoints(np.empty(0, np.int32), np.empty(0, np.int32), np.empty((0, 3)))]
-    distances, between, ranks = [np.empty(0)], parts.copy(), [np.empty(0)]
+    parts = [SurfacePoints.of(0, np.empty(0, np.int32), np.empty((0, 3)))]
+    # Places come first, those with the largest distances before others; then points by their ranks.
+    is_between, keys = [np.empty(0, dtype=bool)], [np.empty(0)]
     for number, instance in enumerate(instances):
         scale = matrix_scale(instance)
         if not has_arrows(instance) or not scale:
             continue
         smallest = NEAREST_PLACES * spacing * _smallest_pixel(instance, camera) / scale
         places = surface_places(instance.surface, smallest, cache)
-        points = SurfacePoints(
-            np.full(len(places.triangle), number, np.int32), places.triangle, places.barycentric
-        )
+        points = SurfacePoints.of(number, places.triangle, places.barycentric)
         needed = _needed_distances(instance, camera, points, spacing)
         kept = np.flatnonzero(places.distance * scale >= needed)
         parts.append(points.part(kept))
-        distances.append(places.distance[kept] * scale)
+        is_between.append(np.zeros(len(kept), dtype=bool))
+        keys.append(-places.distance[kept] * scale)
         if places.finest <= smallest:
             continue
-        points, rank = progressive_samples(instance, camera, spacing)
+        *samples, rank = progressive_samples(instance, camera, spacing)
+        points = SurfacePoints.of(number, *samples)
         needed = _needed_distances(instance, camera, points, spacing)
         kept = np.flatnonzero(needed < places.finest * scale)
-        points = points._replace(instance_id=points.instance_id + np.int32(number))
-        between.append(points.part(kept))
-        ranks.append(rank[kept])
-    by_distance = np.argsort(-np.concatenate(distances), kind="stable")
-    by_rank = np.argsort(np.concatenate(ranks), kind="stable")
-    return SurfacePoints.concatenate(
-        [
-            SurfacePoints.concatenate(parts).part(by_distance),
-            SurfacePoints.concatenate(between).part(by_rank),
-        ]
-    )
+        parts.append(points.part(kept))
+        is_between.append(np.ones(len(kept), dtype=bool))
+        keys.append(rank[kept])
+    order = np.lexsort([np.concatenate(keys), np.concatenate(is_between)])
+    return SurfacePoints.concatenate(parts).part(order)
 
 
 def _needed_distances(
     instance: MeshInstance, camera: Camera, points: SurfacePoints, spacing: float
 ) -> np.ndarray:
     """(P,) float64: how far points have to be from each other, in Blender units; infinite behind the eye."""
-    vertex = instance.surface.triangle_vertex[points.triangle]
-    corners = _to_world(instance, instance.surface.vertices[vertex])
-    world = np.einsum("nk,nki->ni", points.barycentric, corners)
+    world = instance.points_in_triangles(points.triangle, points.barycentric)
     result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
     if camera.is_perspective:
-        depth = _depths(camera, world)
+        depth = camera.depths(world)
         result *= np.where(depth > 0, depth, np.inf)
     return result
-
-
-def _to_world(instance: MeshInstance, points: np.ndarray) -> np.ndarray:
-    """Return (..., 3) points of an instance in world space."""
-    matrix = np.asarray(instance.matrix, dtype=np.float64)
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def _depths(camera: Camera, points: np.ndarray) -> np.ndarray:
-    """Return the (n,) distances of points in world space along the axis of a camera."""
-    return -(points @ camera.view[2, :3] + camera.view[2, 3])
 
 
 def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
@@ -243,13 +214,12 @@ def _smallest_pixel(instance: MeshInstance, camera: Camera) -> float:
     pixel = 1 / camera.pixels_per_unit
     if not camera.is_perspective:
         return pixel
-    depth = _depths(camera, _to_world(instance, instance.surface.box_corners))
-    return pixel * max(float(depth.min()), 0.0)
+    return pixel * max(float(camera.depths(instance.world_bounds()).min()), 0.0)
 
 
 def _reach(degree: int, size: float) -> float:
     """Return the distance from a place to the middles of its N arrowheads, pixels."""
-    if degree == 1:
+    if degree <= 1:
         return 0.0
     return max(REACH, MIN_GAP * WIDTH / (2 * np.sin(np.pi / degree))) * size
 
@@ -308,33 +278,3 @@ def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) 
         pixel = pixel * projected.depth
     is_far = projected.depth - nearest > HIDDEN_SPACINGS * spacing * pixel
     return is_far | (~gbuffer.front_facing & (projected.depth > nearest_front))
-
-
-def _marks_at(
-    instances: Sequence[MeshInstance],
-    points: SurfacePoints,
-    place: np.ndarray,
-    directions: np.ndarray,
-    size: float,
-) -> ArrowMarks:
-    """Return the arrowheads of the directions at points, those of a point one after the other."""
-    length = np.abs(directions)
-    point, member = np.nonzero(length >= MIN_FORESHORTENING)
-    unit = directions[point, member] / length[point, member]
-    direction = np.stack([unit.real, unit.imag], axis=1)
-    reach = np.array(
-        [0.0 if part.field is None else _reach(part.field.degree, size) for part in instances]
-    )
-    anchor = np.empty((len(place), 3))
-    for number in np.unique(points.instance_id).tolist():
-        chosen = points.instance_id == number
-        surface = instances[number].surface
-        vertex = surface.triangle_vertex[points.triangle[chosen]]
-        corners = _to_world(instances[number], surface.vertices[vertex])
-        anchor[chosen] = np.einsum("nk,nki->ni", points.barycentric[chosen], corners)
-    position = place[point] + reach[points.instance_id[point], None] * direction
-    return ArrowMarks(anchor[point], place[point], position, direction, size)
-
-
-def _no_marks(size: float) -> ArrowMarks:
-    return ArrowMarks(np.empty((0, 3)), *np.empty((3, 0, 2)), size)

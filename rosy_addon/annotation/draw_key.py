@@ -8,15 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..color import from_hex, to_linear
+from ..field.blocks import concatenated_ranges
 from .draw_marks import draw_dot
 from .key_contents import ColorScale
 from .key_layout import Box, KeyLayout
 from .painting import draw_over, window
-from .text_coverage import triangle_coverage
 
 #: Exponent of the transparency of dark text at the edges of letters. Light is mixed, and thin dark letters
 #: would look too light.
 DARK_TEXT_EXPONENT = 2.0
+
+#: Scan lines of a row of pixels in a text. Along a scan line the coverage is exact.
+SCAN_LINES = 8
 
 #: Radius of the corners of plates, in text sizes.
 CORNER_RADIUS = 0.35
@@ -83,10 +86,7 @@ def _draw_plate(
 ) -> None:
     """Draw a rectangle with round corners."""
     low, high = np.array(box[:2]), np.array(box[2:])
-    found = window(rgba, low, high)
-    if found is None:
-        return
-    part, x, y = found
+    part, x, y = window(rgba, low, high)
     center, half = (low + high) / 2, (high - low) / 2 - radius
     beyond = (
         np.maximum(np.abs(x - center[0]) - half[0], 0),
@@ -105,10 +105,7 @@ def _draw_color_bar(rgba: np.ndarray, box: Box, color_scale: ColorScale) -> None
 
 def _draw_rectangle(rgba: np.ndarray, box: Box, color: np.ndarray) -> None:
     """Draw a rectangle."""
-    found = window(rgba, np.array(box[:2]), np.array(box[2:]))
-    if found is None:
-        return
-    part, x, y = found
+    part, x, y = window(rgba, np.array(box[:2]), np.array(box[2:]))
     left, bottom, right, top = box
     across = np.minimum(x + 0.5, right) - np.maximum(x - 0.5, left)
     along = np.minimum(y + 0.5, top) - np.maximum(y - 0.5, bottom)
@@ -122,10 +119,65 @@ def _draw_triangles(
     if not len(triangles):
         return
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    found = window(rgba, low, high)
-    if found is None:
+    part, _, _ = window(rgba, low, high)
+    if not part.size:
         return
-    part = found[0]
-    corner = np.floor(np.maximum(low, 0))
-    coverage = triangle_coverage(triangles - corner, part.shape[1], part.shape[0])
+    coverage = triangle_coverage(triangles - np.floor(np.maximum(low, 0)), *part.shape[1::-1])
     draw_over(part, color, 1 - (1 - coverage) ** exponent)
+
+
+def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Return the fraction of each pixel that triangles cover.
+
+    Each scan line crosses a triangle in an interval. The coverage of all intervals is summed by their
+    ends: an end adds to all pixels to its right, in part to its own.
+
+    Parameters
+    ----------
+    triangles : (n, 3, 2) float ndarray
+        Corners in pixels from the lower left, y up, in any order. They do not overlap.
+    width, height : int
+        Of the window, pixels. What is outside is cut away.
+
+    Returns
+    -------
+    (height, width) float32 ndarray
+        0 to 1.
+    """
+    corners = np.asarray(triangles, dtype=np.float64)
+    corners = np.take_along_axis(corners, np.argsort(corners[..., 1], axis=1)[..., None], axis=1)
+    x, y = corners[..., 0], corners[..., 1] * SCAN_LINES
+    # Scan line s is at s + 1/2.
+    first = np.clip(np.ceil(y[:, 0] - 0.5), 0, SCAN_LINES * height).astype(np.int64)
+    stop = np.clip(np.ceil(y[:, 2] - 0.5), 0, SCAN_LINES * height).astype(np.int64)
+    count = np.maximum(stop - first, 0)
+    owner = np.repeat(np.arange(len(corners)), count)
+    line = concatenated_ranges(first, count)
+    x, y, level = x[owner], y[owner], line + 0.5
+    is_lower = level < y[:, 1]
+    start = np.where(is_lower, 0, 1)
+    rows = np.arange(len(owner))
+    short_side = _crossing(
+        x[rows, start], y[rows, start], x[rows, start + 1], y[rows, start + 1], level
+    )
+    long_side = _crossing(x[:, 0], y[:, 0], x[:, 2], y[:, 2], level)
+    left, right = np.minimum(short_side, long_side), np.maximum(short_side, long_side)
+    total = np.zeros(height * (width + 1))
+    for end, sign in ((left, 1.0), (right, -1.0)):
+        end = np.clip(end, 0, width)
+        pixel = np.minimum(end.astype(np.int64), width - 1)
+        inside = pixel + 1 - end  # the part of the pixel to the right of the end
+        index = (line // SCAN_LINES) * (width + 1) + pixel
+        total += np.bincount(index, sign * inside, len(total))
+        total += np.bincount(index + 1, sign * (1 - inside), len(total))
+    coverage = np.cumsum(total.reshape(height, width + 1), axis=1)[:, :width] / SCAN_LINES
+    return np.clip(coverage, 0, 1).astype(np.float32)
+
+
+def _crossing(
+    x0: np.ndarray, y0: np.ndarray, x1: np.ndarray, y1: np.ndarray, level: np.ndarray
+) -> np.ndarray:
+    """Return the x of the points of edges at a level of y, which is between the ends."""
+    rise = y1 - y0
+    along = np.divide(level - y0, rise, out=np.zeros_like(level), where=rise > 0)
+    return x0 + np.clip(along, 0, 1) * (x1 - x0)

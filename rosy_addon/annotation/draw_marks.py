@@ -79,10 +79,7 @@ def draw_dot(
     opacity : float
     """
     outer = radius + outline
-    found = window(rgba, center - outer - 1, center + outer + 1)
-    if found is None:
-        return
-    part, x, y = found
+    part, x, y = window(rgba, center - outer - 1, center + outer + 1)
     distance = np.hypot(x - center[0], y - center[1])
     inner_share = np.clip(radius + 0.5 - distance, 0, 1)[..., None].astype(np.float32)
     fill, line = (
@@ -106,10 +103,7 @@ def _draw_label(
     segments = label.segments()
     width = stroke_width(size) / 2
     reach = width + HALO * size + 1
-    found = window(rgba, segments.min(axis=(0, 1)) - reach, segments.max(axis=(0, 1)) + reach)
-    if found is None:
-        return
-    part, x, y = found
+    part, x, y = window(rgba, segments.min(axis=(0, 1)) - reach, segments.max(axis=(0, 1)) + reach)
     distance = _distance_to_segments(x, y, segments)
     draw_over(part, halo, np.clip(width + HALO * size + 0.5 - distance, 0, 1))
     draw_over(part, color, np.clip(width + 0.5 - distance, 0, 1))

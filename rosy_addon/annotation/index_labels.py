@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..field.singularities import format_index
-from .label_placement import place_labels
 from .singularity_marks import OUTLINE, SingularityMarks, dot_diameters
 
 #: Display colors of labels, and of the halo around them.
@@ -23,6 +22,10 @@ MIN_STROKE_WIDTH = 1.0
 
 #: Largest number of labels. More would hide the dots.
 MAX_LABELS = 250
+
+
+#: Where a label goes beside its dot, the best place first: right or left, above or below.
+SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,43 @@ def place_indices(
 def stroke_width(size: float) -> float:
     """Return the width of the lines of labels in pixels, given the diameter of a dot of index 1 / N."""
     return max(STROKE_WIDTH * size, MIN_STROKE_WIDTH)
+
+
+def place_labels(
+    dots: np.ndarray, sizes: np.ndarray, radius: np.ndarray | float, frame: tuple[int, int]
+) -> np.ndarray:
+    """Choose a place beside its dot for each label, the first labels first.
+
+    Parameters
+    ----------
+    dots : (K, 2) float ndarray
+        Centers of the dots in pixels, y up.
+    sizes : (K, 2) float ndarray
+        Widths and heights of the labels in pixels.
+    radius : (K,) ndarray or float
+        Of the dots, in pixels.
+    frame : (int, int)
+        Width and height of the picture in pixels. No label reaches beyond it.
+
+    Returns
+    -------
+    (K, 2) float64 ndarray
+        Lower left corners of the labels; NaN for those that have no place.
+    """
+    dots, sizes = np.asarray(dots, dtype=np.float64), np.asarray(sizes, dtype=np.float64)
+    corners = np.full(dots.shape, np.nan)
+    radii = np.broadcast_to(radius, len(dots))
+    low, high = dots - radii[:, None], dots + radii[:, None]
+    for label, (dot, size, radius) in enumerate(zip(dots, sizes, radii.tolist(), strict=True)):
+        for side in SIDES:
+            corner = dot + np.where(np.array(side) > 0, radius, -radius - size)
+            is_inside = (corner >= 0).all() and (corner + size <= frame).all()
+            is_covered = (corner < high) & (corner + size > low)
+            if is_inside and not is_covered.all(axis=1).any():
+                corners[label] = corner
+                low, high = np.vstack([low, corner]), np.vstack([high, corner + size])
+                break
+    return corners
 
 
 # --- letters -------------------------------------------------------------------------------------

@@ -52,8 +52,8 @@ SCALE_END, SCALE_GAP = 0.5, 0.3
 #: Width of lines.
 STROKE = 0.07
 
-#: Largest length of the scale bar, and width of the caption, as fractions of the width of the frame.
-MAX_SCALE, CAPTION_WIDTH = 0.2, 0.8
+#: Width of the caption, as a fraction of the width of the frame.
+CAPTION_WIDTH = 0.8
 
 #: Left, bottom, right and top.
 Box = tuple[float, float, float, float]
@@ -137,11 +137,6 @@ class KeyLayout:
         return max(round(STROKE * self.text_size), 1)
 
 
-def automatic_text_size(width: int, height: int) -> float:
-    """Return the text size in pixels for a frame of a size in pixels."""
-    return max(TEXT_SIZE * min(width, height), MIN_TEXT_SIZE)
-
-
 def lay_out_key(
     parts: KeyParts,
     frame: tuple[int, int],
@@ -158,13 +153,13 @@ def lay_out_key(
     text_width : callable
         Returns the width of a line of text, in text sizes.
     text_size : float
-        Pixels. 0: `automatic_text_size`. The size that fits may be smaller.
+        Pixels. 0: `TEXT_SIZE` of the frame. The size that fits may be smaller.
 
     Returns
     -------
     KeyLayout
     """
-    size = first_size = text_size or automatic_text_size(*frame)
+    size = first_size = text_size or max(TEXT_SIZE * min(frame), MIN_TEXT_SIZE)
     while True:
         layout = _Arrangement(parts, frame, text_width, size, size / first_size).layout()
         if layout is not None or size <= END_TEXT_SIZE:
@@ -190,21 +185,19 @@ def wrapped(text: str, width: float, text_width: Callable[[str], float]) -> list
     return lines
 
 
+@dataclass
 class _Arrangement:
     """Places the parts of a key for one text size. `layout` returns None if they do not fit."""
 
-    def __init__(
-        self,
-        parts: KeyParts,
-        frame: tuple[int, int],
-        text_width: Callable[[str], float],
-        text_size: float,
-        dot_scale: float,
-    ) -> None:
-        self.parts, self.frame, self.size = parts, frame, text_size
-        self.text_width, self.dot_scale = text_width, dot_scale
-        self.margin = MARGIN * min(frame)
-        self.result = KeyLayout(text_size)
+    parts: KeyParts
+    frame: tuple[int, int]
+    text_width: Callable[[str], float]
+    size: float
+    dot_scale: float
+
+    def __post_init__(self) -> None:
+        self.margin = MARGIN * min(self.frame)
+        self.result = KeyLayout(self.size)
 
     def layout(self) -> KeyLayout | None:
         """Place everything."""
@@ -222,8 +215,7 @@ class _Arrangement:
 
     def _fits(self) -> bool:
         """Whether all plates are inside the frame, and apart."""
-        low = np.array([plate[:2] for plate in self.result.plates]).reshape(-1, 2)
-        high = np.array([plate[2:] for plate in self.result.plates]).reshape(-1, 2)
+        low, high = np.array(self.result.plates).reshape(-1, 2, 2).transpose(1, 0, 2)
         meets = ((low[:, None] < high[None]) & (high[:, None] > low[None])).all(axis=2)
         return bool((low >= 0).all() and (high <= self.frame).all()) and meets.sum() == len(low)
 

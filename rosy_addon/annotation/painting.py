@@ -7,13 +7,11 @@ import numpy as np
 
 def window(
     rgba: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Return the part of a picture between two corners, and x and y of its pixels; None if empty."""
-    height, width = rgba.shape[:2]
-    left, bottom = np.floor(np.maximum(low, 0)).astype(int)
-    right, top = np.ceil(np.minimum(high, (width, height))).astype(int)
-    if left >= right or bottom >= top:
-        return None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the part of a picture between two corners, which may be empty, and x and y of its pixels."""
+    size = rgba.shape[1::-1]
+    left, bottom = np.floor(np.clip(low, 0, size)).astype(int)
+    right, top = np.ceil(np.clip(high, 0, size)).astype(int)
     y, x = np.mgrid[bottom:top, left:right] + 0.5
     return rgba[bottom:top, left:right], x, y
 

@@ -19,28 +19,19 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def round_below(largest: float) -> float:
     """Return the largest of 1, 2 and 5 times a power of ten that is not above a positive number."""
-    exponent = math.floor(math.log10(largest))
-    candidates = [
-        _scaled(mantissa, power)
-        for power in (exponent - 1, exponent, exponent + 1)
-        for mantissa in MANTISSAS
-    ]
-    return max(value for value in candidates if value <= largest * (1 + 1e-9))
+    return max(value for value in _round_near(largest) if value <= largest * (1 + 1e-9))
 
 
 def round_above(least: float) -> float:
     """Return the least of 1, 2 and 5 times a power of ten that is not below a positive number."""
-    below = round_below(least)
-    if below >= least * (1 - 1e-9):
-        return below
-    exponent = math.floor(math.log10(below) + 1e-9)
-    mantissa = round(below / _scaled(1, exponent))
-    return _scaled(5, exponent) if mantissa == 2 else _scaled(2 if mantissa == 1 else 10, exponent)
+    return min(value for value in _round_near(least) if value >= least * (1 - 1e-9))
 
 
-def _scaled(mantissa: int, exponent: int) -> float:
-    """Return the float that is nearest to a mantissa times a power of ten."""
-    return float(f"{mantissa}e{exponent}")
+def _round_near(number: float) -> list[float]:
+    """Return the floats that are nearest to 1, 2 and 5 times some powers of ten, around a number."""
+    exponent = math.floor(math.log10(number))
+    powers = (exponent - 1, exponent, exponent + 1)
+    return [float(f"{mantissa}e{power}") for power in powers for mantissa in MANTISSAS]
 
 
 def tick_values(low: float, high: float, max_steps: int) -> np.ndarray:

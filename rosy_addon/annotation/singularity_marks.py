@@ -7,7 +7,7 @@ kinds of color vision.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,6 +18,7 @@ from ..field.singularities import find_singularities
 from ..progress import progress
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import part_of
 from ..projection.visible_vertices import project_vertices
 
 #: Display colors by the sign of the index, and of the outline of dots.
@@ -68,14 +69,7 @@ class SingularityMarks:
 
     def part(self, chosen: np.ndarray) -> SingularityMarks:
         """Return those that a mask or indices choose."""
-        return replace(
-            self,
-            position=self.position[chosen],
-            index=self.index[chosen],
-            degree=self.degree[chosen],
-            depth=self.depth[chosen],
-            is_visible=self.is_visible[chosen],
-        )
+        return part_of(self, chosen)
 
     def in_drawing_order(self) -> SingularityMarks:
         """Return them in the order in which they are drawn."""

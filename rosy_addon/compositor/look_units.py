@@ -10,7 +10,6 @@ import numpy as np
 
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.shadow_maps import world_bounds
 from ..settings import pixel_lengths, settings_of, switch
 from .look import Look
 
@@ -68,7 +67,7 @@ def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]
     Look
         Its `unit_size` is the size of a pixel at that center, in Blender units.
     """
-    bounds = [world_bounds(instance) for instance in instances if instance.field is not None]
+    bounds = [instance.world_bounds() for instance in instances if instance.field is not None]
     if look.unit == "pixels" or not bounds:
         return look
     exact_scale = look.unit_size / (
@@ -171,7 +170,7 @@ def instance_line_spacing(
     """
     if look.unit != "pixels":
         return grains * look.grain * look.unit_size
-    exact = grains * look.grain * pixel_world_size(world_bounds(instance), camera)
+    exact = grains * look.grain * pixel_world_size(instance.world_bounds(), camera)
     step = np.rint(np.log2(exact) * SPACING_STEPS_PER_OCTAVE)
     return float(2 ** (step / SPACING_STEPS_PER_OCTAVE))
 

@@ -19,14 +19,14 @@ from ..progress import progress, report
 from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
-from ..projection.pixel_neighbors import affine_depth, neighbor_masks
+from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
 from ..projection.project import project_samples
 from .look import Look
 from .look_units import supersampled_look
 from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
-#: `pixel_neighbors.affine_depth`).
+#: `pixel_neighbors.depth_slopes`).
 DEPTH_JUMP = 2.0
 
 #: Minimum depth difference at a step, in multiples of the depth tolerance, and relative to the changes
@@ -197,7 +197,7 @@ class _Edges:
             cell = (row + margin) * np.int32(self._stride) + column + np.int32(margin)
             self._cell[block] = cell
             self._entry_of_cell[cell] = np.arange(block.start, block.stop, dtype=np.int32)
-            self._depth[block], self._tolerance[block] = affine_depth(gbuffer.part(block))
+            self._depth[block], _, _, self._tolerance[block] = depth_slopes(gbuffer, block)
         with progress(0.2, 0.6, STEP_LABEL):
             #: The `neighbor_masks` without creases.
             self._mask = neighbor_masks(gbuffer, look.crease_angle, True)

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..cache import Cache
 from ..progress import progress
-from ..projection.feature_curvatures import feature_curvatures
 from ..projection.gbuffer import GBuffer
+from ..projection.surface_sampling import feature_curvatures
 from .even_lines import EvenLines, even_lines
 from .flow import unconvolved_noise
 from .ibfv import streak_waves, wave_images

@@ -105,7 +105,7 @@ def surface_noise(
     with progress(0.0, 0.3):
         rest = rest_coordinates(gbuffer)
     units = instance_units(gbuffer, pixel)
-    instance_hash = instance_hashes(gbuffer.instance_names)
+    instance_hash = instance_hashes([instance.surface.name for instance in gbuffer.instances])
     total = np.zeros((channels, len(gbuffer.pixel)), dtype=np.float32)
     for block in reported_blocks(len(gbuffer.pixel), STEP_LABEL, 0.3, 0.6):
         block_rest = rest.block(block)

@@ -12,8 +12,8 @@ from ..cache import Cache
 from ..errors import RosyError
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
-from ..projection.mip_map import MipMap
 from ..projection.surface_sampling import surface_tones
+from ..projection.surface_tone import MipMap
 from .look import Look
 from .reported_blocks import reported_blocks
 from .shading import Light, diffuse, light_visibility

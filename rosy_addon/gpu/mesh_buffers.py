@@ -16,9 +16,8 @@ from ..field.surface import Surface, box_corners
 from ..projection.corner_field import CornerField, field_at_corners
 from ..projection.face_values import SIMILARITY_EPS
 from ..projection.field_channel import FieldChannel, rotation_order
-from ..projection.mip_map import MipMap
 from ..projection.rest_coordinates import rest_positions
-from ..projection.surface_tone import SurfaceTone
+from ..projection.surface_tone import MipMap, SurfaceTone
 
 #: Texels in a row of the record texture: a power of two, with its exponent.
 ROW_BITS = 13

@@ -15,9 +15,9 @@ from ..errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
-from ..projection.mip_map import MipMap
 from ..projection.rest_coordinates import matrix_scale
 from ..projection.surface_lines import rest_matrix
+from ..projection.surface_tone import MipMap
 from ..worker.job import Call, run
 from .device import Device
 from .field_kind import FieldKind, field_kinds

@@ -21,7 +21,7 @@ from ..field.representation import power, signed_power
 from ..field.surface import Surface, build_edges
 from ..progress import progress, report
 from ..projection.corner_field import cached_corner_field
-from ..projection.field_channel import rotation_order
+from ..projection.field_channel import REPRESENTATION, rotation_order
 from ..projection.gbuffer import MeshInstance
 
 #: An edge across which normals are not interpolated is a crease if the normals of its triangles
@@ -285,7 +285,7 @@ def build_tangent_mesh(
             f"{counted(surface.face_count, 'face')}"
         )
     with progress(0.0, 0.3):
-        corner_field = cached_corner_field(surface, instance.matrix, field, display, cache)
+        corner_field = cached_corner_field(instance, display, cache)
     label = "preparing the surface"
     report(0.3, label)
     points = instance.world_points()[surface.triangle_vertex]
@@ -305,7 +305,7 @@ def build_tangent_mesh(
         values = values.T * signed_power(rotations, rotation_order(channel, field.degree))
         if channel[0] == "deviation":
             harmonics.append((channel[1], values))
-        else:
+        elif channel != REPRESENTATION:
             family_z = values.sum(axis=1)
     with progress(0.6, 1.0):
         neighbor, neighbor_edge, edge_transport = _adjacency(

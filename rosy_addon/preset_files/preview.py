@@ -44,7 +44,7 @@ def draw_preview(look: Look) -> np.ndarray:
     look = _fast_look(look)
     surface, field = _trefoil_mesh()
     render_size = PREVIEW_SIZE * look.supersampling
-    camera = orbit_camera(surface, *VIEW_ANGLES, render_size, render_size, margin=0.03)
+    camera = orbit_camera(surface.vertices, *VIEW_ANGLES, render_size, render_size, margin=0.03)
     across = surface.vertices[surface.corner_vertex, 0].astype(np.float32)
     instance = MeshInstance(surface, np.eye(4), field, color_values=across)
     gbuffer = project([instance], camera, look.display)

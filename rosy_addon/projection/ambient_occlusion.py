@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import RosyError
 from ..field.frames import dot, normalize
-from ..field.surface import Surface, sum_per_fan
+from ..field.surface import sum_per_fan
 from ..progress import progress
 from .gbuffer import MeshInstance
 from .shadow_maps import (
@@ -16,11 +16,10 @@ from .shadow_maps import (
     render_depth_map,
     sun_camera,
     visibility_from,
-    world_bounds,
 )
 from .vector_components import cofactor_matrix
 
-#: Defaults: number of light directions, and width and height of each shadow map in pixels.
+#: Number of light directions by default, and width and height of each shadow map in pixels.
 DIRECTION_COUNT, DEPTH_MAP_SIZE = 256, 512
 
 #: Sample points are moved from their vertex into the adjacent faces: by this many pixels of the
@@ -33,7 +32,6 @@ def ambient_occlusion(
     instances: Sequence[MeshInstance],
     instance_id: int,
     direction_count: int = DIRECTION_COUNT,
-    resolution: int = DEPTH_MAP_SIZE,
 ) -> np.ndarray:
     """Compute the ambient occlusion at the corners of one mesh instance.
 
@@ -45,8 +43,6 @@ def ambient_occlusion(
         Index of the instance whose occlusion is computed.
     direction_count : int
         Number of light directions, spread evenly over the sphere.
-    resolution : int
-        Width and height of each shadow map in pixels.
 
     Returns
     -------
@@ -62,15 +58,15 @@ def ambient_occlusion(
     if direction_count < 1:
         raise RosyError(f"{direction_count} directions of light: choose 1 or more")
     instance = instances[instance_id]
-    receiver_points = world_bounds(instance)
-    caster_points = np.concatenate([world_bounds(caster) for caster in instances])
-    pixel_size = float(np.ptp(receiver_points, axis=0).max()) / resolution
+    receiver_points = instance.world_bounds()
+    caster_points = np.concatenate([caster.world_bounds() for caster in instances])
+    pixel_size = float(np.ptp(receiver_points, axis=0).max()) / DEPTH_MAP_SIZE
     points, normals = _sample_points(instance, SAMPLE_INSET_PIXELS * pixel_size)
     visible_weight, total_weight = np.zeros(len(points)), np.zeros(len(points))
     for index, direction in enumerate(fibonacci_sphere(direction_count)):
         cosine = normals @ direction
         facing_light = np.flatnonzero(cosine > 0)
-        camera = sun_camera(direction, caster_points, receiver_points, resolution)
+        camera = sun_camera(direction, caster_points, receiver_points, DEPTH_MAP_SIZE)
         start, stop = index / direction_count, (index + 1) / direction_count
         with progress(start, stop, "sampling directions of light"):
             depth_map = render_depth_map(instances, camera)
@@ -98,20 +94,14 @@ def _sample_points(instance: MeshInstance, inset: float) -> tuple[np.ndarray, np
 
     Both are in world space. `inset` is a distance in world units; `MAX_INSET_FRACTION` limits it.
     """
-    surface, matrix = instance.surface, np.asarray(instance.matrix, dtype=np.float64)
-    linear, translation = matrix[:3, :3], matrix[:3, 3]
-    vertex, center = _fan_positions(surface)
-    position, center = vertex @ linear.T + translation, center @ linear.T + translation
+    surface, linear = instance.surface, np.asarray(instance.matrix, dtype=np.float64)[:3, :3]
+    vertex = np.empty((len(surface.fan_normal), 3))
+    vertex[surface.corner_fan] = surface.vertices[surface.corner_vertex]
+    center_sums = sum_per_fan(surface.face_center[surface.corner_face], surface.corner_fan)
+    center = instance.to_world(center_sums / np.bincount(surface.corner_fan)[:, None])
+    position = instance.to_world(vertex)
     offset = center - position
     length = np.sqrt(dot(offset, offset))
     fraction = np.minimum(MAX_INSET_FRACTION, inset / np.maximum(length, 1e-30))
     normals = normalize(surface.fan_normal @ cofactor_matrix(linear).T)
     return position + fraction[:, None] * offset, normals
-
-
-def _fan_positions(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return (K, 3) vertices of the fans and (K, 3) means of their face centers, object space."""
-    positions = np.empty((len(surface.fan_normal), 3))
-    positions[surface.corner_fan] = surface.vertices[surface.corner_vertex]
-    center_sums = sum_per_fan(surface.face_center[surface.corner_face], surface.corner_fan)
-    return positions, center_sums / np.bincount(surface.corner_fan)[:, None]

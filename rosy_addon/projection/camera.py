@@ -9,13 +9,15 @@ import numpy as np
 
 from ..errors import RosyError
 from ..field.frames import normalize
-from ..field.surface import Surface
 
 #: Largest width or height of a picture, in pixels.
 MAX_SIDE_PIXELS = 16384
 
-#: Focal length and sensor width of Blender's default camera, in millimeters.
-DEFAULT_FOCAL_LENGTH, DEFAULT_SENSOR_WIDTH = 50.0, 36.0
+#: Angle of view over the longer side of Blender's default camera, in radians: a lens of 50 mm, a sensor of 36 mm.
+DEFAULT_FOV = float(2 * np.arctan(36 / (2 * 50)))
+
+#: Fraction of the frame that stays empty at each border, where a camera frames points.
+DEFAULT_MARGIN = 0.04
 
 
 def check_size(width: int, height: int) -> tuple[int, int]:
@@ -103,6 +105,10 @@ class Camera:
         if not self.is_perspective:
             return np.broadcast_to(self.view[2, :3], points.shape)
         return normalize(self.eye - points)
+
+    def depths(self, points: np.ndarray) -> np.ndarray:
+        """Return the (...) distances of (..., 3) points in world space along the axis of this camera."""
+        return -(points @ self.view[2, :3] + self.view[2, 3])
 
     def resized(self, width: int, height: int) -> Camera:
         """Return the same camera with another picture size in pixels."""
@@ -215,10 +221,7 @@ def perspective_camera(
     width: int,
     height: int,
     *,
-    fov: float | None = None,
-    focal: float = DEFAULT_FOCAL_LENGTH,
-    sensor: float = DEFAULT_SENSOR_WIDTH,
-    shift: tuple[float, float] = (0.0, 0.0),
+    fov: float = DEFAULT_FOV,
     clip: tuple[float, float] = (0.1, 1000.0),
     name: str = "camera",
 ) -> Camera:
@@ -230,14 +233,8 @@ def perspective_camera(
         World to camera space.
     width, height : int
         Pixels.
-    fov : float, optional
-        Angle of view over the longer side of the picture, in radians. Replaces `focal` and
-        `sensor`.
-    focal, sensor : float
-        Focal length, and the length of the sensor along the longer side of the picture (Blender's
-        sensor fit "auto"), in the same unit.
-    shift : (float, float)
-        Blender's lens shift, in units of the longer side.
+    fov : float
+        Angle of view over the longer side of the picture, in radians.
     clip : (float, float)
         Depths of the near and the far plane, in Blender units.
     name : str
@@ -245,36 +242,17 @@ def perspective_camera(
     Raises
     ------
     RosyError
-        If the size, angle, lens or clip range is impossible.
+        If the size, angle or clip range is impossible.
     """
-    width, height = check_size(width, height)
-    if fov is not None:
-        if not 0 < fov < np.pi:
-            raise RosyError(
-                f"camera '{name}': the field of view must be between 0 and pi, not {fov}"
-            )
-        tan_half_fov = np.tan(fov / 2)
-    else:
-        if not (focal > 0 and sensor > 0):
-            raise RosyError(f"camera '{name}': focal length and sensor must be above 0")
-        tan_half_fov = sensor / (2 * focal)
+    size = np.array(check_size(width, height))
+    if not 0 < fov < np.pi:
+        raise RosyError(f"camera '{name}': the field of view must be between 0 and pi, not {fov}")
     near, far = clip
     if not 0 < near < far:
         raise RosyError(f"camera '{name}': the clip range {near} to {far} must be 0 < start < end")
-    longer_side = max(width, height)
     projection = np.zeros((4, 4))
-    projection[0, 0], projection[1, 1] = (
-        longer_side / (width * tan_half_fov),
-        longer_side / (height * tan_half_fov),
-    )
-    projection[0, 2], projection[1, 2] = (
-        2 * shift[0] * longer_side / width,
-        2 * shift[1] * longer_side / height,
-    )
-    projection[2, 2], projection[2, 3] = (
-        -(far + near) / (far - near),
-        -2 * far * near / (far - near),
-    )
+    projection[[0, 1], [0, 1]] = size.max() / (size * np.tan(fov / 2))
+    projection[2, 2:] = -(far + near) / (far - near), -2 * far * near / (far - near)
     projection[3, 2] = -1.0
     return Camera(view, projection, width, height, name)
 
@@ -285,7 +263,6 @@ def orthographic_camera(
     height: int,
     *,
     scale: float = 6.0,
-    shift: tuple[float, float] = (0.0, 0.0),
     clip: tuple[float, float] = (0.1, 1000.0),
     name: str = "camera",
 ) -> Camera:
@@ -299,7 +276,7 @@ def orthographic_camera(
         Pixels.
     scale : float
         Blender units along the longer side of the picture (Blender's orthographic scale).
-    shift, clip, name
+    clip, name
         As for `perspective_camera`, but the clip range may start behind the camera.
 
     Raises
@@ -307,23 +284,15 @@ def orthographic_camera(
     RosyError
         If the size, scale or clip range is impossible.
     """
-    width, height = check_size(width, height)
+    size = np.array(check_size(width, height))
     near, far = clip
     if not scale > 0:
         raise RosyError(f"camera '{name}': the orthographic scale must be above 0, not {scale}")
     if not near < far:
         raise RosyError(f"camera '{name}': the clip range {near} to {far} must be start < end")
-    longer_side = max(width, height)
     projection = np.eye(4)
-    projection[0, 0], projection[1, 1] = (
-        2 * longer_side / (width * scale),
-        2 * longer_side / (height * scale),
-    )
-    projection[0, 3], projection[1, 3] = (
-        -2 * shift[0] * longer_side / width,
-        -2 * shift[1] * longer_side / height,
-    )
-    projection[2, 2], projection[2, 3] = -2 / (far - near), -(far + near) / (far - near)
+    projection[[0, 1], [0, 1]] = 2 * size.max() / (size * scale)
+    projection[2, 2:] = -2 / (far - near), -(far + near) / (far - near)
     return Camera(view, projection, width, height, name)
 
 
@@ -350,16 +319,16 @@ def look_at(
     if not np.linalg.norm(back) > 0 or not np.linalg.norm(right) > 1e-9 * np.linalg.norm(back):
         raise RosyError("a camera cannot look at its own position, or along its up direction")
     back, right = back / np.linalg.norm(back), right / np.linalg.norm(right)
-    return _view_from_axes(right, np.cross(back, right), back, eye)
+    return _view_from_axes(np.array([right, np.cross(back, right), back]), eye)
 
 
-def _view_from_axes(
-    right: np.ndarray, up: np.ndarray, back: np.ndarray, eye: np.ndarray
-) -> np.ndarray:
-    """Return the (4, 4) view matrix of a camera, given its unit axes and position, world space."""
+def _view_from_axes(axes: np.ndarray, eye: np.ndarray) -> np.ndarray:
+    """Return the (4, 4) view matrix of a camera at a point, world space.
+
+    The rows of `axes`, (3, 3), are the unit vectors right, up and back.
+    """
     view = np.eye(4)
-    view[:3, :3] = [right, up, back]
-    view[:3, 3] = -view[:3, :3] @ eye
+    view[:3, :3], view[:3, 3] = axes, -axes @ eye
     return view
 
 
@@ -376,38 +345,34 @@ def orbit_basis(azimuth: float, elevation: float) -> np.ndarray:
 
 
 def orbit_camera(
-    targets: Surface | np.ndarray | Sequence[Surface | np.ndarray],
+    points: np.ndarray,
     azimuth: float,
     elevation: float,
     width: int,
     height: int,
     *,
     perspective: bool = True,
-    fov: float = 2 * np.arctan(DEFAULT_SENSOR_WIDTH / (2 * DEFAULT_FOCAL_LENGTH)),
-    margin: float = 0.04,
-    name: str = "view",
+    margin: float = DEFAULT_MARGIN,
 ) -> Camera:
-    """Return a camera in a given direction that frames all targets, as large as possible.
+    """Return a camera in a given direction that frames all points, as large as possible.
 
     Parameters
     ----------
-    targets : Surface, (V, 3) ndarray, or a sequence of them
-        What to frame, in world space.
+    points : (V, 3) ndarray
+        World space.
     azimuth, elevation : float
         Degrees, see `orbit_basis`.
     width, height : int
         Pixels.
     perspective : bool
-    fov : float
-        Angle of view over the longer side, in radians. Only for perspective.
+        The angle of view is `DEFAULT_FOV`.
     margin : float
         Fraction of the frame that stays empty at each border.
-    name : str
 
     Raises
     ------
     RosyError
-        If the angles are not finite or there is nothing to look at.
+        If the angles are not finite or there are no points.
 
     Notes
     -----
@@ -422,8 +387,10 @@ def orbit_camera(
         raise RosyError(
             f"view {azimuth},{elevation}: azimuth and elevation must be finite numbers of degrees"
         )
+    if not len(points):
+        raise RosyError("there are no vertices to frame")
     basis = orbit_basis(azimuth, elevation)
-    u, v, w = (_framed_points(targets) @ basis.T).T
+    u, v, w = (np.asarray(points, dtype=np.float64) @ basis.T).T
     longer_side = max(width, height)
     frame_fraction = 1 - 2 * margin
     extent = max(np.ptp(u), np.ptp(v), np.ptp(w)) or 1.0
@@ -435,21 +402,17 @@ def orbit_camera(
         back = w.max() + extent
         eye = np.array([(u.min() + u.max()) / 2, (v.min() + v.max()) / 2, back]) @ basis
         clip = (0.5 * extent, back - w.min() + 0.5 * extent)
-        view = _view_from_axes(*basis, eye)
-        return orthographic_camera(view, width, height, scale=scale, clip=clip, name=name)
-    framing_slope = np.tan(fov / 2) * frame_fraction
-    center, back = zip(
-        *(
-            _framing_eye(coordinate, w, framing_slope * side / longer_side)
-            for coordinate, side in ((u, width), (v, height))
-        ),
-        strict=True,
-    )
-    back = max(*back, w.max() + 1e-3 * extent)
+        view = _view_from_axes(basis, eye)
+        return orthographic_camera(view, width, height, scale=scale, clip=clip, name="view")
+    center, back = [], w.max() + 1e-3 * extent
+    for coordinate, side in ((u, width), (v, height)):
+        slope = np.tan(DEFAULT_FOV / 2) * frame_fraction * side / longer_side
+        upper, lower = (slope * w + coordinate).max(), (slope * w - coordinate).max()
+        center.append((upper - lower) / 2)
+        back = max(back, (upper + lower) / (2 * slope))
     eye = np.array([*center, back]) @ basis
     clip = (0.5 * (back - w.max()), 2 * (back - w.min()) + extent)
-    view = _view_from_axes(*basis, eye)
-    return perspective_camera(view, width, height, fov=fov, clip=clip, name=name)
+    return perspective_camera(_view_from_axes(basis, eye), width, height, clip=clip, name="view")
 
 
 def framing_points(
@@ -460,8 +423,6 @@ def framing_points(
     height: int,
     *,
     perspective: bool = True,
-    fov: float = 2 * np.arctan(DEFAULT_SENSOR_WIDTH / (2 * DEFAULT_FOCAL_LENGTH)),
-    margin: float = 0.04,
 ) -> np.ndarray:
     """Return the few points that determine `orbit_camera`.
 
@@ -472,8 +433,8 @@ def framing_points(
     ----------
     points : (V, 3) ndarray
         World space; at least one.
-    azimuth, elevation, width, height, perspective, fov, margin
-        As for `orbit_camera`.
+    azimuth, elevation, width, height, perspective
+        As for `orbit_camera`, with the default margin.
 
     Returns
     -------
@@ -483,33 +444,8 @@ def framing_points(
     u, v, w = (points @ orbit_basis(azimuth, elevation).T).T
     extremes = [u, -u, v, -v, w, -w]
     if perspective:
-        slope = np.tan(fov / 2) * (1 - 2 * margin)
+        slope = np.tan(DEFAULT_FOV / 2) * (1 - 2 * DEFAULT_MARGIN)
         for coordinate, side in ((u, width), (v, height)):
             back = slope * side / max(width, height) * w
             extremes += [back + coordinate, back - coordinate]
     return points[np.unique([np.argmax(values) for values in extremes])]
-
-
-def _framing_eye(coordinate: np.ndarray, back: np.ndarray, slope: float) -> tuple[float, float]:
-    """Return the position, across and back, of the nearest eye that sees all points.
-
-    Solves one direction of `orbit_camera`. `coordinate` and `back` are the points' coordinates
-    across and back, `slope` is k.
-    """
-    upper, lower = (slope * back + coordinate).max(), (slope * back - coordinate).max()
-    return (upper - lower) / 2, (upper + lower) / (2 * slope)
-
-
-def _framed_points(targets: Surface | np.ndarray | Sequence[Surface | np.ndarray]) -> np.ndarray:
-    """Return the (V, 3) points to frame: vertices that a face uses, and all points of arrays."""
-    if isinstance(targets, Surface) or (isinstance(targets, np.ndarray) and targets.ndim == 2):
-        targets = [targets]
-    points = [
-        target.vertices[target.used_vertices]
-        if isinstance(target, Surface)
-        else np.asarray(target, dtype=np.float64).reshape(-1, 3)
-        for target in targets
-    ]
-    if not sum(map(len, points)):
-        raise RosyError("there are no vertices to frame")
-    return np.concatenate(points)

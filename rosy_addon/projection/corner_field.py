@@ -2,7 +2,7 @@
 
 A field is given on the faces of the rest shape. The stored member of each face is transported to
 the deformed face (`face_values`). From the faces, the field is transported to the corners and
-averaged over each smooth fan (`fan_values`). All steps but the first work on the representation
+averaged over each smooth fan of corners. All steps but the first work on the representation
 z = rho exp(i N t), so that the result does not depend on which of the N members is stored.
 
 A field can have more values than z: the deviations of directions that are not evenly spaced, and
@@ -27,11 +27,13 @@ from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..progress import report
-from .face_values import FaceValues, face_values
-from .fan_values import FanValues, fan_values, transport_phase
-from .field_channel import FieldChannel, rotation_order
+from .face_values import TangentValues, face_values
+from .field_channel import REPRESENTATION, FieldChannel, rotation_order
+from .gbuffer import MeshInstance
+from .pixel_blocks import part_of
 from .vector_components import (
     BLOCK_SIZE,
+    VectorComponents,
     cofactor_matrix,
     cross_components,
     normalize_components,
@@ -51,8 +53,6 @@ class CornerField:
         Unit normals n_0, n_1, n_2. The first axis is the corner, the second the component.
     reference_tangent : (3, T) float32 ndarray
         A unit tangent at n_0. The angles of all three corners are relative to it.
-    representation : (3, T) complex64 ndarray
-        z at each corner. The values of corners 1 and 2 are transported along the arc to n_0.
     normal_dots : (3, T) float32 ndarray
         The scalar products n_0.n_1, n_0.n_2 and n_1.n_2.
     normal_triple_product : (T,) float32 ndarray
@@ -60,28 +60,26 @@ class CornerField:
     geometric_normal : (3, T) float32 ndarray
         Unit normals of the triangles, oriented by the order of their corners.
     channels : dict of FieldChannel to (3, T) complex64 ndarray
-        Additional values, transported like `representation`.
+        z, and the other values of the field, at each corner. Those of corners 1 and 2 are transported
+        along the arc to n_0.
     """
 
     corner_normals: np.ndarray
     reference_tangent: np.ndarray
-    representation: np.ndarray
     normal_dots: np.ndarray
     normal_triple_product: np.ndarray
     geometric_normal: np.ndarray
     channels: dict[FieldChannel, np.ndarray]
 
+    @property
+    def representation(self) -> np.ndarray:
+        """(3, T) complex64: z at each corner."""
+        return self.channels[REPRESENTATION]
+
     def part(self, triangle: np.ndarray) -> CornerField:
         """Return the values of (n,) triangles."""
-        return CornerField(
-            corner_normals=self.corner_normals[..., triangle],
-            reference_tangent=self.reference_tangent[:, triangle],
-            representation=self.representation[:, triangle],
-            normal_dots=self.normal_dots[:, triangle],
-            normal_triple_product=self.normal_triple_product[triangle],
-            geometric_normal=self.geometric_normal[:, triangle],
-            channels={channel: values[:, triangle] for channel, values in self.channels.items()},
-        )
+        channels = {channel: values[:, triangle] for channel, values in self.channels.items()}
+        return replace(part_of(self, (..., triangle)), channels=channels)
 
     def rotated(self, rotation: np.ndarray) -> CornerField:
         """Return the same values with all vectors rotated by a (3, 3) matrix into another space."""
@@ -117,15 +115,16 @@ def field_at_corners(
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     deformed = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
     report(0.0, "averaging the field at corners")
-    faces = face_values(surface, linear, deformed, field, with_angles=display == "smooth")
+    faces, corner_angle = face_values(surface, linear, deformed, field, display == "smooth")
     report(0.4, "averaging the field at corners")
-    fans = fan_values(surface, linear, faces, field.degree) if display == "smooth" else None
+    fans = None
+    if corner_angle is not None:
+        fans = _fan_values(surface, linear, faces, corner_angle, field.degree)
     report(0.7, "averaging the field at corners")
     count = len(surface.triangles)
     corner_field = CornerField(
         corner_normals=np.empty((3, 3, count), dtype=np.float32),
         reference_tangent=np.empty((3, count), dtype=np.float32),
-        representation=np.empty((3, count), dtype=np.complex64),
         normal_dots=np.empty((3, count), dtype=np.float32),
         normal_triple_product=np.empty(count, dtype=np.float32),
         geometric_normal=np.empty((3, count), dtype=np.float32),
@@ -143,19 +142,114 @@ def field_at_corners(
 
 
 def cached_corner_field(
-    surface: Surface, matrix: np.ndarray, field: RosyField, display: str, cache: Cache | None = None
+    instance: MeshInstance, display: str, cache: Cache | None = None
 ) -> CornerField:
-    """Do the same as `field_at_corners`, with results stored in a cache if one is given.
+    """Return `field_at_corners` of an instance with a field, stored in a cache if one is given.
 
     All cameras, and instances that differ only in their location, share one corner field.
     """
+    surface, field = instance.surface, instance.field
+    create = partial(field_at_corners, surface, instance.matrix, field, display)
     if cache is None:
-        return field_at_corners(surface, matrix, field, display)
-    linear = np.ascontiguousarray(np.asarray(matrix, dtype=np.float64)[:3, :3])
-    return cache.get_or_create(
-        ("corner field", surface, field, linear.tobytes(), display),
-        partial(field_at_corners, surface, matrix, field, display),
+        return create()
+    linear = np.ascontiguousarray(np.asarray(instance.matrix, dtype=np.float64)[:3, :3])
+    return cache.get_or_create(("corner field", surface, field, linear.tobytes(), display), create)
+
+
+def _fan_values(
+    surface: Surface,
+    linear: np.ndarray,
+    faces: TangentValues,
+    corner_angle: np.ndarray,
+    degree: int,
+) -> TangentValues:
+    """Average the values of the faces around each fan, weighted by their corner angles.
+
+    Each value is transported by the minimal rotation from the face normal to the fan normal. Faces
+    where the field is undefined have no weight.
+
+    Parameters
+    ----------
+    surface : Surface
+    linear : (3, 3) float64 ndarray
+        Object to world space, without the translation.
+    faces : TangentValues
+    corner_angle : (C,) float32 ndarray
+        From `face_values`.
+    degree : int
+    """
+    normal = np.array(
+        normalize_components(transform_components(surface.fan_normal.T, cofactor_matrix(linear)))
     )
+    normal = normal.astype(np.float32)
+    frame_x, frame_y = tangent_frame_components(normal)
+    count, fan_count = len(surface.corner_vertex), normal.shape[1]
+    weight = np.empty(count)
+    values = [
+        (face_channel, rotation_order(channel, degree))
+        for channel, face_channel in faces.channels.items()
+    ]
+    sums = [(np.empty(count), np.empty(count)) for _ in values]
+    for start in range(0, count, BLOCK_SIZE):
+        block = slice(start, min(start + BLOCK_SIZE, count))
+        face, fan = surface.corner_face[block], surface.corner_fan[block].astype(np.intp)
+        phase = transport_phase(
+            [component.take(face) for component in faces.normal],
+            [component.take(fan) for component in normal],
+            [x.take(fan) for x in frame_x],
+            [y.take(fan) for y in frame_y],
+        )
+        is_defined = faces.channels[REPRESENTATION].take(face) != 0
+        np.multiply(corner_angle[block], is_defined, out=weight[block])
+        for (face_channel, order), (real, imaginary) in zip(values, sums, strict=True):
+            z = face_channel.take(face)
+            z *= signed_power(phase, order)
+            z *= weight[block]
+            real[block], imaginary[block] = z.real, z.imag
+    total = np.bincount(surface.corner_fan, weight, fan_count)
+    total[total == 0] = np.inf
+    averages = []
+    for real, imaginary in sums:
+        z = np.empty(fan_count, dtype=np.complex64)
+        z.real = np.bincount(surface.corner_fan, real, fan_count) / total
+        z.imag = np.bincount(surface.corner_fan, imaginary, fan_count) / total
+        averages.append(z)
+    return TangentValues(normal, dict(zip(faces.channels, averages, strict=True)))
+
+
+def transport_phase(
+    source: VectorComponents, target: VectorComponents, x: VectorComponents, y: VectorComponents
+) -> np.ndarray:
+    """Return the rotations from the tangent frames of source normals to those of target normals.
+
+    Parameters
+    ----------
+    source, target : 3 (n,) ndarrays
+        Unit normals.
+    x, y : 3 (n,) ndarrays
+        Tangent frames of `target`.
+
+    Returns
+    -------
+    (n,) complex64 ndarray
+        Unit numbers: the x axis of the tangent frame of `source`, transported to `target`, in the
+        frame x, y. Zero if it cannot be transported.
+
+    Notes
+    -----
+    As in `field.frames.transport`, v at s becomes v - (v.t) / (1 + s.t) (s + t) at t. The term
+    along t is left out, because t is perpendicular to the frame.
+    """
+    tangents, _ = tangent_frame_components(source)
+    fraction = dot_components(tangents, target)
+    fraction /= np.maximum(1 + dot_components(source, target), np.finfo(fraction.dtype).eps)
+    phase = np.empty(len(fraction), dtype=np.complex64)
+    phase.real = dot_components(tangents, x) - fraction * dot_components(source, x)
+    phase.imag = dot_components(tangents, y) - fraction * dot_components(source, y)
+    modulus = np.sqrt(phase.real * phase.real + phase.imag * phase.imag)
+    modulus[modulus == 0] = np.inf
+    phase *= np.float32(1) / modulus
+    return phase
 
 
 def _fill_triangles(
@@ -163,8 +257,8 @@ def _fill_triangles(
     block: slice,
     surface: Surface,
     deformed: np.ndarray,
-    faces: FaceValues,
-    fans: FanValues | None,
+    faces: TangentValues,
+    fans: TangentValues | None,
     custom_normals: np.ndarray | None,
     degree: int,
 ) -> None:
@@ -187,26 +281,18 @@ def _fill_triangles(
     normals = [_fill_missing_normals(normal, geometric_normal) for normal in normals]
     x, y = tangent_frame_components(normals[0])
     # Where the field of a face is undefined, it is undefined at all corners of the face.
-    defined = faces.representation.take(face) != 0
-    outputs = [
-        (corner_field.representation, degree, faces.representation, fans and fans.representation)
-    ]
-    outputs += [
-        (
-            out,
-            rotation_order(channel, degree),
-            faces.channels[channel],
-            fans and fans.channels[channel],
-        )
-        for channel, out in corner_field.channels.items()
-    ]
+    defined = faces.channels[REPRESENTATION].take(face) != 0
     for corner, normal in enumerate(normals):
         corner_field.corner_normals[corner, :, block] = normal
         to_reference = (
             transport_phase(normal, normals[0], x, y) if corner and fans is not None else None
         )
-        for out, order, face_channel, fan_channel in outputs:
-            z = face_channel.take(face) if fan_channel is None else fan_channel.take(fan[corner])
+        for channel, out in corner_field.channels.items():
+            order = rotation_order(channel, degree)
+            if fans is None:
+                z = faces.channels[channel].take(face)
+            else:
+                z = fans.channels[channel].take(fan[corner])
             if phases is not None:
                 z *= signed_power(phases[corner], order)
             if to_reference is not None:
@@ -240,7 +326,7 @@ def _fill_missing_normals(
 def _corner_normals(
     fan: Sequence[np.ndarray],
     corners: np.ndarray,
-    fans: FanValues,
+    fans: TangentValues,
     custom_normals: np.ndarray | None,
 ) -> tuple[list[list[np.ndarray]], list[np.ndarray] | None]:
     """Return the normals at the three corners of triangles, and the rotations of frames to them.
@@ -251,7 +337,7 @@ def _corner_normals(
         Fan of each corner.
     corners : (3, n) ndarray of int
         Corners of the triangles.
-    fans : FanValues
+    fans : TangentValues
     custom_normals : (3, C) ndarray or None
         Normals that differ within fans, of any length.
 

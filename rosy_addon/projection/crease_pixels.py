@@ -57,10 +57,15 @@ def crease_pixels(
         report(start / len(points), "drawing outlines")
         lines = _on_screen(points[start : start + BLOCK_EDGES], gbuffer.camera)
         for axis in (0, 1):
-            for crossing in _crossings(lines, axis, gbuffer.camera):
-                _mark_visible(
-                    gbuffer, instance_id, axis, *crossing, entry_of_cell, origin, stride, marks
-                )
+            for row, column, offset, depth in _crossings(lines, axis, gbuffer.camera):
+                entry = entry_of_cell.take(origin + row * stride + column)
+                found = np.flatnonzero(entry >= 0)
+                found = found[gbuffer.instance_id[entry[found]] == instance_id]
+                entry = entry[found]
+                surface_depth, slope_x, slope_y, tolerance = depth_slopes(gbuffer, entry)
+                surface_depth = surface_depth + (slope_x, slope_y)[axis] * offset[found]
+                is_visible = np.abs(depth[found] - surface_depth) <= LINE_TOLERANCE * tolerance
+                marks[entry[is_visible]] = True
     return marks
 
 
@@ -86,15 +91,15 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
 
 def _crossings(
     lines: np.ndarray, axis: int, camera: Camera
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield where lines cross the pixel rows (axis 0) or columns (axis 1).
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield where lines cross the pixel rows (axis 0) or columns (axis 1), with the pixels on both sides.
 
     Yields
     ------
-    index : (k,) int64 ndarray
-        Row, or column.
-    position, depth : (k,) float64 ndarray
-        Where along the row, or column, in pixels; and the depth there.
+    row, column : (k,) int64 ndarray
+        A pixel next to the crossing. It may be outside of the frame, by one pixel.
+    offset, depth : (k,) float64 ndarray
+        Of the crossing: its distance along the axis from the center of the pixel, and its depth.
     """
     along, across = axis, 1 - axis
     size = (camera.width, camera.height)
@@ -109,32 +114,8 @@ def _crossings(
         index = concatenated_ranges(first[part], count[part])
         point = low[line] + slope[line] * (index + 0.5 - low[line, across])[:, None]
         inside = (point[:, along] > -0.5) & (point[:, along] < size[along] + 0.5)
-        yield index[inside], point[inside, along], point[inside, 2]
-
-
-def _mark_visible(
-    gbuffer: GBuffer,
-    instance_id: int,
-    axis: int,
-    index: np.ndarray,
-    position: np.ndarray,
-    depth: np.ndarray,
-    entry_of_cell: np.ndarray,
-    origin: int,
-    stride: int,
-    marks: np.ndarray,
-) -> None:
-    """Mark the pixels on both sides of crossings at which the edge is visible."""
-    before = np.floor(position - 0.5).astype(np.int64)
-    for side in (0, 1):
-        place = before + side
-        cell = index * stride + place if axis == 0 else place * stride + index
-        entry = entry_of_cell.take(origin + cell)
-        found = np.flatnonzero(entry >= 0)
-        found = found[gbuffer.instance_id[entry[found]] == instance_id]
-        entry = entry[found]
-        surface_depth, slope_x, slope_y, tolerance = depth_slopes(gbuffer, entry)
-        offset = position[found] - (place[found] + 0.5)
-        surface_depth = surface_depth + (slope_x if axis == 0 else slope_y) * offset
-        is_visible = np.abs(depth[found] - surface_depth) <= LINE_TOLERANCE * tolerance
-        marks[entry[is_visible]] = True
+        index, position, depth = index[inside], point[inside, along], point[inside, 2]
+        before = np.floor(position - 0.5).astype(np.int64)
+        for place in (before, before + 1):
+            row, column = (index, place) if axis == 0 else (place, index)
+            yield row, column, position - (place + 0.5), depth

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..field.directional_field import field_harmonics
 from ..field.frames import dot_components, transform_components
-from ..field.representation import power, signed_power
+from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from .field_channel import FieldChannel, rotation_order
+from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .vector_components import (
     BLOCK_SIZE,
     VectorComponents,
@@ -23,36 +23,31 @@ from .vector_components import (
     tangent_frame_components,
 )
 
-#: Relative tolerance of `_similarity_scale`: the rounding error of Blender's single precision
+#: Relative tolerance of `similarity_scale`: the rounding error of Blender's single precision
 #: matrices.
 SIMILARITY_EPS = 2e-6
 
 
 @dataclass(frozen=True, eq=False)
-class FaceValues:
-    """Normals, field values and corner angles of the F deformed faces.
+class TangentValues:
+    """The field in the tangent planes of the n faces, or smooth fans, of a deformed surface.
 
     Attributes
     ----------
-    normal : (3, F) float32 ndarray
+    normal : (3, n) float32 ndarray
         Unit normals. Zero for a face without area.
-    representation : (F,) complex64 ndarray
-        z in the tangent frame of the normal (`tangent_frame_components`). Zero for a face without area.
-    corner_angle : (C,) float32 ndarray or None
-        Interior angle of the face at each of its corners, in radians.
-    channels : dict of FieldChannel to (F,) complex64 ndarray
-        Additional values in the same frame.
+    channels : dict of FieldChannel to (n,) complex64 ndarray
+        z, and the other values of the field, in the tangent frame of the normal
+        (`tangent_frame_components`). Zero for a face without area.
     """
 
     normal: np.ndarray
-    representation: np.ndarray
-    corner_angle: np.ndarray | None
     channels: dict[FieldChannel, np.ndarray]
 
 
 def face_values(
     surface: Surface, linear: np.ndarray, deformed: np.ndarray, field: RosyField, with_angles: bool
-) -> FaceValues:
+) -> tuple[TangentValues, np.ndarray | None]:
     """Transport the stored members from the faces of the rest shape to the deformed faces.
 
     Parameters
@@ -64,7 +59,12 @@ def face_values(
         The vertices, transformed by `linear`.
     field : RosyField
     with_angles : bool
-        Compute the corner angles too.
+
+    Returns
+    -------
+    faces : TangentValues
+    corner_angle : (C,) float32 ndarray or None
+        Interior angle of the face at each of its corners, in radians. None without angles.
     """
     count = surface.face_count
     relative_channels: dict[FieldChannel, np.ndarray] = {
@@ -72,20 +72,16 @@ def face_values(
     }
     if field.family_count > 1:
         relative_channels["family", field.family_count] = np.ones(count)
-    result = FaceValues(
-        normal=np.empty((3, count), dtype=np.float32),
-        representation=np.empty(count, dtype=np.complex64),
-        corner_angle=np.empty(len(surface.corner_vertex), dtype=np.float32)
-        if with_angles
-        else None,
-        channels={channel: np.empty(count, dtype=np.complex64) for channel in relative_channels},
+    faces = TangentValues(
+        np.empty((3, count), dtype=np.float32),
+        {
+            channel: np.empty(count, dtype=np.complex64)
+            for channel in (REPRESENTATION, *relative_channels)
+        },
     )
-    scale = _similarity_scale(linear) if surface.rest_vertices is None else None
-    rest = None
-    if scale is None:
-        rest = np.ascontiguousarray(
-            (surface.vertices if surface.rest_vertices is None else surface.rest_vertices).T
-        )
+    corner_angle = np.empty(len(surface.corner_vertex), np.float32) if with_angles else None
+    scale = similarity_scale(linear) if surface.rest_vertices is None else None
+    rest = None if scale else np.ascontiguousarray(surface.in_rest_shape().vertices.T)
     for corner_count, block in _faces_by_size(surface.face_start):
         first_corner = surface.face_start[:-1][block]
         corner_vertex = [
@@ -93,10 +89,10 @@ def face_values(
         ]
         points = relative_to_first(deformed, corner_vertex)
         normal = polygon_normals(points)
-        for component, out in zip(normal, result.normal, strict=True):
+        for component, out in zip(normal, faces.normal, strict=True):
             out[block] = component
         x, y = tangent_frame_components(
-            [component[block].astype(np.float64) for component in result.normal]
+            [component[block].astype(np.float64) for component in faces.normal]
         )
         vectors = [np.ascontiguousarray(component) for component in field.vectors[block].T]
         if rest is None:
@@ -109,14 +105,14 @@ def face_values(
         rho = np.abs(member)
         member /= np.maximum(rho, np.finfo(np.float64).tiny)
         has_area = np.logical_or.reduce(normal)
-        result.representation[block] = power(member, field.degree) * (rho * has_area)
-        for channel, values in relative_channels.items():
+        for channel, out in faces.channels.items():
             rotation = signed_power(member, rotation_order(channel, field.degree))
-            result.channels[channel][block] = values[block] * rotation * has_area
+            values = rho if channel == REPRESENTATION else relative_channels[channel][block]
+            out[block] = values * rotation * has_area
         if with_angles:
             for corner, angle in enumerate(polygon_angles(points)):
-                result.corner_angle[first_corner + corner] = angle
-    return result
+                corner_angle[first_corner + corner] = angle
+    return faces, corner_angle
 
 
 def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray]]:
@@ -135,17 +131,14 @@ def _faces_by_size(face_start: np.ndarray) -> list[tuple[int, slice | np.ndarray
     return blocks
 
 
-def _similarity_scale(linear: np.ndarray) -> float | None:
+def similarity_scale(linear: np.ndarray, tolerance: float = SIMILARITY_EPS) -> float | None:
     """Return the scale of a (3, 3) linear map, or None if the map is not a similarity.
 
-    A similarity is a uniform scale with a rotation or reflection.
+    A similarity is a uniform scale with a rotation or reflection. `tolerance` is relative.
     """
     gram = linear.T @ linear
     squared_scale = np.trace(gram) / 3
-    if (
-        not squared_scale > 0
-        or np.abs(gram - squared_scale * np.eye(3)).max() > SIMILARITY_EPS * squared_scale
-    ):
+    if np.abs(gram - squared_scale * np.eye(3)).max() > tolerance * squared_scale:
         return None
     return float(np.sqrt(squared_scale))
 

@@ -1,11 +1,13 @@
-"""Field channels: values that a field can have in addition to its representation z."""
+"""Field channels: the representation z of a field, and values that it can have in addition."""
 
 from __future__ import annotations
 
-#: Key of a value that a field can have in addition to z. ("deviation", j) is the harmonic C_j of
-#: `field.directional_field`. ("family", m) is the representation, of degree N / m, of the line that
-#: the stored member is on.
+#: Key of a value of a field. ("deviation", j) is the harmonic C_j of `field.directional_field`.
+#: ("family", m) is the representation, of degree N / m, of the line that the stored member is on.
 FieldChannel = tuple[str, int]
+
+#: The channel of z itself, of degree N, which every field has.
+REPRESENTATION: FieldChannel = ("family", 1)
 
 
 def rotation_order(channel: FieldChannel, degree: int) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .camera import Camera
 from .field_channel import FieldChannel
+from .pixel_blocks import part_of, pixel_blocks
 from .surface_tone import SurfaceTone
 
 
@@ -39,10 +40,26 @@ class MeshInstance:
     tone: SurfaceTone | None = None
     color_values: np.ndarray | None = None
 
+    def to_world(self, points: np.ndarray) -> np.ndarray:
+        """Return (..., 3) points of object space in world space."""
+        matrix = np.asarray(self.matrix, dtype=np.float64)
+        return points @ matrix[:3, :3].T + matrix[:3, 3]
+
     def world_points(self) -> np.ndarray:
         """Return the (V, 3) float64 vertices in world space."""
-        matrix = np.asarray(self.matrix, dtype=np.float64)
-        return self.surface.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        return self.to_world(self.surface.vertices)
+
+    def world_bounds(self) -> np.ndarray:
+        """Return the (8, 3) corners of the bounding box in world space.
+
+        The box is aligned to the axes of object space.
+        """
+        return self.to_world(self.surface.box_corners)
+
+    def points_in_triangles(self, triangle: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+        """Return (n, 3) points in world space, given (n,) triangles and (n, 3) coordinates in them."""
+        corners = self.to_world(self.surface.vertices[self.surface.triangle_vertex[triangle]])
+        return np.einsum("nk,nki->ni", barycentric, corners)
 
     def face_points(self) -> np.ndarray:
         """Return the (n, 3) float64 vertices that have a face, in world space."""
@@ -81,8 +98,8 @@ class PixelSamples(NamedTuple):
         The samples that show the triangle of the entry: bit ``row * S + column``.
     other : (E,) int32 ndarray
         The samples that show another triangle, as flat indices into the frame of all samples.
-    other_instance, other_triangle : (E,) int32 ndarray
-        That triangle, and its mesh instance.
+    other_triangle : (E,) int32 ndarray
+        That triangle, counted over all mesh instances.
     other_entry : (E,) int32 ndarray
         The entry whose surface they show: that of their own pixel, or of one beside it.
     """
@@ -90,7 +107,6 @@ class PixelSamples(NamedTuple):
     side: int
     own: np.ndarray
     other: np.ndarray
-    other_instance: np.ndarray
     other_triangle: np.ndarray
     other_entry: np.ndarray
 
@@ -104,10 +120,8 @@ class GBuffer:
     Attributes
     ----------
     camera : Camera
-    instance_names : tuple of str
-        Name of each mesh instance.
-    instance_degrees : tuple of int
-        Degree of the field of each mesh instance, 0 without a field.
+    instances : tuple of MeshInstance
+        The mesh instances that were projected, in the order of `instance_id`.
     pixel : (P,) int32 ndarray
         Flat index into the frame, row by row from the lower left.
     instance_id : (P,) int32 ndarray
@@ -130,16 +144,13 @@ class GBuffer:
         Zero where the field is undefined.
     geometric_normal : (P, 3) float32 ndarray
         Unit normal of the visible triangle, without smooth shading. It points to the side that the
-        camera sees. Equal to `normal` by default.
+        camera sees.
     front_facing : (P,) bool ndarray
-        Whether the corners of the visible triangle run counter-clockwise in the picture. True at
-        all pixels by default.
+        Whether the corners of the visible triangle run counter-clockwise in the picture.
     channels : dict of FieldChannel to (P,) complex64 ndarray
         Additional values of some fields (see `field_channel.FieldChannel`), in the same frame as
         `representation`. Instances that do not have a channel have the value that it has for a
         plain RoSy field.
-    instances : tuple of MeshInstance
-        The mesh instances that were projected, in the order of `instance_id`. Empty if unknown.
     coverage : PixelCoverage or None
         How much of the pixels the entries cover, if pixels have several samples. None if each entry
         covers its pixel.
@@ -148,8 +159,7 @@ class GBuffer:
     """
 
     camera: Camera
-    instance_names: tuple[str, ...]
-    instance_degrees: tuple[int, ...]
+    instances: tuple[MeshInstance, ...]
     pixel: np.ndarray
     instance_id: np.ndarray
     face: np.ndarray
@@ -159,25 +169,42 @@ class GBuffer:
     normal: np.ndarray
     view_direction: np.ndarray
     representation: np.ndarray
-    geometric_normal: np.ndarray | None = None
-    front_facing: np.ndarray | None = None
-    channels: dict[FieldChannel, np.ndarray] = dataclass_field(default_factory=dict)
-    instances: tuple[MeshInstance, ...] = ()
+    geometric_normal: np.ndarray
+    front_facing: np.ndarray
+    channels: dict[FieldChannel, np.ndarray]
     coverage: PixelCoverage | None = None
     samples: PixelSamples | None = None
 
-    def __post_init__(self) -> None:
-        if self.geometric_normal is None:
-            object.__setattr__(self, "geometric_normal", self.normal)
-        if self.front_facing is None:
-            object.__setattr__(self, "front_facing", np.ones(len(self.pixel), dtype=bool))
+    @property
+    def instance_degrees(self) -> list[int]:
+        """The degree of the field of each mesh instance, 0 without a field."""
+        fields = [instance.field for instance in self.instances]
+        return [0 if field is None else field.degree for field in fields]
 
     def part(self, extent: slice) -> GBuffer:
         """Return the G-buffer of some of the pixels, without a copy and without their samples."""
-        arrays = {
-            name: value[extent]
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-        }
         channels = {channel: values[extent] for channel, values in self.channels.items()}
-        return replace(self, **arrays, channels=channels, coverage=None, samples=None)
+        return replace(part_of(self, extent), channels=channels, coverage=None, samples=None)
+
+    def instance_blocks(
+        self,
+    ) -> Iterator[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
+        """Yield the visible mesh instances in their order, with their pixels.
+
+        Yields
+        ------
+        instance_id : int
+        blocks : list of slice or of (n,) intp ndarray
+            Blocks of its pixels; see `pixel_blocks`.
+        progress : (float, float)
+            The fractions of all pixels that are those of instances before it, and of these and its own.
+        """
+        counts = np.bincount(self.instance_id)
+        ends = np.cumsum(counts) / len(self.pixel)
+        for instance_id in np.flatnonzero(counts).tolist():
+            blocks: list[slice | np.ndarray] = [*pixel_blocks(counts[instance_id])]
+            if counts[instance_id] < len(self.pixel):
+                pixels = np.flatnonzero(self.instance_id == instance_id)
+                blocks = [pixels[block] for block in blocks]
+            start = ends[instance_id - 1] if instance_id else 0.0
+            yield instance_id, blocks, (start, ends[instance_id])

@@ -11,7 +11,7 @@ from ..cache import Cache, content_hash
 from ..field.creases import find_creases
 from ..field.surface import Surface, connected_components
 from ..progress import progress, report
-from .face_values import SIMILARITY_EPS
+from .face_values import similarity_scale
 
 
 class OutlineMesh(NamedTuple):
@@ -41,7 +41,7 @@ class OutlineMesh(NamedTuple):
         return surface.vertices[self.crease_ends] @ linear.T
 
 
-def outline_mesh(surface: Surface, matrix: np.ndarray, crease_angle: float | None) -> OutlineMesh:
+def outline_mesh(surface: Surface, linear: np.ndarray, crease_angle: float | None) -> OutlineMesh:
     """Find the creases and the parts of a mesh, in its rest shape.
 
     Creases neither appear nor vanish while a mesh is deformed, so outlines do not flicker.
@@ -49,18 +49,16 @@ def outline_mesh(surface: Surface, matrix: np.ndarray, crease_angle: float | Non
     Parameters
     ----------
     surface : Surface
-    matrix : (3, 3) or (4, 4) ndarray
-        Object to world space. The translation has no effect.
+    linear : (3, 3) ndarray
+        Object to world space, without the translation.
     crease_angle : float or None
         See `find_creases`. None: no creases.
     """
     ends = np.empty((0, 2), dtype=np.int32)
     if crease_angle is not None:
-        shape, linear = surface.in_rest_shape(), np.asarray(matrix, dtype=np.float64)[:3, :3]
-        if not _is_similarity(linear):
-            shape = shape.with_vertices(shape.vertices @ linear.T)
+        shape = surface.in_rest_shape()
         with progress(0.0, 0.6):
-            ends = find_creases(shape, crease_angle).ends
+            ends = find_creases(shape.with_vertices(shape.vertices @ linear.T), crease_angle).ends
     report(0.6, "finding connected parts")
     pairs = np.stack([surface.corner_vertex, surface.corner_vertex[surface.next_corner]], axis=1)
     with progress(0.6, 1.0):
@@ -76,20 +74,11 @@ def cached_outline_mesh(
 
     All deformations of a mesh share a result.
     """
-    if cache is None:
-        return outline_mesh(surface, matrix, crease_angle)
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    if _is_similarity(linear):
+    if similarity_scale(linear) is not None:
         linear = np.eye(3)
+    create = partial(outline_mesh, surface, linear, crease_angle)
+    if cache is None:
+        return create()
     shape_key = surface.rest_shape_key, content_hash(surface.corner_fan)
-    return cache.get_or_create(
-        ("outline mesh", *shape_key, linear.tobytes(), crease_angle),
-        partial(outline_mesh, surface, linear, crease_angle),
-    )
-
-
-def _is_similarity(linear: np.ndarray) -> bool:
-    """Return whether a matrix keeps all angles."""
-    gram = linear.T @ linear
-    scale = np.trace(gram) / 3
-    return bool(np.abs(gram - scale * np.eye(3)).max() <= SIMILARITY_EPS * scale)
+    return cache.get_or_create(("outline mesh", *shape_key, linear.tobytes(), crease_angle), create)

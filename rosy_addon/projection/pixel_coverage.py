@@ -25,7 +25,7 @@ MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
 LABEL = "finding visible pixels"
 
 
-class OtherSamples(NamedTuple):
+class _OtherSamples(NamedTuple):
     """The E samples that show another triangle than the center of their pixel.
 
     Attributes
@@ -35,9 +35,9 @@ class OtherSamples(NamedTuple):
     x, y : (E,) float32 ndarray
         Position in pixels.
     depth : (E,) float32 ndarray
-        Linear on screen for planes, as of `pixel_neighbors.affine_depth`.
-    instance_id, triangle : (E,) int32 ndarray
-        Visible triangle, and its mesh instance.
+        Linear on screen for planes, as of `pixel_neighbors.depth_slopes`.
+    instance_id : (E,) int32 ndarray
+        Mesh instance of the visible triangle.
     normal : (3, E) float32 ndarray
         Unit normals of the triangles in camera space, of either orientation.
     """
@@ -47,16 +47,15 @@ class OtherSamples(NamedTuple):
     y: np.ndarray
     depth: np.ndarray
     instance_id: np.ndarray
-    triangle: np.ndarray
     normal: np.ndarray
 
-    def part(self, index: np.ndarray | slice) -> OtherSamples:
+    def part(self, index: np.ndarray | slice) -> _OtherSamples:
         """Return some of the samples."""
-        return OtherSamples(*(values[..., index] for values in self))
+        return _OtherSamples(*(values[..., index] for values in self))
 
 
 class _Entries(NamedTuple):
-    """What is compared of the entries of a G-buffer: (P,) arrays as in `OtherSamples`."""
+    """What is compared of the entries of a G-buffer: (P,) arrays as in `_OtherSamples`."""
 
     x: np.ndarray
     y: np.ndarray
@@ -67,7 +66,7 @@ class _Entries(NamedTuple):
     instance_id: np.ndarray
     normal: np.ndarray
 
-    def shows(self, entry: np.ndarray, sample: OtherSamples) -> np.ndarray:
+    def shows(self, entry: np.ndarray, sample: _OtherSamples) -> np.ndarray:
         """Return (n,) bool: whether samples are on the surfaces of entries, near their pixels."""
         x, y = sample.x - self.x.take(entry), sample.y - self.y.take(entry)
         predicted = self.depth.take(entry)
@@ -78,39 +77,12 @@ class _Entries(NamedTuple):
         return is_near & (np.abs(cosine) >= MIN_NORMAL_COSINE)
 
 
-def other_samples(
+def pixel_coverage(
+    gbuffer: GBuffer,
     sampled: SampledTriangles,
-    camera: Camera,
     samples: int,
     instance_id: np.ndarray,
-    triangle: np.ndarray,
-    normal: np.ndarray,
-) -> OtherSamples:
-    """Return the samples that show another triangle than the center of their pixel.
-
-    Parameters
-    ----------
-    sampled : SampledTriangles
-    camera : Camera
-        Of the picture.
-    samples : int
-        Samples along each side of a pixel.
-    instance_id, triangle, normal
-        As in `OtherSamples`.
-    """
-    frame = camera.scaled(samples)
-    count = len(sampled.other_entry)
-    x, y, depth = np.empty((3, count), dtype=np.float32)
-    for block in pixel_blocks(count):
-        index = sampled.other_sample[block]
-        x[block], y[block] = _centers(index, frame.width, samples)
-        z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
-        depth[block] = -1 / z if camera.is_perspective else z
-    return OtherSamples(sampled.other_entry, x, y, depth, instance_id, triangle, normal)
-
-
-def pixel_coverage(
-    gbuffer: GBuffer, sampled: SampledTriangles, others: OtherSamples, samples: int
+    triangle_normal: np.ndarray,
 ) -> tuple[PixelCoverage, PixelSamples]:
     """Find the entry of the G-buffer whose surface each sample shows.
 
@@ -119,10 +91,12 @@ def pixel_coverage(
     gbuffer : GBuffer
         At the centers of pixels.
     sampled : SampledTriangles
-    others : OtherSamples
     samples : int
         Samples along each side of a pixel.
+    instance_id, triangle_normal
+        Of the other triangles of the samples, as in `_OtherSamples`.
     """
+    others = _other_samples(sampled, gbuffer.camera, samples, instance_id, triangle_normal)
     camera = gbuffer.camera
     count = len(gbuffer.pixel)
     stride = np.int32(camera.width + 2)
@@ -170,13 +144,27 @@ def pixel_coverage(
         own.astype(np.float32) * share, gbuffer.pixel[others.entry[moved]], entry[moved], share
     )
     return coverage, PixelSamples(
-        samples,
-        sampled.own_samples,
-        sampled.other_sample,
-        others.instance_id,
-        others.triangle,
-        entry,
+        samples, sampled.own_samples, sampled.other_sample, sampled.other_triangle, entry
     )
+
+
+def _other_samples(
+    sampled: SampledTriangles,
+    camera: Camera,
+    samples: int,
+    instance_id: np.ndarray,
+    normal: np.ndarray,
+) -> _OtherSamples:
+    """Return the samples that show another triangle than the center of their pixel."""
+    frame = camera.scaled(samples)
+    count = len(sampled.other_entry)
+    x, y, depth = np.empty((3, count), dtype=np.float32)
+    for block in pixel_blocks(count):
+        index = sampled.other_sample[block]
+        x[block], y[block] = _centers(index, frame.width, samples)
+        z = z_at_depth(frame, *pixel_rays(frame, index), sampled.other_depth[block])
+        depth[block] = -1 / z if camera.is_perspective else z
+    return _OtherSamples(sampled.other_entry, x, y, depth, instance_id, normal)
 
 
 def _centers(index: np.ndarray, width: int, samples: int) -> tuple[np.ndarray, np.ndarray]:

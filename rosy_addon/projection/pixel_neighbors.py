@@ -116,7 +116,10 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
         grid = _pixel_grid(gbuffer, slice(first, stop), grid_index, (band_rows + 1, width))
         grid_masks = np.zeros((band_rows + 1, width), dtype=np.uint16)
         for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
-            source, target = _neighbor_slices(band_rows + 1, width, dx, dy)
+            # The cells that have a neighbor at (dx, dy), and these neighbors.
+            left, right = max(-dx, 0), max(dx, 0)
+            source = slice(0, band_rows + 1 - dy), slice(left, width - right)
+            target = slice(dy, band_rows + 1), slice(right, width - left)
             continuous = _is_continuous(grid, source, target, (dx, dy), min_normal_cosine).astype(
                 np.uint16
             )
@@ -126,23 +129,6 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
         # Links within the last row of the grid are computed again in the next band.
         masks[first:stop] |= grid_masks.reshape(-1).take(grid_index)
     return masks
-
-
-def affine_depth(gbuffer: GBuffer) -> tuple[np.ndarray, np.ndarray]:
-    """Return the depth of pixels in the quantity that `neighbor_masks` uses, and its tolerance.
-
-    Parameters
-    ----------
-    gbuffer : GBuffer
-
-    Returns
-    -------
-    depth, tolerance : (P,) float32 ndarray
-        Depth: z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
-        Tolerance: permitted deviation from the prediction of the tangent plane, one pixel away.
-    """
-    depth, _, _, tolerance = depth_slopes(gbuffer, slice(None))
-    return depth, tolerance
 
 
 class _PixelGrid(NamedTuple):
@@ -191,9 +177,7 @@ def _pixel_grid(
         slope_y=scatter(slope_y),
         tolerance=scatter(tolerance),
         normal=tuple(scatter(component) for component in gbuffer.normal[pixels].T),
-        instance_id=scatter(gbuffer.instance_id[pixels])
-        if len(gbuffer.instance_names) > 1
-        else None,
+        instance_id=scatter(gbuffer.instance_id[pixels]) if len(gbuffer.instances) > 1 else None,
         front_facing=None if gbuffer.front_facing.all() else scatter(gbuffer.front_facing[pixels]),
     )
 
@@ -211,15 +195,15 @@ def depth_slopes(
 
     Returns
     -------
-    depth, slope_x, slope_y, tolerance : (n,) float32 ndarray
-        Depth and tolerance as of `affine_depth`. The slopes are the changes of the depth to the next
-        column and to the next row, on the tangent plane.
+    depth : (n,) float32 ndarray
+        z if orthographic, -1 / z if perspective; larger values are nearer to the eye.
+    slope_x, slope_y : (n,) float32 ndarray
+        Changes of the depth to the next column and to the next row, on the tangent plane.
+    tolerance : (n,) float32 ndarray
+        Permitted deviation from the prediction of the tangent plane, one pixel away.
     """
-    camera, normal, z = (
-        gbuffer.camera,
-        gbuffer.geometric_normal[pixels].T,
-        gbuffer.position[pixels, 2],
-    )
+    camera, z = gbuffer.camera, gbuffer.position[pixels, 2]
+    normal = gbuffer.geometric_normal[pixels].T
     pixel_to_camera = (camera.clip_to_camera_xy * (2.0 / camera.width, 2.0 / camera.height)).astype(
         np.float32
     )
@@ -250,17 +234,6 @@ def depth_slopes(
     return depth, slope_x, slope_y, steepness
 
 
-def _neighbor_slices(
-    height: int, width: int, dx: int, dy: int
-) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Return the slices of the cells that have a neighbor at (dx, dy), and of these neighbors.
-
-    `dy` must not be negative.
-    """
-    columns = slice(max(-dx, 0), width - max(dx, 0)), slice(max(dx, 0), width - max(-dx, 0))
-    return (slice(0, height - dy), columns[0]), (slice(dy, height), columns[1])
-
-
 def _is_continuous(
     grid: _PixelGrid,
     source: tuple[slice, slice],
@@ -274,7 +247,7 @@ def _is_continuous(
     ----------
     grid : _PixelGrid
     source, target : (slice, slice)
-        From `_neighbor_slices`.
+        Rows and columns of the grid, of the same shape.
     step : (int, int)
         dx and dy from source to target.
     min_normal_cosine : float32 or None
@@ -285,8 +258,9 @@ def _is_continuous(
     (h', w') bool ndarray
     """
     jump = grid.depth[target] - grid.depth[source]
-    source_prediction = _predicted_step(grid.slope_x[source], grid.slope_y[source], *step)
-    target_prediction = _predicted_step(grid.slope_x[target], grid.slope_y[target], *step)
+    source_prediction, target_prediction = (
+        step[0] * grid.slope_x[cells] + step[1] * grid.slope_y[cells] for cells in (source, target)
+    )
     tolerance = np.minimum(grid.tolerance[source], grid.tolerance[target])
     if all(step):
         tolerance *= np.float32(np.sqrt(2))
@@ -308,12 +282,3 @@ def _is_continuous(
         normal_cosine += grid.normal[2][source] * grid.normal[2][target]
         continuous &= normal_cosine >= min_normal_cosine
     return continuous
-
-
-def _predicted_step(slope_x: np.ndarray, slope_y: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Return the change of depth on the tangent plane over a step to a neighbor."""
-    if not dx:
-        return slope_y
-    if not dy:
-        return slope_x
-    return slope_y + slope_x if dx > 0 else slope_y - slope_x

@@ -22,7 +22,6 @@ from ..field.surface import Surface
 from .camera import Camera
 from .gbuffer import MeshInstance
 from .project import all_triangles
-from .surface_points import SurfacePoints
 
 #: Points in the area of a square whose side is the spacing.
 POINTS_PER_SPACING = 8
@@ -84,7 +83,7 @@ class _Pieces:
 
 def progressive_samples(
     instance: MeshInstance, camera: Camera, spacing: float
-) -> tuple[SurfacePoints, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sample the part of a surface that is in the frame of a camera, visible or not.
 
     Parameters
@@ -96,15 +95,15 @@ def progressive_samples(
 
     Returns
     -------
-    points : SurfacePoints
-        Of instance 0.
+    triangle : (P,) int32 ndarray
+    barycentric : (P, 3) float64 ndarray
     rank : (P,) float64 ndarray
         The points up to a rank are an even sample of the surface. In points per square unit.
     """
-    clip, triangles, _ = all_triangles([instance], camera)
+    clip, triangles = all_triangles([instance], camera)
     shuffle = _random_bits(len(triangles))
     offset = _random_offsets(shuffle)
-    index, of_piece = [], []
+    numbers, of_pieces = [np.empty(0, np.int64)], [np.empty(0, np.intp)]
     start = _with_points(clip, triangles, camera, spacing, offset)
     area = np.zeros(len(triangles))
     area[start] = rest_areas(instance.surface, start) * matrix_scale(instance) ** 2
@@ -131,17 +130,10 @@ def progressive_samples(
         count = np.clip(count, 0, (4**DIGITS - 1 - whole.first) // step).astype(np.int64)
         chosen = np.repeat(np.arange(len(count)), count)
         rank_in_piece = concatenated_ranges(np.zeros(len(count), dtype=np.intp), count)
-        index.append(whole.first[chosen] + rank_in_piece * step)
-        of_piece.append(whole.triangle[chosen])
+        numbers.append(whole.first[chosen] + rank_in_piece * step)
+        of_pieces.append(whole.triangle[chosen])
         todo = todo.part(is_divided).divided(shuffle)
-    number = np.concatenate(index) if index else np.empty(0, np.int64)
-    triangle = np.concatenate(of_piece) if of_piece else np.empty(0, np.intp)
-    points = SurfacePoints(
-        np.zeros(len(number), dtype=np.int32),
-        triangle.astype(np.int32),
-        _barycentric(number, shuffle[triangle]),
-    )
-    return points, (number + offset[triangle]) / area[triangle]
+    return _points(np.concatenate(numbers), np.concatenate(of_pieces), shuffle, area)
 
 
 def _with_points(
@@ -227,7 +219,7 @@ def matrix_scale(instance: MeshInstance) -> float:
 
 def rest_areas(surface: Surface, triangle: np.ndarray | None = None) -> np.ndarray:
     """Return the (n,) areas of triangles, by default of all, before they deform."""
-    vertices = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    vertices = surface.in_rest_shape().vertices
     corners = surface.triangle_vertex if triangle is None else surface.triangle_vertex[triangle]
     a, b, c = (np.ascontiguousarray(vertices[corner].T) for corner in corners.T)
     (x, y, z), (u, v, w) = b - a, c - a
@@ -253,12 +245,22 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
     """
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))
-    offset = _random_offsets(shuffle)
-    count = np.ceil(area * density - offset).astype(np.int64)
-    triangle = np.repeat(np.arange(len(area)), np.maximum(count, 0))
-    number = concatenated_ranges(np.zeros(len(area), dtype=np.intp), np.maximum(count, 0))
-    rank = (number + offset[triangle]) / area[triangle]
-    return triangle.astype(np.int32), _barycentric(number, shuffle[triangle]), rank
+    count = np.maximum(np.ceil(area * density - _random_offsets(shuffle)), 0).astype(np.int64)
+    triangle = np.repeat(np.arange(len(area)), count)
+    number = concatenated_ranges(np.zeros(len(area), dtype=np.intp), count)
+    return _points(number, triangle, shuffle, area)
+
+
+def _points(
+    number: np.ndarray, triangle: np.ndarray, shuffle: np.ndarray, area: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the points with (P,) numbers in triangles as `progressive_samples` does.
+
+    `shuffle` and `area` are the random bits and the areas of all triangles.
+    """
+    shuffle, area = shuffle[triangle], area[triangle]
+    rank = (number + _random_offsets(shuffle)) / area
+    return triangle.astype(np.int32), _barycentric(number, shuffle), rank
 
 
 def _random_offsets(shuffle: np.ndarray) -> np.ndarray:

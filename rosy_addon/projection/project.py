@@ -9,7 +9,7 @@ on which of the N members is stored.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -22,11 +22,12 @@ from ..memory import raise_mmap_threshold
 from ..progress import progress, report
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import CornerField, cached_corner_field
-from .field_channel import rotation_order
+from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
-from .pixel_coverage import other_samples, pixel_coverage
+from .pixel_coverage import pixel_coverage
 from .rasterizer import (
+    LABEL,
     Fragments,
     SampledTriangles,
     barycentrics,
@@ -83,29 +84,30 @@ def project(
     """
     check_instances(instances, camera, display)
     raise_mmap_threshold()
-    report(0.0, "finding visible pixels")
+    report(0.0, LABEL)
     sampled = None
-    if samples > 1:
-        with progress(0.0, 0.3):
-            visible, sampled, other_instance, other_triangle = _visible_samples(
-                instances, camera, samples, rows
-            )
-    else:
-        with progress(0.0, 0.3):
-            visible = _visible_pixels(instances, camera, rows)
+    with progress(0.0, 0.3):
+        if samples > 1:
+            fragments, sampled = _visible_samples(instances, camera, samples, rows)
+        else:
+            fragments = _visible_pixels(instances, camera, rows)
+    if not len(fragments.pixel):
+        raise_nothing_in_view(instances, camera)
     with progress(0.3, 0.4):
-        gbuffer = _new_gbuffer(instances, camera, visible)
+        gbuffer = _new_gbuffer(instances, camera, fragments)
     with progress(0.4, 1.0 if sampled is None else 0.9):
-        geometric_normals = _fill_instances(gbuffer, visible, display, cache)
+        geometric_normals = _fill_instances(gbuffer, display, cache)
     if sampled is None:
         return gbuffer
+    other_instance, other_triangle = _split_triangles(instances, sampled.other_triangle)
     other_normal = np.zeros((3, len(other_triangle)), dtype=np.float32)
     for instance_id, normal in geometric_normals.items():
         of_instance = np.flatnonzero(other_instance == instance_id)
         other_normal[:, of_instance] = normal.take(other_triangle[of_instance], axis=1)
-    others = other_samples(sampled, camera, samples, other_instance, other_triangle, other_normal)
     with progress(0.9, 1.0):
-        coverage, pixel_samples = pixel_coverage(gbuffer, sampled, others, samples)
+        coverage, pixel_samples = pixel_coverage(
+            gbuffer, sampled, samples, other_instance, other_normal
+        )
     return replace(gbuffer, coverage=coverage, samples=pixel_samples)
 
 
@@ -117,7 +119,7 @@ def project_samples(
     Parameters
     ----------
     gbuffer : GBuffer
-        Of `project` with several samples, and with its instances.
+        Of `project` with several samples.
     entries : (n,) intp ndarray
         The pixels, as indices into the G-buffer.
     display, cache
@@ -130,12 +132,13 @@ def project_samples(
     home, shown : (Q,) int32 ndarray
         Entries of `gbuffer` for each sample: that of its pixel, and that whose surface it shows.
     """
-    report(0.0, "finding visible pixels")
+    report(0.0, LABEL)
     pixel_samples, instances = gbuffer.samples, gbuffer.instances
     side = pixel_samples.side
     camera = gbuffer.camera.scaled(side)
     width = np.int32(gbuffer.camera.width)
-    # The entries of `gbuffer`, the samples, and what is visible at them.
+    first_triangle = first_triangles(instances)
+    # The samples, the entries of `gbuffer`, and the triangles, counted over all instances.
     columns = []
     row, column = np.divmod(gbuffer.pixel[entries], width)
     for bit in range(side * side):
@@ -143,7 +146,8 @@ def project_samples(
         home = entries[is_own].astype(np.int32)
         sample = (row[is_own] * np.int32(side) + np.int32(bit // side)) * (width * np.int32(side))
         sample += column[is_own] * np.int32(side) + np.int32(bit % side)
-        columns.append((sample, home, home, gbuffer.instance_id[home], gbuffer.triangle[home]))
+        triangle = gbuffer.triangle[home] + first_triangle[gbuffer.instance_id[home]]
+        columns.append((sample, home, home, triangle))
     row, column = np.divmod(pixel_samples.other, width * np.int32(side))
     pixel = row // np.int32(side) * width + column // np.int32(side)
     place = np.minimum(np.searchsorted(gbuffer.pixel[entries], pixel), len(entries) - 1)
@@ -153,28 +157,23 @@ def project_samples(
             pixel_samples.other[others],
             entries[place[others]].astype(np.int32),
             pixel_samples.other_entry[others],
-            pixel_samples.other_instance[others],
             pixel_samples.other_triangle[others],
         )
     )
     columns = [np.concatenate(values) for values in zip(*columns, strict=True)]
     order = np.argsort(columns[0], kind="stable")
-    sample, home, shown, instance_id, triangle = (values[order] for values in columns)
-    clip, triangles, first_triangle = all_triangles(instances, camera)
-    global_triangle = triangle + first_triangle[instance_id]
+    sample, home, shown, triangle = (values[order] for values in columns)
+    clip, triangles = all_triangles(instances, camera)
     with progress(0.1, 0.3):
         weights, front_facing = barycentrics(
-            clip, triangles, sample, global_triangle, camera.width, camera.height
+            clip, triangles, sample, triangle, camera.width, camera.height
         )
-    corner_clip = clip[triangles[global_triangle], 2:]
-    z, w = np.einsum("nc,nck->kn", weights, corner_clip)
-    fragments = Fragments(sample, global_triangle, weights, front_facing, z / w)
-    visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
-    visible = _VisiblePixels(fragments, instance_id, triangle, visible_ids)
+    z, w = np.einsum("nc,nck->kn", weights, clip[triangles[triangle], 2:])
+    fragments = Fragments(sample, triangle, weights, front_facing, z / w)
     with progress(0.3, 0.5):
-        samples = _new_gbuffer(instances, camera, visible)
+        samples = _new_gbuffer(instances, camera, fragments)
     with progress(0.5, 1.0):
-        _fill_instances(samples, visible, display, cache)
+        _fill_instances(samples, display, cache)
     return samples, home, shown
 
 
@@ -203,9 +202,9 @@ def surface_points(
         With an entry for each point, in their order. Several may have the same pixel.
     """
     report(0.0, "finding directions")
-    clip, triangles, first_triangle = all_triangles(instances, camera)
-    global_triangle = points.triangle + first_triangle[points.instance_id]
-    corners = clip[triangles[global_triangle]]
+    clip, triangles = all_triangles(instances, camera)
+    triangle = points.triangle + first_triangles(instances)[points.instance_id]
+    corners = clip[triangles[triangle]]
     a, b, c = np.moveaxis(corners[..., (0, 1, 3)], 1, 0)
     front_facing = (a * np.cross(b, c)).sum(axis=1) > 0
     z, w = (points.barycentric[:, :, None] * corners[..., 2:]).sum(axis=1).T
@@ -213,24 +212,19 @@ def surface_points(
     column, row = np.clip(position.astype(np.int64), 0, size - 1).T
     fragments = Fragments(
         (row * camera.width + column).astype(np.int32),
-        global_triangle.astype(np.int32),
+        triangle.astype(np.int32),
         points.barycentric.astype(np.float32),
         front_facing,
         z / w,
     )
-    visible_ids = np.flatnonzero(np.bincount(points.instance_id)).tolist()
-    visible = _VisiblePixels(fragments, points.instance_id, points.triangle, visible_ids)
     with progress(0.0, 0.1):
-        gbuffer = _new_gbuffer(instances, camera, visible)
-    for instance_id in visible_ids:
+        gbuffer = _new_gbuffer(instances, camera, fragments)
+    for instance_id in np.unique(points.instance_id).tolist():
         chosen = np.flatnonzero(points.instance_id == instance_id)
         instance = instances[instance_id]
         with progress(0.1, 1.0):
-            corner_field = cached_corner_field(
-                instance.surface, instance.matrix, instance.field, display, cache
-            )
+            corner_field = cached_corner_field(instance, display, cache)
         corner_field = corner_field.part(points.triangle[chosen]).rotated(camera.view[:3, :3])
-        _allocate_channels(gbuffer, corner_field)
         _fill_pixels(gbuffer, chosen, np.arange(len(chosen)), corner_field, instance.field.degree)
     return gbuffer
 
@@ -283,107 +277,56 @@ def check_instances(instances: Sequence[MeshInstance], camera: Camera, display: 
 # --- visibility --------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
-class _VisiblePixels:
-    """The P visible pixels of instances with a field.
-
-    Attributes
-    ----------
-    fragments : Fragments
-        Its triangles are indices into the triangles of all instances together.
-    instance_id : (P,) int32 ndarray
-        Index of the visible instance.
-    triangle : (P,) int32 ndarray
-        Index of the visible triangle within its instance.
-    visible_ids : list of int
-        Instances that have at least one pixel, in ascending order.
-    """
-
-    fragments: Fragments
-    instance_id: np.ndarray
-    triangle: np.ndarray
-    visible_ids: list[int]
-
-    @property
-    def is_single_instance(self) -> bool:
-        """Whether all pixels show the same instance."""
-        return len(self.visible_ids) == 1
-
-
 def _visible_pixels(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None
-) -> _VisiblePixels:
-    """Find the pixels of some rows where the nearest surface has a field.
-
-    Raises
-    ------
-    NothingInViewError
-        If there is none.
-    """
-    fragments, first_triangle = rasterize_instances(instances, camera, rows)
-    if len(instances) == 1:
-        if not len(fragments.pixel):
-            raise_nothing_in_view(instances, camera)
-        return _VisiblePixels(
-            fragments, np.zeros(len(fragments.pixel), np.int32), fragments.triangle, [0]
-        )
-    instance_has_field = np.array([instance.field is not None for instance in instances])
-    instance_id, triangle = _split_triangles(first_triangle, fragments.triangle)
-    has_field = instance_has_field[instance_id]
-    if not has_field.any():
-        raise_nothing_in_view(instances, camera)
+) -> Fragments:
+    """Find the pixels of some rows where the nearest surface has a field."""
+    fragments = rasterize_instances(instances, camera, rows)
+    has_field = _triangles_with_field(instances)
     if not has_field.all():
-        field_pixels = np.flatnonzero(has_field)
-        instance_id, triangle = instance_id[field_pixels], triangle[field_pixels]
-        fragments = Fragments(*(values[field_pixels] for values in fragments))
-    visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
-    return _VisiblePixels(fragments, instance_id, triangle, visible_ids)
+        kept = np.flatnonzero(has_field.take(fragments.triangle))
+        fragments = Fragments(*(values[kept] for values in fragments))
+    return fragments
 
 
 def _visible_samples(
     instances: Sequence[MeshInstance], camera: Camera, samples: int, rows: tuple[int, int] | None
-) -> tuple[_VisiblePixels, SampledTriangles, np.ndarray, np.ndarray]:
-    """Find the visible triangles at all samples, and what is visible at the center of each pixel.
-
-    Returns
-    -------
-    visible : _VisiblePixels
-    sampled : SampledTriangles
-        Triangles are counted over all instances.
-    other_instance, other_triangle : (E,) int32 ndarray
-        Instances of its other triangles, and the triangles counted within them.
-    """
-    clip, triangles, first_triangle = all_triangles(instances, camera)
-    has_field = np.concatenate(
-        [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
-    )
+) -> tuple[Fragments, SampledTriangles]:
+    """Find what is visible at the center of each pixel, and the visible triangles at all samples."""
+    clip, triangles = all_triangles(instances, camera)
+    has_field = _triangles_with_field(instances)
     with progress(0.0, 0.8):
         sampled = rasterize_samples(
             clip, triangles, has_field, camera.width, camera.height, samples, rows
         )
-    if not len(sampled.pixel):
-        raise_nothing_in_view(instances, camera)
-    pixel = sampled.pixel
+    pixel, triangle = sampled.pixel, sampled.triangle
     with progress(0.8, 1.0):
         weights, front_facing = barycentrics(
-            clip, triangles, pixel, sampled.triangle, camera.width, camera.height
+            clip, triangles, pixel, triangle, camera.width, camera.height
         )
-    fragments = Fragments(pixel, sampled.triangle, weights, front_facing, sampled.depth)
-    instance_id, triangle = _split_triangles(first_triangle, sampled.triangle)
-    visible_ids = np.flatnonzero(np.bincount(instance_id)).tolist()
-    other = _split_triangles(first_triangle, sampled.other_triangle)
-    return _VisiblePixels(fragments, instance_id, triangle, visible_ids), sampled, *other
+    return Fragments(pixel, triangle, weights, front_facing, sampled.depth), sampled
+
+
+def _triangles_with_field(instances: Sequence[MeshInstance]) -> np.ndarray:
+    """(T,) bool: which triangles of all instances have a field."""
+    return np.concatenate(
+        [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
+    )
+
+
+def first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
+    """(B,) int32: the first triangle of each instance, counted over all instances."""
+    counts = [len(instance.surface.triangles) for instance in instances]
+    return np.cumsum([0, *counts[:-1]]).astype(np.int32)
 
 
 def _split_triangles(
-    first_triangle: np.ndarray, triangle: np.ndarray
+    instances: Sequence[MeshInstance], triangle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the instances of (n,) triangles, and the triangles counted within them, as int32.
-
-    `first_triangle` is that of `all_triangles`.
-    """
-    if len(first_triangle) == 1:
+    """Return the instances of (n,) triangles, and the triangles counted within them, as int32."""
+    if len(instances) == 1:
         return np.zeros(len(triangle), dtype=np.int32), triangle
+    first_triangle = first_triangles(instances)
     instance_id = np.empty(len(triangle), dtype=np.int32)
     for block in pixel_blocks(len(triangle)):
         instance_id[block] = np.searchsorted(first_triangle, triangle[block], side="right") - 1
@@ -392,24 +335,17 @@ def _split_triangles(
 
 def rasterize_instances(
     instances: Sequence[MeshInstance], camera: Camera, rows: tuple[int, int] | None = None
-) -> tuple[Fragments, np.ndarray]:
+) -> Fragments:
     """Rasterize all mesh instances together, in all rows of the frame or some.
 
-    Returns
-    -------
-    fragments : Fragments
-        Triangles are counted over all instances, in their order.
-    first_triangle : (B,) int32 ndarray
-        Index of the first triangle of each of the B instances in this count.
+    Triangles are counted over all instances, in their order.
     """
-    clip, triangles, first_triangle = all_triangles(instances, camera)
-    fragments = rasterize(clip, triangles, camera.width, camera.height, rows)
-    return fragments, first_triangle
+    return rasterize(*all_triangles(instances, camera), camera.width, camera.height, rows)
 
 
 def all_triangles(
     instances: Sequence[MeshInstance], camera: Camera
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the triangles of all instances, in their order.
 
     Returns
@@ -417,19 +353,16 @@ def all_triangles(
     clip : (V, 4) float64 ndarray
         Vertices in clip space.
     triangles : (T, 3) int32 ndarray
-    first_triangle : (B,) int32 ndarray
-        Index of the first triangle of each instance.
     """
-    clip = np.concatenate([_to_clip_space(instance, camera) for instance in instances], axis=1)
+    clip = np.concatenate([clip_vertices(instance, camera) for instance in instances], axis=1)
     triangles, vertex_offset = [], 0
     for instance in instances:
         triangles.append(instance.surface.triangle_vertex + np.int32(vertex_offset))
         vertex_offset += len(instance.surface.vertices)
-    first_triangle = np.cumsum([0, *map(len, triangles[:-1])]).astype(np.int32)
-    return clip.T, np.concatenate(triangles), first_triangle
+    return clip.T, np.concatenate(triangles)
 
 
-def _to_clip_space(instance: MeshInstance, camera: Camera) -> np.ndarray:
+def clip_vertices(instance: MeshInstance, camera: Camera) -> np.ndarray:
     """Return the (4, V) float64 vertices of an instance in clip space."""
     matrix = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
     return transform_components(
@@ -447,11 +380,11 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
         frame.
     """
     field_instances = [instance for instance in instances if instance.field is not None]
-    fragments, _ = rasterize_instances(field_instances, camera)
     names = ", ".join(instance.surface.name for instance in field_instances)
-    if len(fragments.pixel):
+    clip, triangles = all_triangles(field_instances, camera)
+    if len(rasterize(clip, triangles, camera.width, camera.height).pixel):
         reason = "hidden behind other objects"
-    elif any(_has_vertex_in_frame(instance, camera) for instance in field_instances):
+    elif (np.abs(clip[triangles, :3]).max(axis=2) <= clip[triangles, 3]).any():
         reason = "seen exactly edge-on, or smaller than a pixel: turn the camera, or move it closer"
     else:
         reason = "outside the frame"
@@ -460,48 +393,34 @@ def raise_nothing_in_view(instances: Sequence[MeshInstance], camera: Camera) -> 
     )
 
 
-def _has_vertex_in_frame(instance: MeshInstance, camera: Camera) -> bool:
-    """Return whether a camera has a used vertex of an instance in its frame."""
-    x, y, z, w = _to_clip_space(instance, camera)[:, instance.surface.used_vertices]
-    return bool((np.maximum(np.abs(x), np.maximum(np.abs(y), np.abs(z))) <= w).any())
-
-
 def _new_gbuffer(
-    instances: Sequence[MeshInstance], camera: Camera, visible: _VisiblePixels
+    instances: Sequence[MeshInstance], camera: Camera, fragments: Fragments
 ) -> GBuffer:
     """Return a G-buffer whose normals and representation are not yet initialized."""
-    count = len(visible.instance_id)
-    fragments = visible.fragments
+    count = len(fragments.pixel)
+    instance_id, triangle = _split_triangles(instances, fragments.triangle)
     face = np.empty(count, dtype=np.int32)
     face_of_triangle = np.concatenate([instance.surface.triangle_face for instance in instances])
     position, view_direction = _empty_vectors(count), _empty_vectors(count)
     for block in pixel_blocks(count):
-        report(block.start / count, "finding visible pixels")
+        report(block.start / count, LABEL)
         face[block] = face_of_triangle.take(fragments.triangle[block])
         x, y = pixel_rays(camera, fragments.pixel[block])
-        position[block, 2] = z_at_depth(camera, x, y, fragments.depth[block])
+        z = z_at_depth(camera, x, y, fragments.depth[block]).astype(np.float32)
         if camera.is_perspective:
             inverse_length = 1 / np.sqrt(x * x + y * y + 1)
-            view_direction[block, 0], view_direction[block, 1] = (
-                -x * inverse_length,
-                -y * inverse_length,
-            )
-            view_direction[block, 2] = inverse_length
-            x *= -position[block, 2]
-            y *= -position[block, 2]
-        position[block, 0], position[block, 1] = x, y
+            view_direction.T[:, block] = -x * inverse_length, -y * inverse_length, inverse_length
+            x, y = -z * x, -z * y
+        position.T[:, block] = x, y, z
     if not camera.is_perspective:
         view_direction[:] = (0.0, 0.0, 1.0)
     return GBuffer(
         camera=camera,
-        instance_names=tuple(instance.surface.name for instance in instances),
-        instance_degrees=tuple(
-            instance.field.degree if instance.field else 0 for instance in instances
-        ),
+        instances=tuple(instances),
         pixel=fragments.pixel,
-        instance_id=visible.instance_id,
+        instance_id=instance_id,
         face=face,
-        triangle=visible.triangle,
+        triangle=triangle,
         barycentric=fragments.barycentric,
         position=position,
         normal=_empty_vectors(count),
@@ -509,7 +428,7 @@ def _new_gbuffer(
         representation=np.empty(count, dtype=np.complex64),
         geometric_normal=_empty_vectors(count),
         front_facing=fragments.front_facing,
-        instances=tuple(instances),
+        channels={},
     )
 
 
@@ -521,9 +440,7 @@ def _empty_vectors(count: int) -> np.ndarray:
 # --- pixels --------------------------------------------------------------------------------------
 
 
-def _fill_instances(
-    gbuffer: GBuffer, visible: _VisiblePixels, display: str, cache: Cache | None
-) -> dict[int, np.ndarray]:
+def _fill_instances(gbuffer: GBuffer, display: str, cache: Cache | None) -> dict[int, np.ndarray]:
     """Write the normals, the representation and the channels of a new G-buffer.
 
     Returns
@@ -531,55 +448,32 @@ def _fill_instances(
     dict of int to (3, T) float32 ndarray
         Normals of the triangles of each visible instance, in camera space.
     """
-    camera, count = gbuffer.camera, len(gbuffer.pixel)
-    pixels_done = 0
     geometric_normals = {}
-    for instance_id in visible.visible_ids:
-        pixels = (
-            slice(0, count)
-            if visible.is_single_instance
-            else np.flatnonzero(visible.instance_id == instance_id)
-        )
-        triangle = visible.triangle[pixels]
-        instance = gbuffer.instances[instance_id]
-        start, midpoint, stop = (
-            pixels_before / count
-            for pixels_before in (
-                pixels_done,
-                pixels_done + 0.5 * len(triangle),
-                pixels_done + len(triangle),
-            )
-        )
-        with progress(start, midpoint):
-            corner_field = cached_corner_field(
-                instance.surface, instance.matrix, instance.field, display, cache
-            )
-        corner_field = corner_field.rotated(camera.view[:3, :3])
+    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
+        instance, middle = gbuffer.instances[instance_id], (start + stop) / 2
+        with progress(start, middle):
+            corner_field = cached_corner_field(instance, display, cache)
+        corner_field = corner_field.rotated(gbuffer.camera.view[:3, :3])
         geometric_normals[instance_id] = corner_field.geometric_normal
-        _allocate_channels(gbuffer, corner_field)
-        for block in pixel_blocks(len(triangle)):
+        for number, block in enumerate(blocks):
             report(
-                midpoint + (stop - midpoint) * block.start / len(triangle),
+                middle + (stop - middle) * number / len(blocks),
                 "rotating the field into the view plane",
             )
-            target_pixels = block if visible.is_single_instance else pixels[block]
             _fill_pixels(
-                gbuffer,
-                target_pixels,
-                triangle[block],
-                corner_field,
-                instance.field.degree,
+                gbuffer, block, gbuffer.triangle[block], corner_field, instance.field.degree
             )
-        pixels_done += len(triangle)
     return geometric_normals
 
 
-def _allocate_channels(gbuffer: GBuffer, corner_field: CornerField) -> None:
-    """Add the channels of an instance to the G-buffer, with the values of a plain RoSy field."""
-    for channel in corner_field.channels:
-        if channel not in gbuffer.channels:
-            default = 1 if channel == ("deviation", 0) else 0
-            gbuffer.channels[channel] = np.full(len(gbuffer.pixel), default, dtype=np.complex64)
+def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
+    """Return the values of a channel in a G-buffer. Where it is new, they are those of a plain RoSy field."""
+    if channel == REPRESENTATION:
+        return gbuffer.representation
+    if channel not in gbuffer.channels:
+        default = 1 if channel == ("deviation", 0) else 0
+        gbuffer.channels[channel] = np.full(len(gbuffer.pixel), default, dtype=np.complex64)
+    return gbuffer.channels[channel]
 
 
 def _fill_pixels(
@@ -606,10 +500,6 @@ def _fill_pixels(
     if not length.all():
         degenerate = length == 0
         normal[:, degenerate] = geometric_normal[:, degenerate]
-    extra_outputs = [
-        (gbuffer.channels[channel], z, rotation_order(channel, degree))
-        for channel, z in corner_field.channels.items()
-    ]
     tangent = transport_components(
         corner_field.reference_tangent.take(triangle, axis=1), corners[0], normal
     )
@@ -617,16 +507,14 @@ def _fill_pixels(
         np.negative(normal, out=normal, where=~front_facing)
         np.negative(geometric_normal, out=geometric_normal, where=~front_facing)
     rotation = view_plane_rotation(tangent, normal, view_direction)
-    for out, corner_values, order in [
-        (gbuffer.representation, corner_field.representation, degree),
-        *extra_outputs,
-    ]:
+    for channel, corner_values in corner_field.channels.items():
+        order = rotation_order(channel, degree)
         z = _interpolated_values(corner_field, corner_values, triangle, weights, length, order)
         if not front_facing.all():
             # Members keep their direction in space. Seen from behind, angles have the other sign.
             np.conjugate(z, out=z, where=~front_facing)
         z *= signed_power(rotation, order)
-        out[pixels] = z
+        _channel_pixels(gbuffer, channel)[pixels] = z
     gbuffer.normal[pixels] = normal.T
     gbuffer.geometric_normal[pixels] = geometric_normal.T
 
@@ -665,7 +553,7 @@ def _interpolated_values(
     ----------
     corner_field : CornerField
     corner_values : (3, T) complex64 ndarray
-        Its representation, or one of its channels.
+        One of its channels.
     triangle : (P,) ndarray of int
     weights : (3, P) float32 ndarray
         Barycentric coordinates b_i.

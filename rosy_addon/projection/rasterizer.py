@@ -108,6 +108,10 @@ class _ScreenVertices(NamedTuple):
     depth: np.ndarray
     packed_center: np.ndarray
 
+    def at(self, vertex: np.ndarray) -> _ScreenVertices:
+        """Return the vertices with (n,) indices."""
+        return _ScreenVertices(*(values.take(vertex) for values in self))
+
     def clamped_to_rows(self, row_start: int, row_stop: int) -> _ScreenVertices:
         """Return the vertices with the rows of `packed_center` clamped to a range of rows."""
         row = np.clip(self.packed_center >> 16, row_start, row_stop)
@@ -221,8 +225,6 @@ def rasterize_samples(
         S, the samples along each side of a pixel.
     """
     first_row, stop_row = (0, height) if rows is None else rows
-    clip_vertices = np.asarray(clip_vertices, dtype=np.float64)
-    triangles = np.ascontiguousarray(triangles, dtype=np.int32).reshape(-1, 3)
     vertices, clipped = _clip_near(clip_vertices, triangles)
     screens = [
         (scale, _to_screen(vertices, width * scale, height * scale)) for scale in (1, samples)
@@ -455,27 +457,20 @@ def _scan_convert(
     if len(covering) < len(a):
         a, b, c, triangle = (values.take(covering) for values in (a, b, c, triangle))
     a, b, c = _sorted_by_y(screen.y, a, b, c)
-    bottom, middle, top = (screen.packed_center.take(corner) >> 16 for corner in (a, b, c))
-    bottom_corner, middle_corner, top_corner = (
-        _gather_corner(screen, corner) for corner in (a, b, c)
-    )
-    depth_plane = _depth_plane(bottom_corner, middle_corner, top_corner)
-    long_edge, lower_edge, upper_edge = (
-        _edge_line(bottom_corner, top_corner),
-        _edge_line(bottom_corner, middle_corner),
-        _edge_line(middle_corner, top_corner),
-    )
-    short_edges = tuple(np.concatenate(pair) for pair in zip(lower_edge, upper_edge, strict=True))
+    low, mid, high = (screen.at(corner) for corner in (a, b, c))
+    bottom, middle, top = (corner.packed_center >> 16 for corner in (low, mid, high))
+    depth_plane = _depth_plane(low, mid, high)
+    long_edge = _edge_line(low, high)
+    edge_pairs = zip(_edge_line(low, mid), _edge_line(mid, high), strict=True)
+    short_edges = tuple(np.concatenate(pair) for pair in edge_pairs)
     for block in blocks_by_count(top - bottom, BLOCK_SIZE):
         first, rows = bottom[block], (top - bottom)[block]
         local_triangle = np.repeat(np.arange(block.start, block.stop), rows)
         row = concatenated_ranges(first, rows)
         short_edge = local_triangle + len(middle) * (row >= middle.take(local_triangle))
         center_y = row + 0.5
-        long_x, short_x = (
-            _edge_x_at_row(long_edge, local_triangle, center_y),
-            _edge_x_at_row(short_edges, short_edge, center_y),
-        )
+        long_x = _edge_x_at_row(long_edge, local_triangle, center_y)
+        short_x = _edge_x_at_row(short_edges, short_edge, center_y)
         first, last = _column_range(long_x, short_x, width)
         nonempty = np.flatnonzero(first < last)
         local_triangle, row, first, last = (
@@ -483,19 +478,6 @@ def _scan_convert(
         )
         spans = _spans_with_depth(row, local_triangle, first, last, depth_plane, width)
         yield spans._replace(triangle=triangle.take(local_triangle))
-
-
-class _ScreenCorner(NamedTuple):
-    """One corner of each triangle of a block: x and y in pixels, and z / w as `depth`."""
-
-    x: np.ndarray
-    y: np.ndarray
-    depth: np.ndarray
-
-
-def _gather_corner(screen: _ScreenVertices, vertex: np.ndarray) -> _ScreenCorner:
-    """Return the position and depth of vertices given by index."""
-    return _ScreenCorner(screen.x.take(vertex), screen.y.take(vertex), screen.depth.take(vertex))
 
 
 def _edge_x_at_row(
@@ -614,7 +596,7 @@ def _sorted_by_y(
 
 
 def _edge_line(
-    low: _ScreenCorner, high: _ScreenCorner
+    low: _ScreenVertices, high: _ScreenVertices
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return x and y of the lower end of edges, and their slope dx / dy."""
     rise = high.y - low.y
@@ -622,7 +604,9 @@ def _edge_line(
     return low.x, low.y, (high.x - low.x) / rise
 
 
-def _depth_plane(a: _ScreenCorner, b: _ScreenCorner, c: _ScreenCorner) -> tuple[np.ndarray, ...]:
+def _depth_plane(
+    a: _ScreenVertices, b: _ScreenVertices, c: _ScreenVertices
+) -> tuple[np.ndarray, ...]:
     """Return the depth of triangles as linear functions on screen, and their depth range.
 
     z / w is affine on screen for a plane, under perspective too.

@@ -5,16 +5,16 @@ Points of the surface keep these positions when the mesh is transformed or defor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..field.frames import transform_components
 from ..field.surface import Surface, box_corners
 from ..progress import report
 from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
-from .pixel_blocks import pixel_blocks
+from .pixel_blocks import part_of
+from .project import clip_vertices
 
 #: Label of the progress.
 LABEL = "finding points on the surface"
@@ -52,13 +52,8 @@ class RestCoordinates:
 
     def block(self, pixels: slice) -> RestCoordinates:
         """Return the coordinates of some of the pixels."""
-        return RestCoordinates(
-            self.weights[:, pixels],
-            self.weights_dx[:, pixels],
-            self.weights_dy[:, pixels],
-            tuple(corner[:, pixels] for corner in self.rest_corners),
-            self.pixel_size[pixels],
-        )
+        rest_corners = tuple(corner[:, pixels] for corner in self.rest_corners)
+        return replace(part_of(self, (..., pixels)), rest_corners=rest_corners)
 
     def at_offset(self, dx: float, dy: float) -> np.ndarray:
         """Return the (3, P) float32 rest positions at an offset from the pixel centers.
@@ -84,7 +79,6 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
 
     Returns
     -------
@@ -97,21 +91,13 @@ def rest_coordinates(gbuffer: GBuffer) -> RestCoordinates:
         rest_corners=tuple(np.empty((3, count), dtype=np.float32) for _ in range(3)),
         pixel_size=np.empty(count, dtype=np.float32),
     )
-    done = 0
-    present = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
-    for instance_id in present:
+    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
         instance = gbuffer.instances[instance_id]
         rest = rest_positions(instance.surface)
         screen = _screen_vertices(gbuffer.camera, instance)
-        pixels = None
-        if len(present) > 1:
-            pixels = np.flatnonzero(gbuffer.instance_id == instance_id)
-        instance_count = count if pixels is None else len(pixels)
-        for block in pixel_blocks(instance_count):
-            report((done + block.start) / count, LABEL)
-            part = block if pixels is None else pixels[block]
-            _fill_pixels(coordinates, gbuffer, instance, rest, screen, part)
-        done += instance_count
+        for number, block in enumerate(blocks):
+            report(start + (stop - start) * number / len(blocks), LABEL)
+            _fill_pixels(coordinates, gbuffer, instance, rest, screen, block)
     return coordinates
 
 
@@ -126,7 +112,7 @@ def rest_positions(surface: Surface) -> np.ndarray:
         In object space. If the mesh is farther than `FAR_RATIO` times its size from the origin,
         relative to a point at the mesh.
     """
-    rest = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    rest = surface.in_rest_shape().vertices
     corners = box_corners(rest[surface.used_vertices])
     size = np.ptp(corners, axis=0).max()
     if np.abs(corners).max() <= FAR_RATIO * size:
@@ -138,9 +124,7 @@ def rest_positions(surface: Surface) -> np.ndarray:
 
 def _screen_vertices(camera: Camera, instance: MeshInstance) -> np.ndarray:
     """Return the (3, V) float64 vertices of an instance: x and y in pixels times w, and w."""
-    clip = camera.projection @ camera.view @ np.asarray(instance.matrix, dtype=np.float64)
-    points = np.ascontiguousarray(instance.surface.vertices.T)
-    x, y, _, w = transform_components(points, clip[:, :3], clip[:, 3])
+    x, y, _, w = clip_vertices(instance, camera)
     return np.stack([(x + w) * (0.5 * camera.width), (y + w) * (0.5 * camera.height), w])
 
 

@@ -20,7 +20,7 @@ from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks
 from .project import rasterize_instances
 
-#: Default width and height of a shadow map, in pixels.
+#: Width and height of the shadow maps of lights, in pixels.
 SHADOW_MAP_SIZE = 2048
 
 #: Width of the percentage-closer filter, in pixels of the shadow map.
@@ -43,7 +43,6 @@ def light_cameras(
     camera: Camera,
     kind: str,
     vector: np.ndarray,
-    resolution: int = SHADOW_MAP_SIZE,
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a light.
 
@@ -56,8 +55,6 @@ def light_cameras(
     kind : {"sun", "point"}
     vector : (3,) ndarray
         Camera space: the unit direction to a sun, or the position of a point light.
-    resolution : int
-        Width and height of each shadow map in pixels.
 
     Returns
     -------
@@ -65,25 +62,16 @@ def light_cameras(
         One camera, or six in all directions for a point light near or among the receivers.
     """
     camera_to_world = camera.view[:3, :3].T
-    caster_points = np.concatenate([world_bounds(instance) for instance in instances])
+    caster_points = np.concatenate([instance.world_bounds() for instance in instances])
     receiver_points = np.concatenate(
-        [world_bounds(instance) for instance in instances if instance.field is not None]
+        [instance.world_bounds() for instance in instances if instance.field is not None]
     )
     vector = np.asarray(vector, dtype=np.float64)
     if kind == "sun":
-        return [sun_camera(camera_to_world @ vector, caster_points, receiver_points, resolution)]
-    return _point_cameras(
-        camera_to_world @ (vector - camera.view[:3, 3]), caster_points, receiver_points, resolution
-    )
-
-
-def world_bounds(instance: MeshInstance) -> np.ndarray:
-    """Return the (8, 3) corners of an instance's bounding box, in world space.
-
-    The box is aligned to the axes of object space.
-    """
-    matrix = np.asarray(instance.matrix, dtype=np.float64)
-    return instance.surface.box_corners @ matrix[:3, :3].T + matrix[:3, 3]
+        direction = camera_to_world @ vector
+        return [sun_camera(direction, caster_points, receiver_points, SHADOW_MAP_SIZE)]
+    light_position = camera_to_world @ (vector - camera.view[:3, 3])
+    return _point_cameras(light_position, caster_points, receiver_points)
 
 
 def sun_camera(
@@ -119,37 +107,30 @@ def sun_camera(
 
 
 def _point_cameras(
-    light_position: np.ndarray,
-    caster_points: np.ndarray,
-    receiver_points: np.ndarray,
-    resolution: int,
+    light_position: np.ndarray, caster_points: np.ndarray, receiver_points: np.ndarray
 ) -> list[Camera]:
     """Return the cameras of the shadow maps of a point light, all arguments in world space."""
     center = (receiver_points.min(axis=0) + receiver_points.max(axis=0)) / 2
     radius = float(np.linalg.norm(receiver_points - center, axis=1).max())
     distance = float(np.linalg.norm(center - light_position))
     far = float(np.linalg.norm(caster_points - light_position, axis=1).max()) * 1.01 + 1e-9
-    clip = (1e-3 * far, far)
-    if distance > SINGLE_VIEW_MIN_RADII * radius:
-        up = np.eye(3)[np.argmin(np.abs(center - light_position))]
-        fov = 2 * np.arcsin(radius / distance) * (1 + 4 * NORMAL_BIAS_PIXELS / resolution)
-        view = look_at(light_position, center, up)
-        return [perspective_camera(view, resolution, resolution, fov=fov, clip=clip, name="lamp")]
+    fov = np.pi / 2
     views = [
         look_at(light_position, light_position + sign * np.eye(3)[axis], np.eye(3)[axis - 2])
         for axis in range(3)
         for sign in (1, -1)
     ]
-    fov = np.pi / 2
-    return [
-        perspective_camera(view, resolution, resolution, fov=fov, clip=clip, name="lamp")
-        for view in views
-    ]
+    if distance > SINGLE_VIEW_MIN_RADII * radius:
+        up = np.eye(3)[np.argmin(np.abs(center - light_position))]
+        fov = 2 * np.arcsin(radius / distance) * (1 + 4 * NORMAL_BIAS_PIXELS / SHADOW_MAP_SIZE)
+        views = [look_at(light_position, center, up)]
+    size, clip = SHADOW_MAP_SIZE, (1e-3 * far, far)
+    return [perspective_camera(view, size, size, fov=fov, clip=clip, name="lamp") for view in views]
 
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
     """(H, W) float32 depth of the nearest surface along the camera axis; inf if there is none."""
-    fragments, _ = rasterize_instances(instances, camera)
+    fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
     m_z, m_w = camera.projection[2, 2:]
     if camera.is_perspective:
@@ -165,7 +146,6 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
     cameras : sequence of Camera
         From `light_cameras`.
 
@@ -217,11 +197,7 @@ def visibility_from(
     clip = position @ camera.projection[:3, :3].T + camera.projection[:3, 3]
     # Positive in front of the camera. Points behind it stay visible.
     axial_depth = -position[:, 2]
-    divisor = (
-        np.where(axial_depth > 0, axial_depth, 1.0)
-        if camera.is_perspective
-        else np.ones(len(position))
-    )
+    divisor = np.where(axial_depth > 0, axial_depth, 1.0) if camera.is_perspective else 1.0
     x, y = clip[:, 0] / divisor, clip[:, 1] / divisor
     in_frustum = np.flatnonzero((np.abs(x) <= 1) & (np.abs(y) <= 1) & (axial_depth > 0))
     visibility = np.ones(len(points), dtype=np.float32)

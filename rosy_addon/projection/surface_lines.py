@@ -21,9 +21,8 @@ from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_patte
 from ..field.surface import Surface, build_surface
 from ..memory import check_memory
 from ..progress import progress, report
-from .corner_field import CornerField, field_at_corners
-from .face_values import SIMILARITY_EPS
-from .fan_values import transport_phase
+from .corner_field import CornerField, field_at_corners, transport_phase
+from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import rotation_order
 from .rest_coordinates import matrix_scale
 from .vector_components import tangent_frame_components
@@ -66,11 +65,9 @@ def rest_matrix(matrix: np.ndarray) -> np.ndarray:
     turns keeps its lines.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
-    gram = linear.T @ linear
-    squared_scale = np.trace(gram) / 3
-    if np.abs(gram - squared_scale * np.eye(3)).max() <= 4 * SIMILARITY_EPS * squared_scale:
+    if similarity_scale(linear, 4 * SIMILARITY_EPS) is not None:
         return np.eye(3) * matrix_scale(matrix)
-    values, axes = np.linalg.eigh(gram)
+    values, axes = np.linalg.eigh(linear.T @ linear)
     return (axes * np.sqrt(np.maximum(values, 0))) @ axes.T
 
 
@@ -92,30 +89,15 @@ def cached_surface_lines(
     # Rounded, as rotated matrices have rounding errors.
     spacing = float(f"{spacing / scale:.5g}")
     stretch = np.round(stretch / scale, 5)
-    args = surface, stretch, field, display, spacing, max_triangles
+    create = partial(surface_lines, surface, stretch, field, display, spacing, max_triangles)
     if cache is None:
-        return surface_lines(*args)
-    content = _content(surface, field), stretch.tobytes()
+        return create()
+    # Deformations do not change what the lines depend on.
+    normals = surface.corner_normal if surface.rest_vertices is None else None
+    field_parts = field.degree, field.vectors, field.direction_ratios
+    content = content_hash(surface.corner_fan, normals, *field_parts, stretch)
     return cache.get_or_create(
-        ("surface lines", *content, display, spacing, max_triangles),
-        partial(surface_lines, *args),
-    )
-
-
-def _content(surface: Surface, field: RosyField) -> bytes:
-    """Return a hash of what the lines of a surface depend on. Deformations do not change it."""
-    shape = (surface.vertices, surface.corner_normal)
-    if surface.rest_vertices is not None:
-        shape = (surface.rest_vertices,)
-    return content_hash(
-        *shape,
-        surface.corner_vertex,
-        surface.face_start,
-        surface.triangles,
-        surface.corner_fan,
-        field.degree,
-        field.vectors,
-        field.direction_ratios,
+        ("surface lines", surface.rest_shape_key, content, display, spacing, max_triangles), create
     )
 
 

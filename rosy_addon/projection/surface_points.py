@@ -29,6 +29,13 @@ class SurfacePoints(NamedTuple):
         return SurfacePoints(*(column[chosen] for column in self))
 
     @staticmethod
+    def of(instance_id: int, triangle: np.ndarray, barycentric: np.ndarray) -> SurfacePoints:
+        """Return points on one instance."""
+        return SurfacePoints(
+            np.full(len(triangle), instance_id, dtype=np.int32), triangle, barycentric
+        )
+
+    @staticmethod
     def concatenate(parts: list[SurfacePoints]) -> SurfacePoints:
         """Return the points of all parts, in their order."""
         return SurfacePoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))

@@ -1,12 +1,15 @@
-"""Sampling of the tones and numbers of surfaces at the pixels of a G-buffer."""
+"""Sampling of the tones, numbers and feature curvatures of surfaces at the pixels of a G-buffer."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
+from ..cache import Cache
+from ..field.feature_curvature import feature_curvature
 from ..field.frames import dot
+from ..progress import progress, report
 from .gbuffer import GBuffer, MeshInstance
 
 #: Lower bound of the cosine between normal and view direction. Bounds the area of the surface that
@@ -20,7 +23,6 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
 
     Returns
     -------
@@ -28,17 +30,19 @@ def surface_tones(gbuffer: GBuffer) -> np.ndarray:
         Linear tones. NaN where the mesh instance has no tone.
     """
     tones = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
-    for instance, pixels in _visible_instances(gbuffer):
+    for instance_id, blocks, _ in gbuffer.instance_blocks():
+        instance = gbuffer.instances[instance_id]
         tone = instance.tone
         if tone is None:
             continue
-        corners = instance.surface.triangles.take(gbuffer.triangle[pixels], axis=0)
-        sampled = np.einsum("pi,pik->kp", gbuffer.barycentric[pixels], tone.values[corners])
-        if tone.image is None:
-            tones[pixels] = sampled[0]
-        else:
-            level = 0.5 * np.log2(_texel_footprint(gbuffer, instance, pixels, corners) + 1e-12)
-            tones[pixels] = tone.mip_map.sample(*sampled, level, repeat=True)
+        for block in blocks:
+            corners = instance.surface.triangles.take(gbuffer.triangle[block], axis=0)
+            sampled = np.einsum("pi,pik->kp", gbuffer.barycentric[block], tone.values[corners])
+            if tone.image is None:
+                tones[block] = sampled[0]
+            else:
+                level = 0.5 * np.log2(_texel_footprint(gbuffer, instance, block, corners) + 1e-12)
+                tones[block] = tone.mip_map.sample(*sampled, level, repeat=True)
     return tones
 
 
@@ -48,7 +52,6 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
     Parameters
     ----------
     gbuffer : GBuffer
-        With `instances`.
 
     Returns
     -------
@@ -56,11 +59,13 @@ def surface_values(gbuffer: GBuffer) -> np.ndarray:
         NaN where there is no number.
     """
     values = np.full(len(gbuffer.pixel), np.nan, dtype=np.float32)
-    for instance, pixels in _visible_instances(gbuffer):
+    for instance_id, blocks, _ in gbuffer.instance_blocks():
+        instance = gbuffer.instances[instance_id]
         if instance.color_values is not None:
-            values[pixels] = values_in_triangles(
-                instance, gbuffer.triangle[pixels], gbuffer.barycentric[pixels]
-            )
+            for block in blocks:
+                values[block] = values_in_triangles(
+                    instance, gbuffer.triangle[block], gbuffer.barycentric[block]
+                )
     return values
 
 
@@ -86,16 +91,36 @@ def values_in_triangles(
     return first + barycentric[:, 1] * (second - first) + barycentric[:, 2] * (third - first)
 
 
-def _visible_instances(gbuffer: GBuffer) -> Iterator[tuple[MeshInstance, np.ndarray]]:
-    """Iterate over the instances that are visible, with the indices of their pixels."""
-    return (
-        (gbuffer.instances[instance_id], np.flatnonzero(gbuffer.instance_id == instance_id))
-        for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
-    )
+def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
+    """Interpolate the curvature of features at the pixels of a G-buffer.
+
+    Parameters
+    ----------
+    gbuffer : GBuffer
+    cache : Cache
+        Stores the curvatures of the surfaces, which a deformed mesh finds again.
+
+    Returns
+    -------
+    (P,) float32 ndarray
+        In 1 / Blender unit of object space.
+    """
+    curvature = np.zeros(len(gbuffer.pixel), dtype=np.float32)
+    for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():
+        surface = gbuffer.instances[instance_id].surface
+        with progress(start, stop):
+            corners = cache.get_or_create(
+                ("feature curvature", surface.rest_shape_key), partial(feature_curvature, surface)
+            )
+        for block in blocks:
+            report(stop, "measuring features")
+            values = corners.take(gbuffer.triangle[block], axis=0)
+            curvature[block] = np.einsum("ij,ij->i", values, gbuffer.barycentric[block])
+    return np.maximum(curvature, 0, out=curvature)
 
 
 def _texel_footprint(
-    gbuffer: GBuffer, instance: MeshInstance, pixels: np.ndarray, corners: np.ndarray
+    gbuffer: GBuffer, instance: MeshInstance, pixels: slice | np.ndarray, corners: np.ndarray
 ) -> np.ndarray:
     """Return the (n,) area that pixels of the picture cover on the image of a tone, in texels."""
     surface, tone = instance.surface, instance.tone

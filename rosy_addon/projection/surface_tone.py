@@ -1,4 +1,4 @@
-"""The tone of a surface, given at its corners or by an image."""
+"""The tone of a surface, given at its corners or by an image, which is sampled at several resolutions."""
 
 from __future__ import annotations
 
@@ -7,7 +7,87 @@ from functools import cached_property
 
 import numpy as np
 
-from .mip_map import MipMap
+
+class MipMap:
+    """An image at full resolution, half, a quarter and so on, down to a single pixel.
+
+    Parameters
+    ----------
+    image : (H, W) float ndarray
+        The bottom row is first.
+
+    Attributes
+    ----------
+    levels : list of (h, w) float32 ndarray
+        From full resolution to a single pixel. Odd sizes are rounded up.
+    """
+
+    def __init__(self, image: np.ndarray) -> None:
+        self.levels = [np.ascontiguousarray(image, dtype=np.float32)]
+        while self.levels[-1].size > 1:
+            self.levels.append(_downsample(self.levels[-1]))
+
+    def sample(
+        self, u: np.ndarray, v: np.ndarray, level: np.ndarray, *, repeat: bool
+    ) -> np.ndarray:
+        """Sample the image: bilinear within a level, nearest between levels.
+
+        Parameters
+        ----------
+        u, v : (n,) ndarray
+            Texture coordinates, from 0 to 1 over the width and the height.
+        level : (n,) ndarray
+            Mip level, 0 for full resolution. Rounded to the nearest level that exists.
+        repeat : bool
+            Whether the image repeats beyond its borders. Otherwise coordinates are clamped.
+
+        Returns
+        -------
+        (n,) float32 ndarray
+        """
+        result = np.empty(len(u), dtype=np.float32)
+        level_index = np.clip(np.rint(level), 0, len(self.levels) - 1).astype(np.int32)
+        for index in np.flatnonzero(np.bincount(level_index)).tolist():
+            selected = np.flatnonzero(level_index == index)
+            result[selected] = _sample_bilinear(
+                self.levels[index], u[selected], v[selected], repeat
+            )
+        return result
+
+
+def _downsample(image: np.ndarray) -> np.ndarray:
+    """Halve an image by averaging 2 x 2 pixels; an odd last row or column is repeated."""
+    height, width = image.shape
+    result = np.pad(
+        image, ((0, height % 2 if height > 1 else 0), (0, width % 2 if width > 1 else 0)), "edge"
+    )
+    if height > 1:
+        result = 0.5 * (result[::2] + result[1::2])
+    if width > 1:
+        result = 0.5 * (result[:, ::2] + result[:, 1::2])
+    return result.astype(np.float32)
+
+
+def _sample_bilinear(image: np.ndarray, u: np.ndarray, v: np.ndarray, repeat: bool) -> np.ndarray:
+    """Interpolate (n,) values bilinearly between the pixel centers of one (h, w) image."""
+    height, width = image.shape
+    neighbors, fractions = [], []
+    for position, size in ((v, height), (u, width)):
+        position = (
+            position - np.floor(position) if repeat else np.clip(position, 0, 1)
+        ) * size - 0.5
+        first = np.floor(position)
+        fractions.append((position - first).astype(np.float32))
+        first = first.astype(np.intp)
+        pair = first, first + 1
+        neighbors.append(
+            [index % size if repeat else np.clip(index, 0, size - 1) for index in pair]
+        )
+    (low, high), (left, right) = neighbors
+    fraction_y, fraction_x = fractions
+    below = image[low, left] * (1 - fraction_x) + image[low, right] * fraction_x
+    above = image[high, left] * (1 - fraction_x) + image[high, right] * fraction_x
+    return below * (1 - fraction_y) + above * fraction_y
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..progress import report
 from .camera import Camera
-from .clip_planes import is_cut_away
 from .gbuffer import MeshInstance
-from .project import all_triangles
+from .project import all_triangles, first_triangles
+from .surface_points import SurfacePoints
 
 #: Surfaces that are nearer to a point than this fraction of the size of the scene do not hide it.
 SAME_POINT = 1e-6
@@ -29,12 +30,13 @@ TRIANGLES_PER_BLOCK, PAIRS_PER_BLOCK = 1 << 15, 1 << 20
 LABEL, POINTS_LABEL = "finding visible singularities", "finding places of arrowheads"
 
 
-@dataclass(frozen=True, eq=False)
-class ProjectedPoints:
+class ProjectedPoints(NamedTuple):
     """K points in a picture.
 
     Attributes
     ----------
+    world : (K, 3) float64 ndarray
+        World space.
     position : (K, 2) float64 ndarray
         Pixels from the lower left of the picture. NaN if the point is not in front of the camera.
     depth : (K,) float64 ndarray
@@ -46,6 +48,7 @@ class ProjectedPoints:
         Whether it is in the frame, too, and no surface is in front of it.
     """
 
+    world: np.ndarray
     position: np.ndarray
     depth: np.ndarray
     is_in_view: np.ndarray
@@ -53,12 +56,7 @@ class ProjectedPoints:
 
     def part(self, chosen: np.ndarray) -> ProjectedPoints:
         """Return those that a mask or indices choose."""
-        return ProjectedPoints(
-            self.position[chosen],
-            self.depth[chosen],
-            self.is_in_view[chosen],
-            self.is_visible[chosen],
-        )
+        return ProjectedPoints(*(column[chosen] for column in self))
 
 
 def project_vertices(
@@ -100,8 +98,7 @@ def project_vertices(
 def project_points(
     instances: Sequence[MeshInstance],
     camera: Camera,
-    triangle: np.ndarray,
-    barycentric: np.ndarray,
+    points: SurfacePoints,
     clip_planes: np.ndarray | None = None,
     *,
     finds_hidden: bool = True,
@@ -113,9 +110,8 @@ def project_points(
     instances : sequence of MeshInstance
         All of them hide points.
     camera : Camera
-    triangle : (K,) int ndarray
-        Counted over all instances, in their order.
-    barycentric : (K, 3) float64 ndarray
+    points : SurfacePoints
+        K points.
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
     finds_hidden : bool
@@ -127,9 +123,10 @@ def project_points(
     """
     report(0.0, POINTS_LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
+    triangle = points.triangle + first_triangles(instances)[points.instance_id]
     corners = scene.triangles[triangle]
     point_clip, point_world = (
-        sum(barycentric[:, k, None] * values[corners[:, k]] for k in range(3))
+        sum(points.barycentric[:, k, None] * values[corners[:, k]] for k in range(3))
         for values in (scene.clip, scene.world)
     )
 
@@ -139,40 +136,6 @@ def project_points(
     if not finds_hidden:
         scene = replace(scene, triangles=scene.triangles[:0])
     return _project(scene, point_clip, point_world, touches, POINTS_LABEL)
-
-
-@dataclass(frozen=True, eq=False)
-class _Scene:
-    """All triangles of a scene, and what is seen of them.
-
-    Attributes
-    ----------
-    clip : (V, 4) float64 ndarray
-    world : (V, 3) float64 ndarray
-    triangles : (T, 3) int ndarray
-        Those that hide points.
-    camera : Camera
-    clip_planes : (6, 4) float64 ndarray or None
-    """
-
-    clip: np.ndarray
-    world: np.ndarray
-    triangles: np.ndarray
-    camera: Camera
-    clip_planes: np.ndarray | None
-
-    @classmethod
-    def of(
-        cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
-    ) -> _Scene:
-        """Return the scene of some instances, all of which hide points."""
-        clip, triangles, _ = all_triangles(instances, camera)
-        world = np.concatenate([instance.world_points() for instance in instances])
-        return cls(clip, world, triangles, camera, clip_planes)
-
-    def distance(self, world: np.ndarray) -> np.ndarray:
-        """Return the (n,) distances of (n, 3) points along the axis of the camera."""
-        return -(world @ self.camera.view[2, :3] + self.camera.view[2, 3])
 
 
 def _project(
@@ -187,43 +150,35 @@ def _project(
     `touches` tells whether the (n,) triangles of the scene contain (n,) points, by their numbers: they do not
     hide them.
     """
-    camera, clip_planes = scene.camera, scene.clip_planes
+    camera = scene.camera
     x, y, z, w = clip.T
-    is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut_away(world, clip_planes)
+    is_in_view = (w > 0) & (np.abs(z) <= w) & ~is_cut_away(world, scene.clip_planes)
     ndc = np.full((len(clip), 2), np.nan)
     np.divide(np.stack([x, y], axis=1), w[:, None], out=ndc, where=(w > 0)[:, None])
     position = (ndc + 1) * (0.5 * np.array([camera.width, camera.height]))
     is_visible = is_in_view & (np.abs(ndc) <= 1).all(axis=1)
-    distance = scene.distance(world)
+    distance = camera.depths(world)
     # A triangle nearer than the near plane, or beyond the far one, hides nothing.
     number = np.arange(len(scene.triangles))
     for is_outside in (scene.clip[:, 2] < -scene.clip[:, 3], scene.clip[:, 2] > scene.clip[:, 3]):
         if is_outside.any():
             number = number[~is_outside[scene.triangles[number]].all(axis=1)]
-    tolerance = SAME_POINT * float(np.ptp(scene.world, axis=0).max(initial=0.0))
-    occluders = _Occluders(
-        scene.clip,
-        scene.world,
-        scene.distance(scene.world),
-        scene.triangles[number],
-        clip_planes,
-        tolerance,
-    )
     for start in range(0, len(number), TRIANGLES_PER_BLOCK):
         report(start / len(number), label)
         left = np.flatnonzero(is_visible)
-        for triangle, chosen in occluders.pairs(start, start + TRIANGLES_PER_BLOCK, ndc[left]):
+        block = number[start : start + TRIANGLES_PER_BLOCK]
+        for triangle, chosen in scene.pairs(block, ndc[left]):
             point = left[chosen]
-            others = np.flatnonzero(~touches(number[triangle], point))
+            others = np.flatnonzero(~touches(triangle, point))
             triangle, point = triangle[others], point[others]
-            hidden = occluders.hides(triangle, ndc[point], distance[point])
+            hidden = scene.hides(triangle, ndc[point], distance[point])
             is_visible[point[hidden]] = False
-    return ProjectedPoints(position, distance, is_in_view, is_visible)
+    return ProjectedPoints(world, position, distance, is_in_view, is_visible)
 
 
 @dataclass(frozen=True, eq=False)
-class _Occluders:
-    """T triangles that may hide points.
+class _Scene:
+    """All triangles of a scene, and what is seen of them.
 
     Attributes
     ----------
@@ -232,6 +187,8 @@ class _Occluders:
     distance : (V,) float64 ndarray
         Along the axis of the camera.
     triangles : (T, 3) int ndarray
+        Those that hide points.
+    camera : Camera
     clip_planes : (6, 4) float64 ndarray or None
     tolerance : float
         Distance in front of a point at which surfaces begin to hide it.
@@ -241,18 +198,28 @@ class _Occluders:
     world: np.ndarray
     distance: np.ndarray
     triangles: np.ndarray
+    camera: Camera
     clip_planes: np.ndarray | None
     tolerance: float
 
+    @classmethod
+    def of(
+        cls, instances: Sequence[MeshInstance], camera: Camera, clip_planes: np.ndarray | None
+    ) -> _Scene:
+        """Return the scene of some instances, all of which hide points."""
+        clip, triangles = all_triangles(instances, camera)
+        world = np.concatenate([instance.world_points() for instance in instances])
+        tolerance = SAME_POINT * float(np.ptp(world, axis=0).max(initial=0.0))
+        return cls(clip, world, camera.depths(world), triangles, camera, clip_planes, tolerance)
+
     def pairs(
-        self, start: int, stop: int, ndc: np.ndarray
+        self, triangle: np.ndarray, ndc: np.ndarray
     ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Find the points in the bounding boxes of some triangles.
 
         Parameters
         ----------
-        start, stop : int
-            The triangles.
+        triangle : (t,) intp ndarray
         ndc : (n, 2) float64 ndarray
             From -1 to 1.
 
@@ -267,7 +234,7 @@ class _Occluders:
         key = 4.0 * point_row + ndc[:, 0]
         order = np.argsort(key, kind="stable")
         key = key[order]
-        corners = self.clip[self.triangles[start:stop].T]
+        corners = self.clip[self.triangles[triangle].T]
         w = corners[..., 3]
         is_in_front = (w > 0).all(axis=0)[:, None]
         # The projection of a triangle that reaches behind the eye is not bounded by its corners.
@@ -285,7 +252,7 @@ class _Occluders:
         box, first, count = (array[count > 0] for array in (box, first, count))
         return (
             (
-                start + kept[np.repeat(box[part], count[part])],
+                triangle[kept[np.repeat(box[part], count[part])]],
                 order[concatenated_ranges(first[part], count[part])],
             )
             for part in blocks_by_count(count, PAIRS_PER_BLOCK)
@@ -328,3 +295,21 @@ class _Occluders:
 def _grid_rows(y: np.ndarray, row_count: int) -> np.ndarray:
     """Return the rows of (n,) heights from -1 to 1, of a grid of so many rows."""
     return np.clip((0.5 * (y + 1) * row_count).astype(np.intp), 0, row_count - 1)
+
+
+def is_cut_away(points: np.ndarray, clip_planes: np.ndarray | None) -> np.ndarray:
+    """Return which points are on the negative side of a plane.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    clip_planes : (6, 4) ndarray or None
+        In the space of the points. None cuts nothing away.
+
+    Returns
+    -------
+    (n,) bool ndarray
+    """
+    if clip_planes is None:
+        return np.zeros(len(points), dtype=bool)
+    return ((points @ clip_planes[:, :3].T + clip_planes[:, 3]) < 0).any(axis=1)

@@ -11,18 +11,20 @@ import numpy as np
 from ..cache import BAKE_CACHE, Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.compose import compose
+from ..compositor.flow import noise_channel_count
+from ..compositor.look import is_hatched
 from ..compositor.picture import Picture
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.strip_division import context_rows, divide_into_strips, group_strips
 from ..compositor.strips import Strip, join_strips
 from ..compositor.target_tone import check_tone
 from ..errors import NothingInViewError, RosyError
+from ..field.symmetry import FieldSymmetry
+from ..memory import PIXEL_BYTES, PROCESS_BYTES, TRIANGLE_BYTES, check_memory, samples_memory
 from ..progress import progress
 from ..projection.project import cached_project, check_instances, project, raise_nothing_in_view
 from ..worker.pool import POOL, core_count
-from .arrowheads import with_arrowheads
-from .picture_memory import check_picture_memory
-from .singularities import with_singularities
+from .marks import with_marks
 from .view_input import ViewInput
 
 #: Share of the progress bar that projecting takes.
@@ -61,10 +63,8 @@ def draw_picture(
     """
     with progress(0.0, 0.97):
         picture = _draw_fields(view, cache, cache if keep_gbuffers else None, workers)
-    with progress(0.97, 0.99):
-        picture = with_arrowheads(picture, view, cache)
-    with progress(0.99, 1.0):
-        return with_singularities(picture, view, cache)
+    with progress(0.97, 1.0):
+        return with_marks(picture, view, cache)
 
 
 def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) -> Picture:
@@ -87,19 +87,17 @@ def _draw_fields(
     check_instances(view.instances, view.sample_camera, view.look.display)
     workers = workers or core_count()
     groups = picture_groups(view, workers)
-    while workers > 1:  # fewer processes need less memory
+    while True:
         try:
-            check_picture_memory(view, groups, workers)
+            _check_picture_memory(view, groups, workers)
             break
         except RosyError:
-            workers -= 1
-    try:
-        check_picture_memory(view, groups, workers)
-    except RosyError:
-        if not cache:
-            raise
-        cache.clear()
-        check_picture_memory(view, groups, workers)
+            if workers > 1:  # fewer processes need less memory
+                workers -= 1
+            elif cache:
+                cache.clear()
+            else:
+                raise
     if len(groups) == 1:
         return _draw_strips(view, groups[0], cache, gbuffer_cache)
     draw_here = partial(draw_rows, cache=Cache() if cache is None else cache)
@@ -153,17 +151,16 @@ def _draw_strips(
 ) -> Picture:
     """Draw neighboring strips of a picture."""
     camera, look = view.shaded_camera, view.look
-    arguments = view.instances, camera, look.display
-    whole = _whole(strips)
+    scene = view.instances, camera, look.display
+    whole, rows = _whole(strips), None
+    if (whole.start, whole.stop) != (0, camera.height):
+        context = context_rows(look, camera, view.instances)
+        rows = max(whole.start - context, 0), min(whole.stop + context, camera.height)
     with progress(0.0, PROJECTION_SHARE):
-        if (whole.start, whole.stop) != (0, camera.height):
-            context = context_rows(look, camera, view.instances)
-            rows = max(whole.start - context, 0), min(whole.stop + context, camera.height)
-            gbuffer = project(*arguments, cache, view.samples_per_side, rows)
-        elif gbuffer_cache is None:
-            gbuffer = project(*arguments, cache, view.samples_per_side)
+        if rows is None and gbuffer_cache is not None:
+            gbuffer = cached_project(*scene, gbuffer_cache, view.samples_per_side)
         else:
-            gbuffer = cached_project(*arguments, gbuffer_cache, view.samples_per_side)
+            gbuffer = project(*scene, cache, view.samples_per_side, rows)
     with progress(PROJECTION_SHARE, 1.0):
         return compose(
             gbuffer,
@@ -180,3 +177,53 @@ def _draw_strips(
 def _whole(strips: Sequence[Strip]) -> Strip:
     """Return neighboring strips as one."""
     return Strip(strips[0].start, strips[-1].stop, strips[0].height)
+
+
+def _check_picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: int) -> None:
+    """Check that a picture can take the memory that it needs; see `picture_memory`.
+
+    Raises
+    ------
+    RosyError
+        If it needs more than `memory.available_memory`.
+    """
+    camera, samples = view.camera, view.look.supersampling
+    each = f" with {samples} x {samples} samples each" if samples > 1 else ""
+    check_memory(
+        picture_memory(view, groups, workers),
+        f"a picture of {camera.width} x {camera.height} pixels{each}",
+        "choose a smaller size" + (", or less supersampling" if samples > 1 else ""),
+    )
+
+
+def picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: int) -> float:
+    """Return the bytes that a picture may take at its peak, beyond those that are taken before.
+
+    It is the finished picture, and in each process the samples of its strips and all triangles. The
+    surfaces are assumed to fill the picture.
+
+    Parameters
+    ----------
+    view : ViewInput
+    groups : sequence of sequence of Strip
+        The strips that are drawn together.
+    workers : int
+        Number of processes.
+    """
+    look, camera = view.look, view.shaded_camera
+    fields = [instance.field for instance in view.instances if instance.field is not None]
+    lines = [
+        FieldSymmetry(field.degree, ()).line_count
+        if field.direction_ratios is None
+        else field.degree
+        for field in fields
+    ]
+    many_images = is_hatched(look) or noise_channel_count(look) > 1 or look.method != "sheets"
+    height = max(group[-1].stop - group[0].start for group in groups)
+    if len(groups) > 1:
+        height = min(height + 2 * context_rows(look, camera, view.instances), camera.height)
+    process = PROCESS_BYTES
+    process += samples_memory(camera.width * height, max(lines, default=1), many_images)
+    process += TRIANGLE_BYTES * sum(len(instance.surface.triangles) for instance in view.instances)
+    picture = PIXEL_BYTES * view.camera.width * view.camera.height
+    return picture + process * min(workers, len(groups))

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..annotation.arrow_marks import ArrowMarks, arrow_marks
+from ..annotation.draw_arrows import draw_arrows
+from ..annotation.draw_marks import draw_marks
+from ..annotation.key_contents import PictureKey, sorted_indices
+from ..annotation.singularity_marks import cached_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
-from ..cache import BAKE_CACHE
+from ..cache import BAKE_CACHE, Cache
 from ..compositor.look import Look
+from ..compositor.look_units import look_in_pixels
 from ..compositor.picture import Picture
-from .arrowheads import with_arrowheads
-from .singularities import with_singularities
+from ..compositor.picture_key import color_scale_of, fixed_color_range
+from ..progress import progress
+from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
+
+#: Least length of an arrowhead, pixels.
+MIN_SIZE = 3.0
 
 
 def has_marks(look: Look) -> bool:
@@ -16,9 +31,85 @@ def has_marks(look: Look) -> bool:
     return bool(look.arrows) or shows_singularities(look)
 
 
-def with_marks(picture: Picture, view: ViewInput) -> Picture:
-    """Draw the marks of a view over its picture, with the cache of bakes in the process that calls it."""
-    picture = with_arrowheads(picture, view, BAKE_CACHE)
-    picture = with_singularities(picture, view, BAKE_CACHE)
-    BAKE_CACHE.evict_over_limit()
+def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CACHE) -> Picture:
+    """Draw arrowheads and singularities over the picture of a view, if the look has them.
+
+    Parameters
+    ----------
+    picture : Picture
+    view : ViewInput
+        The view that it was drawn for.
+    cache : Cache, optional
+        Stores corner fields, and the singularities of fields. By default that of bakes in the process,
+        for helpers.
+
+    Returns
+    -------
+    Picture
+        The same if there is nothing to draw, or the picture has thresholds.
+    """
+    if view.draws_thresholds:
+        return picture
+    if view.look.arrows:
+        with progress(0.0, 0.5):
+            arrows = view_arrows(view, cache)
+        if len(arrows):
+            with progress(0.5, 0.6):
+                picture = replace(picture, rgba=draw_arrows(picture.rgba, arrows))
+    if shows_singularities(view.look):
+        with progress(0.6, 0.9):
+            marks = singularity_marks(
+                view.instances, view.camera, view.look, view.clip_planes, cache
+            )
+        with progress(0.9, 1.0):
+            picture = replace(picture, rgba=draw_marks(picture.rgba, marks), marks=marks)
+    if cache is BAKE_CACHE:  # others have owners that evict
+        cache.evict_over_limit()
     return picture
+
+
+def view_arrows(
+    view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
+) -> ArrowMarks:
+    """Find the arrowheads of a view whose look has them; see `arrow_marks`."""
+    look = look_in_pixels(view.look, view.sample_camera, view.instances)
+    return arrow_marks(
+        view.instances,
+        view.camera,
+        look.arrows,
+        max(look.arrow_size, MIN_SIZE),
+        display=look.display,
+        clip_planes=view.clip_planes,
+        cache=cache,
+        is_exact=is_exact,
+    )
+
+
+def sequence_key(instances: Sequence[MeshInstance], look: Look) -> PictureKey:
+    """Find what the key of an animation says.
+
+    It is true of all frames: the range of the colors is known only if the look sets it, and the
+    singularities are those of the fields, visible or not.
+
+    Parameters
+    ----------
+    instances : sequence of MeshInstance
+        Of one of the frames.
+    look : Look
+
+    Returns
+    -------
+    PictureKey
+    """
+    kinds, cache = [np.empty((0, 2), dtype=np.int64)], Cache()
+    fields = [instance for instance in instances if instance.field is not None]
+    if shows_singularities(look):
+        for number, instance in enumerate(fields):
+            with progress(number / len(fields), (number + 1) / len(fields)):
+                _, index = cached_singularities(instance, cache)
+            kinds.append(np.stack([index, np.full(len(index), instance.field.degree)], axis=1))
+    return PictureKey(
+        color_scale_of(look, fixed_color_range(look)),
+        sorted_indices(np.concatenate(kinds), has_counts=False),
+        look.singularity_size,
+    )

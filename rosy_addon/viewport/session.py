@@ -17,7 +17,7 @@ from ..cache import Cache
 from ..compositor.look import Look, has_flow
 from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import look_in_view, select_viewport_renderer
-from ..rendering.arrowheads import view_arrows
+from ..rendering.marks import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.lights import read_lights

@@ -26,8 +26,8 @@ from ..cache import Cache
 from ..color import from_hex
 from ..field.singularities import find_singularities
 from ..gpu.preparation import Preparation
-from ..projection.clip_planes import is_cut_away
 from ..projection.gbuffer import MeshInstance
+from ..projection.visible_vertices import is_cut_away
 from ..worker.job import Call
 from .pixel_frames import pixel_frames
 

@@ -48,7 +48,7 @@ def test_outlines_of_a_coarse_mesh_have_no_gaps(scene):
     """Silhouettes of interpolated normals lie behind faces of their mesh, here by up to 0.3 units."""
     surface = suzanne(0)
     instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", 4))
-    camera = orbit_camera(surface, -32.0, 24.0, 300, 300)
+    camera = orbit_camera(surface.vertices, -32.0, 24.0, 300, 300)
     strokes = draw_instances([instance], camera, StrokeStyle(spacing=60, outline=True)).strokes
     outlines = strokes.select(strokes.family == strokes.names.index("silhouettes"))
     silhouettes, _ = visible_silhouettes(instance, camera, min_jump=50)

@@ -255,4 +255,6 @@ def surface_of_shape(rosy: SimpleNamespace, name: str, data: Path | None = None)
 def camera_of_shape(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:
     """Return the camera for a shape in `VIEWS`, with a square frame."""
     azimuth, elevation, perspective = VIEWS[name]
-    return rosy.orbit_camera(surface, azimuth, elevation, size, size, perspective=perspective)
+    return rosy.orbit_camera(
+        surface.vertices, azimuth, elevation, size, size, perspective=perspective
+    )

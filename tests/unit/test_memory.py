@@ -21,8 +21,7 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.rendering.draw import draw_picture, picture_groups
-from rosy_addon.rendering.picture_memory import picture_memory
+from rosy_addon.rendering.draw import draw_picture, picture_groups, picture_memory
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.turntable_video import turntable, turntable_views
 

@@ -24,7 +24,6 @@ from rosy_addon.progress import listening
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.turntable_video import (
-    VideoWriter,
     check_still,
     check_video_path,
     draw_next,
@@ -222,4 +221,4 @@ def test_an_mp4_with_ffmpeg(tmp_path):
 
 def test_an_mp4_needs_an_encoder(tmp_path):
     with pytest.raises(RosyError, match=r"film\.mp4: an \.mp4 needs ffmpeg or Blender"):
-        VideoWriter(tmp_path / "film.mp4", 12)
+        turntable(draw_picture, iter(()), 3, tmp_path / "film.mp4", 12)

@@ -38,7 +38,7 @@ def draw() -> dict[str, np.ndarray]:
     }
     for name, (surface, kind, degree, shape_look) in shapes.items():
         size = 160 * shape_look.supersampling
-        camera = orbit_camera(surface, -25, 30, size, size)
+        camera = orbit_camera(surface.vertices, -25, 30, size, size)
         instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
         pictures[name] = compose(project([instance], camera), shape_look)
     return {name: to_srgb_uint8(picture.rgba) for name, picture in pictures.items()}

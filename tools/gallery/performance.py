@@ -66,7 +66,7 @@ def _samples(look: Look, name: str) -> None:
     """Draw and save pictures with one and four samples a pixel, at 100 % and at 400 %."""
     ring = torus()
     instance = MeshInstance(ring, np.eye(4), around_field(ring, 4))
-    camera = orbit_camera(ring, 24, 44, SAMPLED_SIDE, SAMPLED_SIDE)
+    camera = orbit_camera(ring.vertices, 24, 44, SAMPLED_SIDE, SAMPLED_SIDE)
     pictures = {}
     for label, samples in (("one sample", 1), ("2 x 2 samples", 2)):
         sampled = replace(look, supersampling=samples)

@@ -75,7 +75,9 @@ def view(
 ) -> Camera:
     """Return a camera that frames a surface, with `supersampling` times `size` pixels."""
     width, height = (supersampling * side for side in size)
-    return orbit_camera(surface, *angles, width, height, perspective=perspective, margin=0.006)
+    return orbit_camera(
+        surface.vertices, *angles, width, height, perspective=perspective, margin=0.006
+    )
 
 
 def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> Picture:

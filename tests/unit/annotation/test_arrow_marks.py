@@ -16,8 +16,7 @@ from rosy_addon.annotation.arrow_marks import (
     arrow_marks,
 )
 from rosy_addon.annotation.draw_arrows import draw_arrows
-from rosy_addon.annotation.even_spacing import spaced_points
-from rosy_addon.annotation.surface_places import surface_places
+from rosy_addon.annotation.surface_places import spaced_points, surface_places
 from rosy_addon.cache import Cache
 from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.look import Look
@@ -171,7 +170,7 @@ def test_undefined_faces_have_no_arrowheads():
 def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
     instance = instance_of(torus(96, 48), 1)
     marks = [
-        arrows([instance], orbit_camera(instance.surface, azimuth, 40, 480, 400))
+        arrows([instance], orbit_camera(instance.surface.vertices, azimuth, 40, 480, 400))
         for azimuth in (20.0, 20.0, 20.5)
     ]
     np.testing.assert_array_equal(marks[0].position, marks[1].position)

@@ -10,9 +10,15 @@ import pytest
 from conftest import long
 from shapes import icosphere
 
-from rosy_addon.annotation.draw_key import DARK_PLATES, LIGHT_PLATES, draw_key
+from rosy_addon.annotation.draw_key import DARK_PLATES, LIGHT_PLATES, draw_key, triangle_coverage
 from rosy_addon.annotation.key_contents import ColorScale, IndexCount, PictureKey
-from rosy_addon.annotation.key_layout import KeyParts, automatic_text_size, lay_out_key, wrapped
+from rosy_addon.annotation.key_layout import (
+    MIN_TEXT_SIZE,
+    TEXT_SIZE,
+    KeyParts,
+    lay_out_key,
+    wrapped,
+)
 from rosy_addon.annotation.round_numbers import (
     format_number,
     round_above,
@@ -21,7 +27,6 @@ from rosy_addon.annotation.round_numbers import (
     tick_values,
 )
 from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN
-from rosy_addon.annotation.text_coverage import triangle_coverage
 from rosy_addon.color import from_hex, luminance, map_colors, to_display
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture_key import fixed_color_range, picture_key
@@ -176,7 +181,7 @@ def test_nothing_overlaps(size):
         layout = lay_out_key(parts, size, text_width, text_size)
         count = bool(caption) + bool(indices) + (scale is not None) + (bar is not None)
         assert len(layout.plates) == count
-        assert layout.text_size >= min(text_size or automatic_text_size(*size), 5.5)
+        assert layout.text_size >= min(text_size or max(TEXT_SIZE * min(size), MIN_TEXT_SIZE), 5.5)
         boxes = np.array(layout.plates).reshape(-1, 4)
         for number, box in enumerate(boxes):
             assert (box >= 0).all() and (box[2:] <= size).all()

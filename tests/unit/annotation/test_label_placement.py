@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rosy_addon.annotation.label_placement import place_labels
+from rosy_addon.annotation.index_labels import place_labels
 
 
 def test_a_label_is_above_and_to_the_right_of_its_dot():

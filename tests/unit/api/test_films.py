@@ -13,6 +13,7 @@ from rosy_addon.compositor.flow import flow_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.representation import face_representation
 from rosy_addon.projection.face_values import face_values
+from rosy_addon.projection.field_channel import REPRESENTATION
 
 SQUARE = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
 LOOK = Look(length=8)
@@ -80,7 +81,7 @@ def test_noise_moves_with_the_mesh(square):
     assert np.array_equal(instance.surface.rest_vertices, square.vertices)
     deformed = np.ascontiguousarray(bent.T)
     drawn, expected = (
-        face_values(mesh, np.eye(3), deformed, field, False).representation
+        face_values(mesh, np.eye(3), deformed, field, False)[0].channels[REPRESENTATION]
         for mesh, field in (
             (instance.surface, instance.field),
             (other.mesh, fields[1].rosy),

@@ -263,4 +263,4 @@ def test_deformed_meshes_keep_their_creases():
     deformed = build_surface(
         sheared, box.corner_vertex, box.face_start, sharp_angle=0.1, rest_vertices=box.vertices
     )
-    assert len(outline_mesh(deformed, np.eye(4), 1.4).crease_ends) == 12
+    assert len(outline_mesh(deformed, np.eye(3), 1.4).crease_ends) == 12

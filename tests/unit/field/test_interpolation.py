@@ -21,6 +21,7 @@ from rosy_addon.field.representation import (
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import have_same_polygons
 from rosy_addon.projection.face_values import face_values
+from rosy_addon.projection.field_channel import REPRESENTATION
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,7 @@ def test_vectors_on_a_rest_shape_are_transported_back(surface):
     moved = replace(surface, rest_vertices=rest)
     deformed = np.ascontiguousarray(surface.vertices.T)
     expected, transported = (
-        face_values(mesh, np.eye(3), deformed, a_field, False).representation
+        face_values(mesh, np.eye(3), deformed, a_field, False)[0].channels[REPRESENTATION]
         for mesh, a_field in ((surface, field), (moved, replace(field, vectors=vectors)))
     )
     assert transported == pytest.approx(expected, abs=1e-6)

@@ -18,6 +18,7 @@ from conftest import long, mainly
 from harness.gpu_parity import draw_pair, rooms
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from lenses import shifted
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
 from rosy_addon.compositor.look import Look
@@ -487,8 +488,8 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
     size = [side * supersampling for side in size]
     view_matrix = look_at(eye, (0, 0, 0), (0, 0, 1))
     if perspective:
-        return perspective_camera(view_matrix, *size, fov=0.65, shift=(0.06, -0.04))
-    return orthographic_camera(view_matrix, *size, scale=2.6, shift=(0.06, -0.04))
+        return shifted(perspective_camera(view_matrix, *size, fov=0.65), (0.06, -0.04))
+    return shifted(orthographic_camera(view_matrix, *size, scale=2.6), (0.06, -0.04))
 
 
 def assert_parity(

@@ -89,7 +89,7 @@ def closed_cylinder(columns):
     ids=["torus", "cylinder", "sphere"],
 )
 def test_silhouettes_of_coarse_meshes_are_those_of_the_smooth_surface(coarse, dense, view):
-    camera = orbit_camera(dense, *view, 300, 300)
+    camera = orbit_camera(dense.vertices, *view, 300, 300)
     lines = outlines_of(coarse, camera)
     lengths = pixel_lengths(lines, camera)
     assert lengths.min() >= MIN_MARK_PX
@@ -106,7 +106,7 @@ def test_silhouettes_of_flat_faces_are_edges():
         smooth.face_start,
         flat_faces=np.ones(smooth.face_count, dtype=bool),
     )
-    camera = orbit_camera(flat, 20, 10, 300, 300)
+    camera = orbit_camera(flat.vertices, 20, 10, 300, 300)
     lines = outlines_of(flat, camera)
     assert set(lines.family.tolist()) == {lines.names.index("silhouettes")}
     assert pixel_lengths(lines, camera).min() >= MIN_MARK_PX

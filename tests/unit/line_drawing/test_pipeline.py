@@ -227,7 +227,7 @@ def test_seeding_ends_where_all_strokes_are_short():
         surface.vertices, surface.corner_vertex, surface.face_start, sharp_angle=0.5
     )
     instance = MeshInstance(surface, IDENTITY, generate(surface, "smoothest", 6))
-    camera = orbit_camera(surface, 45, 20, 150, 100)
+    camera = orbit_camera(surface.vertices, 45, 20, 150, 100)
     with listening(cancel_at(300)):
         draw_instances([instance], camera, StrokeStyle(curvature=0.5, hidden=True))
 

@@ -229,7 +229,7 @@ def test_segments_lie_in_their_faces_and_strokes_cross_edges_without_a_gap():
 def test_strokes_look_like_the_render():
     """Strokes have the direction of the field in the G-buffer at the pixels that they cross."""
     instance = instance_of(icosphere(4), 4, kind="smoothest")
-    camera = orbit_camera(instance.surface, 20, 30, 900, 900, perspective=False)
+    camera = orbit_camera(instance.surface.vertices, 20, 30, 900, 900, perspective=False)
     gbuffer = project([instance], camera)
     visible = visible_strokes(trace_strokes(instance, 0.1), [instance], camera)
     end = np.flatnonzero(np.diff(visible.stroke, prepend=-1) == 0)
@@ -553,7 +553,7 @@ def test_curvature_and_light():
     surface = torus()
     spacing = spacing_by_curvature(surface, 1.0, 0.5)
     assert spacing.shape == (len(surface.vertices),) and np.ptp(spacing) > 0
-    camera = orbit_camera(surface, 0, 90, 100, 100, perspective=False)
+    camera = orbit_camera(surface.vertices, 0, 90, 100, 100, perspective=False)
     tone = headlight_tone(MeshInstance(surface, IDENTITY), camera)
     assert np.isclose(tone.max(), 1, atol=1e-3) and tone[surface.vertices[:, 2] < -0.3].max() == 0
 

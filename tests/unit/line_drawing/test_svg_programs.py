@@ -134,7 +134,7 @@ def scene():
     """A torus with a field along its axis, and a camera."""
     surface = torus(96, 48)
     instance = MeshInstance(surface, np.eye(4), generate(surface, "axis", 2))
-    return instance, orbit_camera(surface, -25, 40, WIDTH, HEIGHT)
+    return instance, orbit_camera(surface.vertices, -25, 40, WIDTH, HEIGHT)
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lenses import shifted
 from shapes import icosphere
 
 from rosy_addon.errors import RosyError
@@ -18,6 +19,7 @@ from rosy_addon.projection.camera import (
     perspective_camera,
     pixel_rays,
 )
+from rosy_addon.projection.gbuffer import MeshInstance
 
 angles = st.floats(-400, 400)
 
@@ -74,7 +76,10 @@ def test_framing_ignores_loose_vertices():
             "vertices": np.concatenate([ball.vertices, [[100.0, 0, 0]]]),
         }
     )
-    first, second = (orbit_camera(s, 10, 20, 50, 50) for s in (ball, [loose, ball]))
+    first, second = (
+        orbit_camera(MeshInstance(s, np.eye(4)).face_points(), 10, 20, 50, 50)
+        for s in (ball, loose)
+    )
     assert (first.view == second.view).all()
 
 
@@ -109,7 +114,7 @@ def test_orthographic_scale_spans_the_longer_side():
 
 @pytest.mark.parametrize("make", [perspective_camera, orthographic_camera])
 def test_pixel_rays_go_through_pixel_centers(make):
-    camera = make(np.eye(4), 31, 17, shift=(0.2, -0.3))
+    camera = shifted(make(np.eye(4), 31, 17), (0.2, -0.3))
     pixel = np.arange(31 * 17)
     x, y = pixel_rays(camera, pixel)
     depth = 3.0 if camera.is_perspective else 1.0
@@ -118,13 +123,6 @@ def test_pixel_rays_go_through_pixel_centers(make):
     )
     np.testing.assert_allclose((ndc[:, 0] + 1) * 15.5, pixel % 31 + 0.5)
     np.testing.assert_allclose((ndc[:, 1] + 1) * 8.5, pixel // 31 + 0.5)
-
-
-def test_a_shift_moves_the_picture_as_in_blender():
-    """With the lens shifted right by half of the longer side, the axis is at the left border."""
-    for make in (perspective_camera, orthographic_camera):
-        camera = make(np.eye(4), 40, 20, shift=(0.5, 0.25))
-        np.testing.assert_allclose(device_coordinates(camera, np.array([[0, 0, -5.0]]))[0, :2], -1)
 
 
 def test_the_scale_of_a_projection_does_not_matter():
@@ -174,13 +172,12 @@ def test_impossible_cameras_are_refused(settings, message):
     "make",
     [
         lambda: perspective_camera(np.eye(4), 9, 9, fov=4.0),
-        lambda: perspective_camera(np.eye(4), 9, 9, focal=0.0),
         lambda: perspective_camera(np.eye(4), 9, 9, clip=(0.0, 5.0)),
         lambda: perspective_camera(np.eye(4), 9, 9, clip=(5.0, 1.0)),
         lambda: orthographic_camera(np.eye(4), 9, 9, scale=0.0),
         lambda: orthographic_camera(np.eye(4), 9, 9, clip=(2.0, 2.0)),
         lambda: orbit_camera(np.zeros((3, 3)), np.nan, 0, 9, 9),
-        lambda: orbit_camera([], 0, 0, 9, 9),
+        lambda: orbit_camera(np.empty((0, 3)), 0, 0, 9, 9),
         lambda: look_at((1, 1, 1), (1, 1, 1)),
         lambda: look_at((1, 1, 9), (1, 1, 1)),
     ],

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import bpy
 
 from ..rosy_addon.bake_texture import TextureResult, bake_texture
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.worker.job import Steps
+from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import DialogJobMixin
-from .poll import poll_active_field, poll_idle, selected_mesh_objects
-from .reports import report_warnings
 from .unwrap import unwrapped
 
 
@@ -21,16 +18,13 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
     bl_idname = "rosy.bake_texture"
     bl_label = "Bake Texture"
     bl_options = {"UNDO"}
+    conditions = (IDLE, ACTIVE_FIELD)
 
     unwrap: bpy.props.BoolProperty(
         name="Unwrap",
         description="Unwrap meshes that have no UV map, with Smart UV Project",
         options={"SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_idle(cls) and poll_active_field(cls, context)
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask whether to unwrap meshes, if there are any without a UV map."""
@@ -49,25 +43,21 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
 
     def begin(self, context: bpy.types.Context) -> Steps[list[TextureResult]]:
         missing = self._without_uv_map(context) if self.unwrap else []
-        steps = bake_texture.begin(context.scene, self._objects(context))
+        steps = bake_texture.begin(context.scene, self.required_data(context))
         return unwrapped(context, missing, steps) if missing else steps
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return self._objects(context)
+    def required_data(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
 
     def finish(self, context: bpy.types.Context, result: list[TextureResult]) -> None:
         names = ", ".join(f"'{texture.object.name}'" for texture in result)
         self.report({"INFO"}, f"Baked the texture of {names}")
-        report_warnings(self, (text for texture in result for text in texture.warnings))
-
-    @staticmethod
-    def _objects(context: bpy.types.Context) -> list[bpy.types.Object]:
-        return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
+        self.report_warnings(*(text for texture in result for text in texture.warnings))
 
     def _without_uv_map(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         return [
             obj
-            for obj in self._objects(context)
+            for obj in self.required_data(context)
             if not obj.data.uv_layers and not obj.rosy.texture_uv_map
         ]
 

@@ -16,8 +16,8 @@ from ..scene.staleness import SCENE_STATES
 from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
-from .generator_settings import generator_setting_names
 from .helper_start import start_helper_once
+from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
 from .sidebar import (
     SidebarPanel,
     draw_cycles_hint,
@@ -25,9 +25,6 @@ from .sidebar import (
     draw_wrapped,
     use_property_columns,
 )
-
-#: Placeholder texts of empty settings of the generator.
-PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
 
 #: Types of shading in which a 3D view does not show the pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
@@ -98,11 +95,7 @@ def _draw_existing_field(
 def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings and the button of the conversion, and the menu of storage formats."""
     settings = context.window_manager.operator_properties_last("rosy.field_convert")
-    column = layout.column()
-    for name in ("new_degree", "angle", "smooth", "pair_distance", "magnitude"):
-        column.prop(settings, name)
-    if settings.magnitude == "values":
-        column.prop(settings, "values")
+    draw_convert_settings(layout.column(), settings)
     layout.operator("rosy.field_convert")
     layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
 
@@ -112,20 +105,15 @@ def _draw_compare_settings(
 ) -> None:
     """Draw the settings and the button of the comparison with another field."""
     settings = context.window_manager.operator_properties_last("rosy.field_compare")
-    column = layout.column()
-    column.prop(settings, "other", placeholder=other_fields[0] if len(other_fields) == 1 else "")
-    column.prop(settings, "use_as_color")
+    only_other = other_fields[0] if len(other_fields) == 1 else ""
+    draw_settings(layout.column(), settings, "other", "use_as_color", other=only_other)
     layout.operator("rosy.field_compare")
 
 
 def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings of the generator and the buttons that make or import a field."""
     settings = context.window_manager.operator_properties_last("rosy.field_generate")
-    column = layout.column()
-    column.prop(settings, "kind")
-    column.prop(settings, "degree")
-    for name in generator_setting_names(settings):
-        column.prop(settings, name, placeholder=PLACEHOLDERS.get(name, ""))
+    draw_generator_settings(layout.column(), settings)
     row = layout.row()
     row.scale_y = 1.5
     row.operator("rosy.field_generate", icon="FORCE_VORTEX")

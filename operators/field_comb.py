@@ -7,13 +7,14 @@ from contextlib import suppress
 import bpy
 import numpy as np
 
-from ..rosy_addon.comb_field import CombStroke, start_stroke
+from ..rosy_addon.comb_field import CombStroke
 from ..rosy_addon.errors import REPORTED_ERRORS, RosyError
 from ..rosy_addon.field.guide_brush import EFFECTS, GuideBrush
 from ..rosy_addon.ui import comb_brush, overlay
+from ..rosy_addon.ui.properties import BRUSH_STRENGTH
 from ..rosy_addon.ui.sidebar import use_property_columns
 from ..rosy_addon.worker.job import Steps, part
-from .base import ACTIVE_FIELD, IDLE, Condition, selected_mesh_objects
+from .base import ACTIVE_FIELD, FRACTION, IDLE, Condition, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
 
 #: Modes of the view in which the field can be combed.
@@ -70,14 +71,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         soft_max=10.0,
         default=0.2,
     )
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description="How much of its effect the brush has",
-        subtype="FACTOR",
-        min=0.0,
-        max=1.0,
-        default=1.0,
-    )
+    strength: bpy.props.FloatProperty(**BRUSH_STRENGTH)
     exact: bpy.props.BoolProperty(
         name="Exact",
         description="Let the field follow the stroke exactly, in the whole radius",
@@ -96,12 +90,9 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         name="Reach",
         description="Distance from the stroke at which the field stays what it is, as a fraction of the size of the "
         "mesh, when the mesh has no guides yet",
-        min=0.0,
-        max=10.0,
         soft_max=0.5,
-        precision=3,
-        step=1,
         default=0.1,
+        **FRACTION,
     )
 
     #: The stroke of the mouse, once that has been on the mesh.
@@ -124,10 +115,10 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             return super().invoke(context, event)
         self._is_away = False
         try:
-            self._mouse = comb_brush.start_stroke(context, selected_mesh_objects(context)[0])
+            self._mouse = comb_brush.CURSOR.hold(context, selected_mesh_objects(context)[0])
             self._add(context, event)
         except REPORTED_ERRORS as error:
-            comb_brush.end_stroke()
+            comb_brush.CURSOR.release()
             return self.report_error(error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -136,7 +127,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         if self._job is None:
             result = self._drag(context, event)
             if result != {"RUNNING_MODAL"} or self._job is not None:
-                comb_brush.end_stroke()
+                comb_brush.CURSOR.release()
             return result
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             # The next stroke begins: settle at once.
@@ -210,7 +201,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             self.front_faces,
             self.mirror,
         )
-        return start_stroke(selected_mesh_objects(context)[0].data, brush, self.reach)
+        return CombStroke(selected_mesh_objects(context)[0].data, brush, self.reach)
 
     def _settle(self, context: bpy.types.Context, line: CombStroke) -> Steps[None]:
         """Solve for the whole field, and store it."""
@@ -231,7 +222,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop. Blender calls this if the window is closed or a file is opened."""
-        comb_brush.end_stroke()
+        comb_brush.CURSOR.release()
         super().cancel(context)
         self._take_back()
 

@@ -21,7 +21,7 @@ from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from ..rosy_addon.ui.operator_settings import draw_convert_settings, draw_settings
 from ..rosy_addon.worker.job import Call, Step, Steps, part
-from .base import EDITABLE_FIELD, selected_mesh_objects
+from .base import EDITABLE_FIELD, FRACTION, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
 _Result = TypeVar("_Result")
@@ -114,23 +114,17 @@ class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
     smooth: bpy.props.FloatProperty(
         name="Smooth",
         description="Smooth the field over this fraction of the size of the mesh",
-        min=0.0,
-        max=10.0,
         soft_max=0.2,
-        precision=3,
-        step=1,
         default=0.0,
+        **FRACTION,
     )
     pair_distance: bpy.props.FloatProperty(
         name="Cancel Pairs",
         description="Remove pairs of singularities with opposite indices that are nearer than this fraction of "
         "the size of the mesh",
-        min=0.0,
-        max=10.0,
         soft_max=0.2,
-        precision=3,
-        step=1,
         default=0.0,
+        **FRACTION,
     )
     magnitude: bpy.props.EnumProperty(
         name="Magnitude",

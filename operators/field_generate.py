@@ -32,7 +32,7 @@ from ..rosy_addon.scene.singularity_points import (
 )
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.worker.job import Call, Steps
-from .base import EDITABLE, selected_mesh_objects
+from .base import EDITABLE, FRACTION, selected_mesh_objects
 from .modal_job import ModalJobMixin
 
 #: Labels of generators that are not the capitalized key.
@@ -97,12 +97,9 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         name="Reach",
         description="Distance by which curvature extends into flat parts, or by which guides are "
         "smoothed, as a fraction of the size of the mesh. 0: do not smooth",
-        min=0.0,
-        max=10.0,
         soft_max=0.2,
-        precision=3,
-        step=1,
         default=0.0,
+        **FRACTION,
     )
     edges: bpy.props.EnumProperty(
         name="Edges",

@@ -13,7 +13,7 @@ from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.ui import singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.worker.job import Call, Steps
-from .base import EDITABLE_FIELD, IN_3D_VIEW, RosyOperator, selected_mesh_objects
+from .base import EDITABLE_FIELD, FRACTION, IN_3D_VIEW, RosyOperator, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 #: The reach of both operators; that of the tool is passed on by the operator that it starts.
@@ -21,12 +21,9 @@ REACH = {
     "name": "Reach",
     "description": "Distance over which directions change, as a fraction of the size of the mesh. At least as "
     "far as the singularity moves",
-    "min": 0.0,
-    "max": 10.0,
     "soft_max": 0.5,
-    "precision": 3,
-    "step": 1,
     "default": 0.1,
+    **FRACTION,
 }
 
 

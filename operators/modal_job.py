@@ -92,21 +92,13 @@ class Job:
         self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
         self.window_manager.progress_begin(0, 100)
         self.handlers = [
-            (getattr(bpy.app.handlers, name), self._make_interrupt_handler(reason))
+            (getattr(bpy.app.handlers, name), lambda *_, reason=reason: self.stop(reason))
             for name, reason in INTERRUPT_REASONS.items()
         ]
         for handlers, handler in self.handlers:
             handlers.append(handler)
         _current_job = self
         self._show_progress(context, Step(0.0, "starting"))
-
-    def _make_interrupt_handler(self, reason: str) -> Any:
-        """Return an application handler that stops the job."""
-
-        def interrupt(*_: Any) -> None:
-            self.stop(reason)
-
-        return interrupt
 
     def advance(self, context: bpy.types.Context) -> bool:
         """Hear what the helper says, and go on with the job if it waits for nothing.

@@ -21,6 +21,9 @@ from .modal_job import FileJobMixin
 #: Azimuth of the first picture, in degrees.
 AZIMUTH = -25.0
 
+#: Arguments of the width and the height.
+SIDE = {"subtype": "PIXEL", "default": 512, "min": 16, "max": 8192}
+
 
 class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
     """Render a turntable video of the active mesh with its field, with the look of the scene"""
@@ -47,18 +50,12 @@ class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
     width: bpy.props.IntProperty(
         name="Width",
         description="Width of the video",
-        subtype="PIXEL",
-        default=512,
-        min=16,
-        max=8192,
+        **SIDE,
     )
     height: bpy.props.IntProperty(
         name="Height",
         description="Height of the video",
-        subtype="PIXEL",
-        default=512,
-        min=16,
-        max=8192,
+        **SIDE,
     )
     elevation: bpy.props.FloatProperty(
         name="Elevation",

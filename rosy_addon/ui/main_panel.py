@@ -16,10 +16,10 @@ from ..scene.staleness import SCENE_STATES
 from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
-from .helper_start import start_helper_once
 from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
 from .sidebar import (
     SidebarPanel,
+    closed_panel,
     draw_cycles_hint,
     draw_progress,
     draw_wrapped,
@@ -36,7 +36,7 @@ class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
     bl_label = "RoSy"
 
     def draw(self, context: bpy.types.Context) -> None:
-        start_helper_once(context)
+        job_status.start_helper_once(context)
         layout = self.layout
         use_property_columns(layout)
         objects = field_objects(context.view_layer)
@@ -76,19 +76,12 @@ def _draw_existing_field(
         "rosy.singularities", text="Singularities", icon="OVERLAY", depress=is_shown
     )
     button.show = "NONE" if is_shown else "OVERLAY"
-    header, body = layout.panel("rosy_convert_field", default_closed=True)
-    header.label(text="Convert")
-    if body is not None:
+    if (body := closed_panel(layout, "convert_field", "Convert")) is not None:
         _draw_convert_settings(body, context)
     other_fields = other_field_names(mesh)
-    if other_fields:
-        header, body = layout.panel("rosy_compare_field", default_closed=True)
-        header.label(text="Compare")
-        if body is not None:
-            _draw_compare_settings(body, context, other_fields)
-    header, body = layout.panel("rosy_another_field", default_closed=True)
-    header.label(text="Make Another Field")
-    if body is not None:
+    if other_fields and (body := closed_panel(layout, "compare_field", "Compare")) is not None:
+        _draw_compare_settings(body, context, other_fields)
+    if (body := closed_panel(layout, "another_field", "Make Another Field")) is not None:
         _draw_new_field(body, context)
 
 
@@ -183,9 +176,7 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
 
 def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings and the button of textures."""
-    header, body = layout.panel("rosy_texture", default_closed=True)
-    header.label(text="Texture")
-    if body is None:
+    if (body := closed_panel(layout, "texture", "Texture")) is None:
         return
     obj = context.view_layer.objects.active
     column = body.column()

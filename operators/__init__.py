@@ -1,5 +1,4 @@
-"""The operators of the extension, one verb in each file.
+"""The operators of the extension.
 
-`modal_job`, `poll`, `preset_shared` and `reports` are helpers that operators share, and
-`registration` registers all of them.
+`base` and `modal_job` have what operators share, and `registration` registers all of them.
 """

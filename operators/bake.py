@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import bpy
 
 from ..rosy_addon.bake import BakeResult, bake
 from ..rosy_addon.errors import RosyError
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
-from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.ui.properties import CAMERA_ITEMS
 from ..rosy_addon.worker.job import Steps
+from .base import IDLE, VISIBLE_FIELD
 from .modal_job import ModalJobMixin
-from .poll import poll_has_field
-from .reports import report_warnings
 
 
 class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
@@ -25,32 +21,26 @@ class ROSY_OT_bake(ModalJobMixin, bpy.types.Operator):
     bl_idname = "rosy.bake"
     bl_label = "Bake"
     bl_options = {"UNDO"}
+    conditions = (IDLE, VISIBLE_FIELD)
 
     camera: bpy.props.EnumProperty(
         name="Camera", description="Camera to draw from", items=CAMERA_ITEMS
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_has_field(cls, context)
 
     def begin(self, context: bpy.types.Context) -> Steps[list[BakeResult]]:
         return bake.begin(
             context.scene, cameras=self._cameras(context), workers=worker_count(context)
         )
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return field_objects(context.view_layer)
-
     def finish(self, context: bpy.types.Context, result: list[BakeResult]) -> None:
         names = ", ".join(f"'{picture.camera}'" for picture in result)
         self.report({"INFO"}, f"Baked from {names}")
-        report_warnings(self, (text for picture in result for text in picture.warnings))
+        self.report_warnings(*(text for picture in result for text in picture.warnings))
 
     def _cameras(self, context: bpy.types.Context) -> list[CameraSource]:
         """Return the cameras to bake from: the operator's choice, by default the scene's."""
         scene = context.scene
-        source = self.camera if self.properties.is_property_set("camera") else scene.rosy.camera
+        source = self.chosen("camera", scene.rosy.camera)
         if source == "VIEW":
             return [view_camera(context)]
         return scene_cameras(scene) if source == "ALL" else [render_camera(scene)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -11,12 +10,10 @@ from ..rosy_addon.animation import SequenceResult, bake_animation
 from ..rosy_addon.errors import RosyError, counted
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
-from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.worker.job import Steps
+from .base import IDLE, VISIBLE_FIELD
 from .modal_job import DialogJobMixin
-from .poll import poll_has_field
-from .reports import report_warnings
 
 
 class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
@@ -25,6 +22,7 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
     bl_idname = "rosy.bake_animation"
     bl_label = "Bake Animation"
     bl_options = {"UNDO"}
+    conditions = (IDLE, VISIBLE_FIELD)
     cancel_note = "completed frames were kept"
 
     first: bpy.props.IntProperty(name="First", description="First frame", default=1)
@@ -43,10 +41,6 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
         options={"HIDDEN", "SKIP_SAVE"},
     )
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_has_field(cls, context)
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask for a folder if the scene has none, as in a file that was never saved."""
@@ -84,18 +78,11 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
 
     def _frame_settings(self, scene: bpy.types.Scene) -> dict[str, int]:
         """Return the first and last frame and the step: the operator's, by default the scene's."""
-        defaults = {
-            "first": scene.frame_start,
-            "last": scene.frame_end,
-            "step": scene.frame_step,
-        }
         return {
-            name: getattr(self, name) if self.properties.is_property_set(name) else default
-            for name, default in defaults.items()
+            "first": self.chosen("first", scene.frame_start),
+            "last": self.chosen("last", scene.frame_end),
+            "step": self.chosen("step", scene.frame_step),
         }
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return field_objects(context.view_layer)
 
     def finish(self, context: bpy.types.Context, result: list[SequenceResult]) -> None:
         for sequence in result:
@@ -103,7 +90,7 @@ class ROSY_OT_bake_animation(DialogJobMixin, bpy.types.Operator):
                 {"INFO"},
                 f"{counted(len(sequence.rendered), 'frame')} drawn, {len(sequence.skipped)} up to date: {sequence.sequence.path}",
             )
-        report_warnings(self, (text for sequence in result for text in sequence.warnings))
+        self.report_warnings(*(text for sequence in result for text in sequence.warnings))
 
 
 CLASSES = (ROSY_OT_bake_animation,)

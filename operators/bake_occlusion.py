@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import bpy
 
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
 from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.worker.job import Steps
+from .base import IDLE, VISIBLE_FIELD
 from .modal_job import ModalJobMixin
-from .poll import poll_has_field
 
 
 class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
@@ -20,6 +18,7 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
     bl_idname = "rosy.occlusion"
     bl_label = "Tone by Occlusion"
     bl_options = {"REGISTER", "UNDO"}
+    conditions = (IDLE, VISIBLE_FIELD)
 
     directions: bpy.props.IntProperty(
         name="Directions",
@@ -30,17 +29,10 @@ class ROSY_OT_occlusion(ModalJobMixin, bpy.types.Operator):
         max=65536,
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_has_field(cls, context)
-
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         depsgraph = context.evaluated_depsgraph_get()
         objects = field_objects(context.view_layer)
         return store_occlusion.begin(depsgraph, objects, direction_count=self.directions)
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return field_objects(context.view_layer)
 
     def finish(self, context: bpy.types.Context, result: None) -> None:
         settings = context.scene.rosy

@@ -1,18 +1,31 @@
-"""Operator: bake the field of the selected meshes into textures for their UV maps."""
+"""Operator: bake the field of the selected meshes into textures for their UV maps.
+
+Meshes without one are unwrapped with Blender's Smart UV Project.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import bpy
+import numpy as np
 
 from ..rosy_addon.bake_texture import TextureResult, bake_texture
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.scene.compat import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
-from ..rosy_addon.worker.job import Steps
+from ..rosy_addon.worker.job import Step, Steps
+from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects
 from .modal_job import DialogJobMixin
-from .poll import poll_active_field, poll_idle, selected_mesh_objects
-from .reports import report_warnings
-from .unwrap import unwrapped
+
+#: Angle between the faces of a chart, and distance between charts as a fraction of the map.
+ANGLE, MARGIN = math.radians(66), 0.003
+
+#: Name of the new UV maps, as Blender's own.
+UV_MAP_NAME = "UVMap"
 
 
 class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
@@ -21,16 +34,13 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
     bl_idname = "rosy.bake_texture"
     bl_label = "Bake Texture"
     bl_options = {"UNDO"}
+    conditions = (IDLE, ACTIVE_FIELD)
 
     unwrap: bpy.props.BoolProperty(
         name="Unwrap",
         description="Unwrap meshes that have no UV map, with Smart UV Project",
         options={"SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_idle(cls) and poll_active_field(cls, context)
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask whether to unwrap meshes, if there are any without a UV map."""
@@ -49,27 +59,116 @@ class ROSY_OT_bake_texture(DialogJobMixin, bpy.types.Operator):
 
     def begin(self, context: bpy.types.Context) -> Steps[list[TextureResult]]:
         missing = self._without_uv_map(context) if self.unwrap else []
-        steps = bake_texture.begin(context.scene, self._objects(context))
-        return unwrapped(context, missing, steps) if missing else steps
+        steps = bake_texture.begin(context.scene, self.required_data(context))
+        return _with_uv_maps(context, missing, steps) if missing else steps
 
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return self._objects(context)
+    def required_data(self, context: bpy.types.Context) -> list[bpy.types.Object]:
+        return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
 
     def finish(self, context: bpy.types.Context, result: list[TextureResult]) -> None:
         names = ", ".join(f"'{texture.object.name}'" for texture in result)
         self.report({"INFO"}, f"Baked the texture of {names}")
-        report_warnings(self, (text for texture in result for text in texture.warnings))
-
-    @staticmethod
-    def _objects(context: bpy.types.Context) -> list[bpy.types.Object]:
-        return [obj for obj in selected_mesh_objects(context) if has_field(obj)]
+        self.report_warnings(*(text for texture in result for text in texture.warnings))
 
     def _without_uv_map(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         return [
             obj
-            for obj in self._objects(context)
+            for obj in self.required_data(context)
             if not obj.data.uv_layers and not obj.rosy.texture_uv_map
         ]
+
+
+def _with_uv_maps(
+    context: bpy.types.Context, objects: Sequence[bpy.types.Object], steps: Steps[Any]
+) -> Steps[Any]:
+    """Add a UV map to the meshes of objects for a job, which removes them if it is not finished.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    objects : sequence of bpy.types.Object
+        Meshes without a UV map.
+    steps : Steps
+        Of the job that needs the UV maps.
+
+    Raises
+    ------
+    RosyError
+        If a mesh is linked from a library.
+    """
+    meshes = {obj.data: obj for obj in objects}
+    for mesh, obj in meshes.items():
+        if not is_editable(mesh):
+            raise RosyError(
+                f"object '{obj.name}': its mesh is linked and has no UV map: make it local"
+            )
+    if context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    map_names = {}
+    for mesh in meshes:
+        # The operator refuses meshes without faces.
+        uv = _unwrapped(context, mesh) if mesh.polygons else np.zeros(0, dtype=np.float32)
+        layer = mesh.uv_layers.new(name=UV_MAP_NAME)
+        layer.data.foreach_set("uv", uv)
+        # Blender adds a number if the mesh has another attribute of this name.
+        map_names[mesh] = layer.name
+    with_cleanup = _with_removal(map_names, steps)
+    next(with_cleanup)  # from here on, it removes the maps also if it is closed
+    return with_cleanup
+
+
+def _with_removal(map_names: Mapping[bpy.types.Mesh, str], steps: Steps[Any]) -> Steps[Any]:
+    """Run the steps of a job. If it is not finished, the UV maps are removed from the meshes."""
+    try:
+        yield Step(0.0, "unwrapping")
+        return (yield from steps)
+    except BaseException:
+        for mesh, name in map_names.items():
+            if (layer := mesh.uv_layers.get(name)) is not None:
+                mesh.uv_layers.remove(layer)
+        raise
+
+
+def _unwrapped(context: bpy.types.Context, mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the (2 C,) float32 coordinates of an unwrapped copy of a mesh.
+
+    Blender's operator changes what is hidden and selected, and needs an object that is visible. The copy
+    keeps both away from the user's mesh.
+    """
+    with _only_selected_copy(context, mesh) as copy:
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.reveal(select=False)
+        bpy.ops.mesh.select_all(action="SELECT")
+        bpy.ops.uv.smart_project(angle_limit=ANGLE, island_margin=MARGIN)
+        bpy.ops.object.mode_set(mode="OBJECT")
+        uv = np.zeros(2 * len(copy.data.loops), dtype=np.float32)
+        if copy.data.uv_layers:
+            copy.data.uv_layers[0].data.foreach_get("uv", uv)
+        return uv
+
+
+@contextmanager
+def _only_selected_copy(
+    context: bpy.types.Context, mesh: bpy.types.Mesh
+) -> Iterator[bpy.types.Object]:
+    """Yield an object with a copy of a mesh, which alone is selected and active."""
+    active = context.view_layer.objects.active
+    selected = list(context.selected_objects)
+    copy = bpy.data.objects.new("RoSy Unwrapping", mesh.copy())
+    try:
+        context.scene.collection.objects.link(copy)
+        for obj in selected:
+            obj.select_set(False)
+        copy.select_set(True)
+        context.view_layer.objects.active = copy
+        yield copy
+    finally:
+        data = copy.data
+        bpy.data.objects.remove(copy)
+        bpy.data.meshes.remove(data)
+        for obj in selected:
+            obj.select_set(True)
+        context.view_layer.objects.active = active
 
 
 CLASSES = (ROSY_OT_bake_texture,)

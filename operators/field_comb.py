@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import suppress
 
 import bpy
 import numpy as np
 
-from ..rosy_addon.comb_field import CombStroke, start_stroke
+from ..rosy_addon.comb_field import CombStroke
 from ..rosy_addon.errors import REPORTED_ERRORS, RosyError
 from ..rosy_addon.field.guide_brush import EFFECTS, GuideBrush
 from ..rosy_addon.ui import comb_brush, overlay
+from ..rosy_addon.ui.properties import BRUSH_STRENGTH
+from ..rosy_addon.ui.sidebar import use_property_columns
 from ..rosy_addon.worker.job import Steps, part
-from .modal_job import Job, ModalJobMixin
-from .poll import poll_active_field, poll_idle, selected_mesh_objects
-from .reports import report_error
+from .base import ACTIVE_FIELD, FRACTION, IDLE, Condition, selected_mesh_objects
+from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
 
 #: Modes of the view in which the field can be combed.
 MODES = ("OBJECT", "SCULPT")
@@ -38,12 +38,19 @@ class RosyStrokePoint(bpy.types.PropertyGroup):
     )
 
 
-class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Turn the field of the active mesh along a stroke, and keep the stroke as guides on the mesh"""
 
     bl_idname = "rosy.field_comb"
     bl_label = "Comb Field"
     bl_options = {"REGISTER", "UNDO"}
+    conditions = (
+        IDLE,
+        Condition(
+            lambda context: context.mode in MODES, "Switch to Object Mode or Sculpt Mode first"
+        ),
+        ACTIVE_FIELD,
+    )
 
     stroke: bpy.props.CollectionProperty(
         type=RosyStrokePoint,
@@ -64,14 +71,7 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
         soft_max=10.0,
         default=0.2,
     )
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description="How much of its effect the brush has",
-        subtype="FACTOR",
-        min=0.0,
-        max=1.0,
-        default=1.0,
-    )
+    strength: bpy.props.FloatProperty(**BRUSH_STRENGTH)
     exact: bpy.props.BoolProperty(
         name="Exact",
         description="Let the field follow the stroke exactly, in the whole radius",
@@ -90,28 +90,13 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
         name="Reach",
         description="Distance from the stroke at which the field stays what it is, as a fraction of the size of the "
         "mesh, when the mesh has no guides yet",
-        min=0.0,
-        max=10.0,
         soft_max=0.5,
-        precision=3,
-        step=1,
         default=0.1,
+        **FRACTION,
     )
 
     #: The stroke of the mouse, once that has been on the mesh.
     _line = None
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not poll_idle(cls):
-            return False
-        if context.mode not in MODES:
-            cls.poll_message_set("Switch to Object Mode or Sculpt Mode first")
-            return False
-        return poll_active_field(cls, context)
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return [selected_mesh_objects(context)[0].data]
 
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Draw the whole stroke."""
@@ -130,11 +115,11 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
             return super().invoke(context, event)
         self._is_away = False
         try:
-            self._mouse = comb_brush.start_stroke(context, selected_mesh_objects(context)[0])
+            self._mouse = comb_brush.CURSOR.hold(context, selected_mesh_objects(context)[0])
             self._add(context, event)
         except REPORTED_ERRORS as error:
-            comb_brush.end_stroke()
-            return report_error(self, error)
+            comb_brush.CURSOR.release()
+            return self.report_error(error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -142,7 +127,7 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
         if self._job is None:
             result = self._drag(context, event)
             if result != {"RUNNING_MODAL"} or self._job is not None:
-                comb_brush.end_stroke()
+                comb_brush.CURSOR.release()
             return result
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             # The next stroke begins: settle at once.
@@ -170,7 +155,7 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
                 self._job = Job(context, self._settle(context, self._line), [self._line.mesh])
         except REPORTED_ERRORS as error:
             self._take_back()
-            return report_error(self, error)
+            return self.report_error(error)
         except ReferenceError:  # the mesh was deleted
             return {"CANCELLED"}
         return {"RUNNING_MODAL"}
@@ -216,8 +201,7 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
             self.front_faces,
             self.mirror,
         )
-        (mesh,) = self.required_data(context)
-        return start_stroke(mesh, brush, self.reach)
+        return CombStroke(selected_mesh_objects(context)[0].data, brush, self.reach)
 
     def _settle(self, context: bpy.types.Context, line: CombStroke) -> Steps[None]:
         """Solve for the whole field, and store it."""
@@ -232,22 +216,20 @@ class ROSY_OT_field_comb(ModalJobMixin, bpy.types.Operator):
                 return {"FINISHED"}
         except REPORTED_ERRORS as error:
             self._take_back()
-            return report_error(self, error)
+            return self.report_error(error)
         self._take_back()
         return {"CANCELLED"}
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop. Blender calls this if the window is closed or a file is opened."""
-        comb_brush.end_stroke()
+        comb_brush.CURSOR.release()
         super().cancel(context)
         self._take_back()
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        comb_brush.draw_settings(layout, self)
-        layout.prop(self, "radius")
+        use_property_columns(self.layout)
+        comb_brush.draw_settings(self.layout, self)
+        self.layout.prop(self, "radius")
 
 
 CLASSES = (RosyStrokePoint, ROSY_OT_field_comb)

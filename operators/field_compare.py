@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import bpy
@@ -16,9 +15,10 @@ from ..rosy_addon.scene.field_difference import (
     other_field_names,
     store_difference,
 )
+from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.worker.job import Steps
-from .modal_job import ModalJobMixin
-from .poll import poll_active_field, poll_editable, selected_mesh_objects
+from .base import selected_mesh_objects
+from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 
 def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> list[str]:
@@ -27,7 +27,7 @@ def _search_fields(_operator: Any, context: bpy.types.Context, _typed: str) -> l
     ]
 
 
-class ROSY_OT_field_compare(ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Compute the angle between the field of the active mesh and another one, store it as an attribute, and color the lines by it"""
 
     bl_idname = "rosy.field_compare"
@@ -46,16 +46,8 @@ class ROSY_OT_field_compare(ModalJobMixin, bpy.types.Operator):
         default=True,
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_editable(cls, context) and poll_active_field(cls, context)
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return [selected_mesh_objects(context)[0].data]
-
     def begin(self, context: bpy.types.Context) -> Steps[FieldDifference]:
-        (mesh,) = self.required_data(context)
-        return store_difference.begin(mesh, self.other)
+        return store_difference.begin(selected_mesh_objects(context)[0].data, self.other)
 
     def finish(self, context: bpy.types.Context, result: FieldDifference) -> None:
         if self.use_as_color:
@@ -78,11 +70,7 @@ class ROSY_OT_field_compare(ModalJobMixin, bpy.types.Operator):
         )
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.prop(self, "other")
-        layout.prop(self, "use_as_color")
+        draw_settings(self.layout, self, "other", "use_as_color")
 
 
 CLASSES = (ROSY_OT_field_compare,)

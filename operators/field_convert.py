@@ -19,9 +19,10 @@ from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents
 from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
+from ..rosy_addon.ui.operator_settings import draw_convert_settings, draw_settings
 from ..rosy_addon.worker.job import Call, Step, Steps, part
+from .base import EDITABLE_FIELD, FRACTION, selected_mesh_objects
 from .modal_job import ModalJobMixin
-from .poll import poll_active_field, poll_editable, selected_mesh_objects, store_fields
 
 _Result = TypeVar("_Result")
 
@@ -60,12 +61,10 @@ def _search_values(_operator: Any, context: bpy.types.Context, _typed: str) -> l
     return [*(group.name for group in obj.vertex_groups), *names]
 
 
-class _FieldOperator:
+class _FieldsJobMixin(ModalJobMixin):
     """Mixin of operators on the fields of the selected meshes."""
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_editable(cls, context) and poll_active_field(cls, context)
+    conditions = EDITABLE_FIELD
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
         return dict.fromkeys(obj.data for obj in selected_mesh_objects(context) if has_field(obj))
@@ -82,7 +81,7 @@ class _FieldOperator:
         return results
 
 
-class ROSY_OT_field_convert(_FieldOperator, ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_convert(_FieldsJobMixin, bpy.types.Operator):
     """Change the degree of the fields of the selected meshes, rotate or smooth them, cancel singularities, or replace their magnitudes"""
 
     bl_idname = "rosy.field_convert"
@@ -115,23 +114,17 @@ class ROSY_OT_field_convert(_FieldOperator, ModalJobMixin, bpy.types.Operator):
     smooth: bpy.props.FloatProperty(
         name="Smooth",
         description="Smooth the field over this fraction of the size of the mesh",
-        min=0.0,
-        max=10.0,
         soft_max=0.2,
-        precision=3,
-        step=1,
         default=0.0,
+        **FRACTION,
     )
     pair_distance: bpy.props.FloatProperty(
         name="Cancel Pairs",
         description="Remove pairs of singularities with opposite indices that are nearer than this fraction of "
         "the size of the mesh",
-        min=0.0,
-        max=10.0,
         soft_max=0.2,
-        precision=3,
-        step=1,
         default=0.0,
+        **FRACTION,
     )
     magnitude: bpy.props.EnumProperty(
         name="Magnitude",
@@ -155,7 +148,7 @@ class ROSY_OT_field_convert(_FieldOperator, ModalJobMixin, bpy.types.Operator):
     def begin(self, context: bpy.types.Context) -> Steps[int]:
         """Convert all fields, then store them. Return the number of meshes."""
         converted = yield from self.each_mesh(context, self._converted)
-        store_fields(self, context, converted)
+        self.store_fields(context, converted)
         return len(converted)
 
     def _converted(self, mesh: bpy.types.Mesh) -> Steps[RosyField]:
@@ -178,16 +171,10 @@ class ROSY_OT_field_convert(_FieldOperator, ModalJobMixin, bpy.types.Operator):
         self.report({"INFO"}, f"Converted {counted(result, 'field')}")
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        for name in ("new_degree", "angle", "smooth", "pair_distance", "magnitude"):
-            layout.prop(self, name)
-        if self.magnitude == "values":
-            layout.prop(self, "values")
+        draw_convert_settings(self.layout, self)
 
 
-class ROSY_OT_field_store(_FieldOperator, ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_store(_FieldsJobMixin, bpy.types.Operator):
     """Store the fields of the selected meshes in another form, for Geometry Nodes and other programs"""
 
     bl_idname = "rosy.field_store"
@@ -223,12 +210,9 @@ class ROSY_OT_field_store(_FieldOperator, ModalJobMixin, bpy.types.Operator):
         self.report({"INFO"}, f"Stored {counted(result, 'field')} as {FORMS[self.form][0]}")
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.prop(self, "form")
+        draw_settings(self.layout, self, "form")
         if self.form != "DIRECTIONS":
-            layout.prop(self, "attribute")
+            draw_settings(self.layout, self, "attribute")
 
 
 CLASSES = (ROSY_OT_field_convert, ROSY_OT_field_store)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -17,8 +16,8 @@ from ..rosy_addon.scene.field_attributes import field_degree
 from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.worker.job import Call, Steps
-from .modal_job import DialogJobMixin
-from .poll import poll_active_field, poll_editable, selected_mesh_objects, sync_suffix
+from .base import selected_mesh_objects, sync_suffix
+from .modal_job import ActiveMeshMixin, FileJobMixin
 
 #: File formats by suffix: label and description in the user interface.
 FIELD_FORMATS = {
@@ -34,7 +33,7 @@ FIELD_FORMATS = {
 GUIDE_FORMATS = (".rosy", ".rawfield", ".txt", ".npy")
 
 
-class ROSY_OT_field_export(DialogJobMixin, bpy.types.Operator, ExportHelper):
+class ROSY_OT_field_export(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ExportHelper):
     """Write the field of the active mesh to a file"""
 
     bl_idname = "rosy.field_export"
@@ -64,15 +63,6 @@ class ROSY_OT_field_export(DialogJobMixin, bpy.types.Operator, ExportHelper):
             ),
         ],
     )
-    skip_browser: bpy.props.BoolProperty(
-        name="Skip Browser",
-        description="Start without a file browser",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_editable(cls, context) and poll_active_field(cls, context)
 
     def check(self, context: bpy.types.Context) -> bool:
         """Set the suffix of the file name to the format's in the file browser."""
@@ -81,9 +71,6 @@ class ROSY_OT_field_export(DialogJobMixin, bpy.types.Operator, ExportHelper):
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask for the path of the file."""
         return None if self.skip_browser else ExportHelper.invoke(self, context, event)
-
-    def take_answer(self, context: bpy.types.Context) -> None:
-        self.skip_browser = True
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))
@@ -94,10 +81,6 @@ class ROSY_OT_field_export(DialogJobMixin, bpy.types.Operator, ExportHelper):
                 f"{GUIDE_FORMATS[-1]} file"
             )
         return _export(selected_mesh_objects(context)[0].data, path, is_guides)
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        obj = selected_mesh_objects(context)[0]
-        return obj, obj.data
 
     def finish(self, context: bpy.types.Context, result: Path) -> None:
         self.report({"INFO"}, f"Wrote {result}")

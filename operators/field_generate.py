@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from functools import partial
 from math import pi
 from typing import Any
@@ -31,11 +30,10 @@ from ..rosy_addon.scene.singularity_points import (
     has_points,
     read_singularity_points,
 )
-from ..rosy_addon.ui.generator_settings import generator_setting_names
+from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
 from ..rosy_addon.worker.job import Call, Steps
+from .base import EDITABLE, FRACTION, selected_mesh_objects
 from .modal_job import ModalJobMixin
-from .poll import poll_editable, selected_mesh_objects, store_fields
-from .reports import report_warning
 
 #: Labels of generators that are not the capitalized key.
 KIND_LABELS = {"uv": "UV Map"}
@@ -79,6 +77,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     bl_idname = "rosy.field_generate"
     bl_label = "Make Field"
     bl_options = {"REGISTER", "UNDO"}
+    conditions = EDITABLE
 
     kind: bpy.props.EnumProperty(
         name="From",
@@ -98,12 +97,9 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         name="Reach",
         description="Distance by which curvature extends into flat parts, or by which guides are "
         "smoothed, as a fraction of the size of the mesh. 0: do not smooth",
-        min=0.0,
-        max=10.0,
         soft_max=0.2,
-        precision=3,
-        step=1,
         default=0.0,
+        **FRACTION,
     )
     edges: bpy.props.EnumProperty(
         name="Edges",
@@ -177,10 +173,6 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         default="rosy",
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_editable(cls, context)
-
     def begin(self, context: bpy.types.Context) -> Steps[str]:
         """Generate all fields, then store them. Return what was made, for a message.
 
@@ -209,11 +201,10 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             fields[mesh] = field
             label = "checking orientations"
             if note := (yield Call(orientation_warning, (surface,), stop, stop, label)):
-                report_warning(self, note)
+                self.report_warnings(note)
         if not fields:
             raise errors[0]
-        for error in errors:
-            report_warning(self, str(error))
+        self.report_warnings(*map(str, errors))
         surfaces = {mesh: surface for mesh, surface, _ in inputs}
         fields_on_surfaces = [(surfaces[mesh], field) for mesh, field in fields.items()]
         # Counting must not take long.
@@ -221,7 +212,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         is_cheap = self.kind not in FAST_KINDS or face_count <= MAX_FAST_FACES
         describe = partial(description, count_singularities=is_cheap)
         notes = yield Call(describe, (fields_on_surfaces,), 0.9)
-        store_fields(self, context, fields, self.attribute)
+        self.store_fields(context, fields, self.attribute)
         names = [obj.name for obj in selected_mesh_objects(context) if obj.data in fields]
         target = f"'{names[0]}'" if len(fields) == 1 else counted(len(fields), "mesh", "meshes")
         return f"a field of degree {self.degree} on {target}{notes and ': '}{notes}"
@@ -238,50 +229,37 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         self, context: bpy.types.Context, mesh: bpy.types.Mesh, surface: Surface
     ) -> GeneratorSettings:
         """Return the settings of the generator for one mesh, with the guides read."""
-        settings = GeneratorSettings(self.kind, tuple(self.axis), self.reach, self.sharp_angle)
-        if self.kind == "uv":
-            return replace(settings, uv=corner_uvs(mesh, self.uv_map))
+        owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
+        kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
+        guides = kind_guides.get(self.kind, ())
+        values: dict[str, Any] = {}
+        if "EDGES" in guides and self.edges != "FEATURES":
+            values["edges"] = marked_edges(mesh, self.edges)
+        elif "EDGES" in guides and self.kind == "guided":
+            values["edges"] = feature_edges(surface, self.sharp_angle)
+        if "OBJECTS" in guides:
+            strokes, empties = guide_strokes_and_empties(self._guide_objects(context), owner)
+            values |= {"strokes": strokes, "axis_guides": empties}
+        if "ANNOTATIONS" in guides:
+            annotations = annotation_strokes(context.scene, owner)
+            values["strokes"] = [*values.get("strokes", ()), *annotations]
+        if "UV" in guides:
+            values["uv"] = corner_uvs(mesh, self.uv_map)
+        if "ATTRIBUTE" in guides:
+            name = self.vectors or GUIDE_ATTRIBUTE
+            values["vectors"] = guide_vectors(mesh, name, surface)
+            values["vectors_have_firmness"] = name == GUIDE_ATTRIBUTE
         if self.kind == "prescribed":
-            target = self._first_object(context, mesh)
-            points = read_singularity_points(context.scene, target, self.degree, self.singularities)
+            values["singularities"] = read_singularity_points(
+                context.scene, owner, self.degree, self.singularities
+            )
+            values["add_missing"] = self.add_missing
             vectors = guide_vectors(mesh, self.vectors, surface) if self.vectors else None
             if self.vectors == GUIDE_ATTRIBUTE:
                 vectors[np.linalg.norm(vectors, axis=1) < STROKE_FIRMNESS] = 0
-            return replace(
-                settings, singularities=points, add_missing=self.add_missing, vectors=vectors
-            )
-        if self.kind == "features" and self.edges != "FEATURES":
-            return replace(settings, edges=marked_edges(mesh, self.edges))
-        if self.kind != "guided":
-            return settings
-        if "EDGES" in self.guides:
-            by_angle = self.edges == "FEATURES"
-            edges = feature_edges(surface, self.sharp_angle) if by_angle else None
-            settings = replace(
-                settings, edges=marked_edges(mesh, self.edges) if edges is None else edges
-            )
-        if "OBJECTS" in self.guides:
-            target = self._first_object(context, mesh)
-            strokes, empties = guide_strokes_and_empties(self._guide_objects(context), target)
-            settings = replace(settings, strokes=strokes, axis_guides=empties)
-        if "ANNOTATIONS" in self.guides:
-            target = self._first_object(context, mesh)
-            annotations = annotation_strokes(context.scene, target)
-            settings = replace(settings, strokes=[*settings.strokes, *annotations])
-        if "UV" in self.guides:
-            settings = replace(settings, uv=corner_uvs(mesh, self.uv_map))
-        if "ATTRIBUTE" in self.guides:
-            name = self.vectors or GUIDE_ATTRIBUTE
-            settings = replace(
-                settings,
-                vectors=guide_vectors(mesh, name, surface),
-                vectors_have_firmness=name == GUIDE_ATTRIBUTE,
-            )
-        return settings
-
-    def _first_object(self, context: bpy.types.Context, mesh: bpy.types.Mesh) -> bpy.types.Object:
-        """Return the selected object of a mesh that guides are read for."""
-        return next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
+            values["vectors"] = vectors
+        axis, reach, angle = tuple(self.axis), self.reach, self.sharp_angle
+        return GeneratorSettings(self.kind, axis, reach, angle, **values)
 
     def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """Return the guide objects: the named one, or by default the selected ones."""
@@ -307,14 +285,8 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         self.report({"INFO"}, f"Made {result}")
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        layout.prop(self, "kind")
-        layout.prop(self, "degree")
-        for name in generator_setting_names(self):
-            layout.prop(self, name)
-        layout.prop(self, "attribute")
+        draw_generator_settings(self.layout, self)
+        draw_settings(self.layout, self, "attribute")
 
 
 CLASSES = (ROSY_OT_field_generate,)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -15,17 +14,17 @@ from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.worker.job import Call, Steps
-from .modal_job import DialogJobMixin
-from .poll import poll_editable, selected_mesh_objects, store_fields
-from .reports import report_warning
+from .base import EDITABLE, selected_mesh_objects
+from .modal_job import ActiveMeshMixin, FileJobMixin
 
 
-class ROSY_OT_field_import(DialogJobMixin, bpy.types.Operator, ImportHelper):
+class ROSY_OT_field_import(ActiveMeshMixin, FileJobMixin, bpy.types.Operator, ImportHelper):
     """Read the field of the active mesh from a file"""
 
     bl_idname = "rosy.field_import"
     bl_label = "Import Field"
     bl_options = {"REGISTER", "UNDO"}
+    conditions = EDITABLE
 
     filename_ext = ".rosy"
     filter_glob: bpy.props.StringProperty(
@@ -59,22 +58,10 @@ class ROSY_OT_field_import(DialogJobMixin, bpy.types.Operator, ImportHelper):
         description="Name of the mesh attribute that stores the field. An existing field is replaced",
         default="rosy",
     )
-    skip_browser: bpy.props.BoolProperty(
-        name="Skip Browser",
-        description="Start without a file browser",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_editable(cls, context)
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask for the settings of a file that was dropped on the view, or for a file."""
         return None if self.skip_browser else self.invoke_popup(context)
-
-    def take_answer(self, context: bpy.types.Context) -> None:
-        self.skip_browser = True
 
     def begin(self, context: bpy.types.Context) -> Steps[LoadedField]:
         """Read the field, then store it."""
@@ -89,16 +76,12 @@ class ROSY_OT_field_import(DialogJobMixin, bpy.types.Operator, ImportHelper):
                 field_directions, (surface, field), 0.9, label="computing directions"
             )
             field = replace(field, source_directions=directions)
-        store_fields(self, context, {mesh: field}, self.attribute)
+        self.store_fields(context, {mesh: field}, self.attribute)
         return LoadedField(field, note)
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        obj = selected_mesh_objects(context)[0]
-        return obj, obj.data
 
     def finish(self, context: bpy.types.Context, result: LoadedField) -> None:
         if result.note:
-            report_warning(self, result.note)
+            self.report_warnings(result.note)
         obj = selected_mesh_objects(context)[0]
         faces = counted(len(result.field.vectors), "face")
         self.report(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -12,32 +11,23 @@ from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.ui import singularity_handles
+from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.worker.job import Call, Steps
-from .modal_job import ModalJobMixin
-from .poll import (
-    poll_active_field,
-    poll_editable,
-    poll_view_3d,
-    selected_mesh_objects,
-    store_fields,
-)
-from .reports import report_error, report_operator_error
+from .base import EDITABLE_FIELD, FRACTION, IN_3D_VIEW, RosyOperator, selected_mesh_objects
+from .modal_job import ActiveMeshMixin, ModalJobMixin
 
 #: The reach of both operators; that of the tool is passed on by the operator that it starts.
 REACH = {
     "name": "Reach",
     "description": "Distance over which directions change, as a fraction of the size of the mesh. At least as "
     "far as the singularity moves",
-    "min": 0.0,
-    "max": 10.0,
     "soft_max": 0.5,
-    "precision": 3,
-    "step": 1,
     "default": 0.1,
+    **FRACTION,
 }
 
 
-class ROSY_OT_field_singularities(ModalJobMixin, bpy.types.Operator):
+class ROSY_OT_field_singularities(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
     """Move a singularity of the active mesh's field to another vertex, merge it with another one, split it, or make a pair"""
 
     bl_idname = "rosy.field_singularities"
@@ -66,37 +56,27 @@ class ROSY_OT_field_singularities(ModalJobMixin, bpy.types.Operator):
     )
     reach: bpy.props.FloatProperty(**REACH)
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_editable(cls, context) and poll_active_field(cls, context)
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return [selected_mesh_objects(context)[0].data]
-
     def begin(self, context: bpy.types.Context) -> Steps[None]:
         """Change the field of the active mesh."""
-        (mesh,) = self.required_data(context)
+        mesh = selected_mesh_objects(context)[0].data
         surface = mesh_surface(mesh)
         field = read_mesh_field(mesh, surface=surface)
         reach = self.reach * surface.extent
         inputs = surface, field, self.source, self.target, self.index, reach
         field = yield Call(move_index, inputs)
-        store_fields(self, context, {mesh: replace(field, source_directions=None)})
+        self.store_fields(context, {mesh: replace(field, source_directions=None)})
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
-        for name in ("source", "target", "index", "reach"):
-            layout.prop(self, name)
+        draw_settings(self.layout, self, "source", "target", "index", "reach")
 
 
-class ROSY_OT_drag_singularity(bpy.types.Operator):
+class ROSY_OT_drag_singularity(RosyOperator, bpy.types.Operator):
     """Drag a singularity along the surface, onto another one to merge them, or with Ctrl from any vertex to make a pair"""
 
     bl_idname = "rosy.drag_singularity"
     bl_label = "Drag Singularity"
     bl_options = {"INTERNAL"}
+    conditions = (IN_3D_VIEW, *EDITABLE_FIELD)
 
     make_pair: bpy.props.BoolProperty(
         name="Make Pair",
@@ -105,21 +85,13 @@ class ROSY_OT_drag_singularity(bpy.types.Operator):
     )
     reach: bpy.props.FloatProperty(**REACH)
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return (
-            poll_view_3d(cls, context)
-            and poll_editable(cls, context)
-            and poll_active_field(cls, context)
-        )
-
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         obj = selected_mesh_objects(context)[0]
         mouse = event.mouse_region_x, event.mouse_region_y
         try:
             self._drag = singularity_handles.start_drag(context, obj, mouse, self.make_pair)
         except REPORTED_ERRORS as error:
-            return report_error(self, error)
+            return self.report_error(error)
         if self._drag is None:
             return {"CANCELLED", "PASS_THROUGH"}
         context.window_manager.modal_handler_add(self)
@@ -145,7 +117,7 @@ class ROSY_OT_drag_singularity(bpy.types.Operator):
                     "INVOKE_DEFAULT", source=source, target=target, index=index, reach=self.reach
                 )
             except RuntimeError as error:  # reported by that operator
-                return report_operator_error(self, error)
+                return self.report_operator_error(error)
             return {"FINISHED"}
         return {"RUNNING_MODAL"}
 

@@ -14,13 +14,14 @@ from typing import Any
 import bpy
 
 from ..rosy_addon.errors import REPORTED_ERRORS, as_sentence
+from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper
 from ..rosy_addon.viewport.view3d import redraw_sidebars
 from ..rosy_addon.worker.helper import HELPER, HelperLostError
 from ..rosy_addon.worker.job import Step, Steps, run
 from ..rosy_addon.worker.step_runner import StepRunner
-from .reports import report_error, report_operator_error, report_warning
+from .base import EDITABLE_FIELD, RosyOperator, selected_mesh_objects
 
 #: Seconds for which steps in Blender's process go on. Events of the user are handled between them.
 SLICE_SECONDS = 0.05
@@ -91,21 +92,13 @@ class Job:
         self.timer = self.window_manager.event_timer_add(TIMER_SECONDS, window=context.window)
         self.window_manager.progress_begin(0, 100)
         self.handlers = [
-            (getattr(bpy.app.handlers, name), self._make_interrupt_handler(reason))
+            (getattr(bpy.app.handlers, name), lambda *_, reason=reason: self.stop(reason))
             for name, reason in INTERRUPT_REASONS.items()
         ]
         for handlers, handler in self.handlers:
             handlers.append(handler)
         _current_job = self
         self._show_progress(context, Step(0.0, "starting"))
-
-    def _make_interrupt_handler(self, reason: str) -> Any:
-        """Return an application handler that stops the job."""
-
-        def interrupt(*_: Any) -> None:
-            self.stop(reason)
-
-        return interrupt
 
     def advance(self, context: bpy.types.Context) -> bool:
         """Hear what the helper says, and go on with the job if it waits for nothing.
@@ -222,8 +215,8 @@ class Job:
         redraw_sidebars()
 
 
-class ModalJobMixin:
-    """Mixin of operators that run a job: implements execute, invoke, modal and cancel."""
+class ModalJobMixin(RosyOperator):
+    """Mixin of operators that run a job: implements act, invoke, modal and cancel."""
 
     _job: Job | None = None
 
@@ -241,19 +234,17 @@ class ModalJobMixin:
         raise NotImplementedError
 
     def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        """Return the datablocks that the job needs. It stops if one of them is deleted."""
-        return ()
+        """Return the datablocks that the job needs. It stops if one of them is deleted.
+
+        By default these are all visible objects with a field.
+        """
+        return field_objects(context.view_layer)
 
     def finish(self, context: bpy.types.Context, result: Any) -> None:
         """Report the result of the job to the user."""
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        try:
-            result = run(self.begin(context))
-        except REPORTED_ERRORS as error:
-            return report_error(self, error)
-        self.finish(context, result)
-        return {"FINISHED"}
+    def act(self, context: bpy.types.Context) -> None:
+        self.finish(context, run(self.begin(context)))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if bpy.app.background or context.window is None:
@@ -261,7 +252,7 @@ class ModalJobMixin:
         try:
             self._job = Job(context, self.begin(context), self.required_data(context))
         except REPORTED_ERRORS as error:
-            return report_error(self, error)
+            return self.report_error(error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -273,9 +264,9 @@ class ModalJobMixin:
             try:
                 is_done = job.advance(context)
             except REPORTED_ERRORS as error:
-                return report_error(self, error)
+                return self.report_error(error)
             if job.note:
-                report_warning(self, job.note)
+                self.report_warnings(job.note)
                 job.note = ""
             if is_done:
                 self.finish(context, job.result)
@@ -289,6 +280,16 @@ class ModalJobMixin:
         """Stop the job. Blender calls this if the window is closed or a file is opened."""
         if self._job is not None:
             self._job.stop("the window was closed")
+
+
+class ActiveMeshMixin:
+    """Mixin of operators on the active mesh and its field."""
+
+    conditions = EDITABLE_FIELD
+
+    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
+        obj = selected_mesh_objects(context)[0]
+        return obj, obj.data
 
 
 class DialogJobMixin(ModalJobMixin):
@@ -319,7 +320,7 @@ class DialogJobMixin(ModalJobMixin):
         try:
             result = self.ask(context, event)
         except REPORTED_ERRORS as error:
-            return report_error(self, error)
+            return self.report_error(error)
         if result is None:
             return super().invoke(context, event)
         self._has_asked = True
@@ -339,5 +340,18 @@ class DialogJobMixin(ModalJobMixin):
         try:
             result = operator("INVOKE_DEFAULT", **settings)
         except RuntimeError as error:  # reported by the second operator
-            return report_operator_error(self, error)
+            return self.report_operator_error(error)
         return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
+
+
+class FileJobMixin(DialogJobMixin):
+    """Mixin of operators that ask for a file, unless `skip_browser` is set."""
+
+    skip_browser: bpy.props.BoolProperty(
+        name="Skip Browser",
+        description="Start without a file browser",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+
+    def take_answer(self, context: bpy.types.Context) -> None:
+        self.skip_browser = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, counted
+from ..rosy_addon.errors import counted
 from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.singularity_points import (
@@ -13,16 +13,16 @@ from ..rosy_addon.scene.singularity_points import (
     remove_singularity_points,
 )
 from ..rosy_addon.ui import overlay
-from .poll import poll_active_field, poll_idle, selected_mesh_objects
-from .reports import report_error
+from .base import ACTIVE_FIELD, IDLE, RosyOperator, selected_mesh_objects
 
 
-class ROSY_OT_singularities(bpy.types.Operator):
+class ROSY_OT_singularities(RosyOperator, bpy.types.Operator):
     """Show the singularities of the fields of the selected meshes: orange for positive index, blue for negative index"""
 
     bl_idname = "rosy.singularities"
     bl_label = "Singularities"
     bl_options = {"REGISTER", "UNDO"}
+    conditions = (IDLE, ACTIVE_FIELD)
 
     show: bpy.props.EnumProperty(
         name="Show",
@@ -35,20 +35,13 @@ class ROSY_OT_singularities(bpy.types.Operator):
         ],
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_idle(cls) and poll_active_field(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         objects = [obj for obj in selected_mesh_objects(context) if has_field(obj)]
         if self.show == "NONE":
             _hide(context, objects)
-            return {"FINISHED"}
+            return
         depsgraph = context.evaluated_depsgraph_get()
-        try:
-            singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
-        except REPORTED_ERRORS as error:
-            return report_error(self, error)
+        singularities_by_object = {obj: read_singularities(obj, depsgraph) for obj in objects}
         _hide(context, objects)
         for obj, singularities in singularities_by_object.items():
             if self.show in ("OVERLAY", "BOTH"):
@@ -62,7 +55,6 @@ class ROSY_OT_singularities(bpy.types.Operator):
             for obj, singularities in singularities_by_object.items()
         )
         self.report({"INFO"}, f"{counted(count, 'singularity', 'singularities')}; {total}")
-        return {"FINISHED"}
 
 
 def _hide(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import bpy
 
 from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes
@@ -16,13 +14,11 @@ from ..rosy_addon.scene.stroke_objects import (
     stroke_objects,
     target_objects,
 )
-from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui.properties import STROKE_CAMERA_ITEMS, STROKE_KIND_ITEMS
 from ..rosy_addon.worker.job import Steps
 from .bake import view_camera
+from .base import IDLE, OBJECT_MODE, VISIBLE_FIELD, Condition, RosyOperator, sync_suffix
 from .modal_job import DialogJobMixin
-from .poll import poll_has_field, poll_idle, sync_suffix
-from .reports import report_warnings
 
 
 class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
@@ -31,6 +27,7 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
     bl_idname = "rosy.strokes"
     bl_label = "Draw Strokes"
     bl_options = {"UNDO"}
+    conditions = (OBJECT_MODE, IDLE, VISIBLE_FIELD)
 
     kind: bpy.props.EnumProperty(
         name="Make",
@@ -57,13 +54,6 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
         description="Do not ask before strokes are replaced that were edited",
         options={"HIDDEN", "SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to Object Mode first (Tab)")
-            return False
-        return poll_has_field(cls, context)
 
     def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
         """Ask for the path of a file, or before strokes are replaced that the user has edited."""
@@ -100,18 +90,14 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
         """Show no settings in the file browser: those of the panel apply."""
 
     def begin(self, context: bpy.types.Context) -> Steps[StrokeResult]:
-        is_set = self.properties.is_property_set
         return draw_strokes.begin(
             context.scene,
             kind=self._kind(context),
             collection=context.collection,
-            path=self.filepath if is_set("filepath") else None,
+            path=self.chosen("filepath", None),
             objects=target_objects(context.scene, context.view_layer),
             camera=self._camera(context),
         )
-
-    def required_data(self, context: bpy.types.Context) -> Iterable[bpy.types.ID]:
-        return field_objects(context.view_layer)
 
     def finish(self, context: bpy.types.Context, result: StrokeResult) -> None:
         destination = f"'{result.obj.name}'" if result.path is None else str(result.path)
@@ -119,40 +105,32 @@ class ROSY_OT_strokes(DialogJobMixin, bpy.types.Operator):
             {"INFO"},
             f"{counted(len(result.drawing.strokes), 'stroke')} from '{result.camera}': {destination}",
         )
-        report_warnings(self, result.notes)
+        self.report_warnings(*result.notes)
 
     def _kind(self, context: bpy.types.Context) -> str:
         """Return what to make: the operator's choice, by default the scene's."""
-        is_set = self.properties.is_property_set("kind")
-        return self.kind if is_set else context.scene.rosy.strokes.kind
+        return self.chosen("kind", context.scene.rosy.strokes.kind)
 
     def _camera(self, context: bpy.types.Context) -> CameraSource | None:
         """Return the camera of the current view if it is chosen; None for the scene's camera."""
-        is_set = self.properties.is_property_set("camera")
-        source = self.camera if is_set else context.scene.rosy.strokes.camera
+        source = self.chosen("camera", context.scene.rosy.strokes.camera)
         return view_camera(context) if source == "VIEW" else None
 
 
-class ROSY_OT_strokes_remove(bpy.types.Operator):
+class ROSY_OT_strokes_remove(RosyOperator, bpy.types.Operator):
     """Remove the stroke objects of this scene. Fields, pictures and files are kept"""
 
     bl_idname = "rosy.strokes_remove"
     bl_label = "Remove Strokes"
     bl_options = {"REGISTER", "UNDO"}
+    conditions = (
+        IDLE,
+        Condition(lambda context: stroke_objects(context.scene), "This scene has no strokes"),
+    )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not poll_idle(cls):
-            return False
-        if not stroke_objects(context.scene):
-            cls.poll_message_set("This scene has no strokes")
-            return False
-        return True
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         count = remove_strokes(context.scene)
         self.report({"INFO"}, f"Removed {counted(count, 'object')} with strokes")
-        return {"FINISHED"}
 
 
 CLASSES = (ROSY_OT_strokes, ROSY_OT_strokes_remove)

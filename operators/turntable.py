@@ -15,26 +15,24 @@ from ..rosy_addon.render_turntable import render_turntable
 from ..rosy_addon.turntable_video import check_video_path
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.worker.job import Steps
-from .modal_job import ModalJobMixin
-from .poll import poll_active_field, poll_idle, selected_mesh_objects, sync_suffix
-from .reports import report_operator_error
+from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects, sync_suffix
+from .modal_job import FileJobMixin
 
 #: Azimuth of the first picture, in degrees.
 AZIMUTH = -25.0
 
-#: Properties that are passed on from the file browser to the operator that does the work.
-VIDEO_SETTINGS = ("filepath", "film", "pictures", "rate", "width", "height", "elevation", "still")
+#: Arguments of the width and the height.
+SIDE = {"subtype": "PIXEL", "default": 512, "min": 16, "max": 8192}
 
 
-class ROSY_OT_turntable(ModalJobMixin, bpy.types.Operator, ExportHelper):
+class ROSY_OT_turntable(FileJobMixin, bpy.types.Operator, ExportHelper):
     """Render a turntable video of the active mesh with its field, with the look of the scene"""
 
     bl_idname = "rosy.turntable"
     bl_label = "Turntable"
     bl_options = {"REGISTER"}
+    conditions = (IDLE, ACTIVE_FIELD)
     cancel_note = "no video was written"
-
-    _in_browser = False
 
     filename_ext = ".mp4"
     filter_glob: bpy.props.StringProperty(default="*.mp4;*.gif", options={"HIDDEN"})
@@ -52,18 +50,12 @@ class ROSY_OT_turntable(ModalJobMixin, bpy.types.Operator, ExportHelper):
     width: bpy.props.IntProperty(
         name="Width",
         description="Width of the video",
-        subtype="PIXEL",
-        default=512,
-        min=16,
-        max=8192,
+        **SIDE,
     )
     height: bpy.props.IntProperty(
         name="Height",
         description="Height of the video",
-        subtype="PIXEL",
-        default=512,
-        min=16,
-        max=8192,
+        **SIDE,
     )
     elevation: bpy.props.FloatProperty(
         name="Elevation",
@@ -77,36 +69,14 @@ class ROSY_OT_turntable(ModalJobMixin, bpy.types.Operator, ExportHelper):
         name="Still Camera",
         description="Leave the camera where it is, so that only streaks drift: a look with Flow",
     )
-    skip_browser: bpy.props.BoolProperty(
-        name="Skip Browser",
-        description="Start without a file browser",
-        options={"HIDDEN", "SKIP_SAVE"},
-    )
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_idle(cls) and poll_active_field(cls, context)
 
     def check(self, context: bpy.types.Context) -> bool:
         """Set the suffix of the file name to the video format's in the file browser."""
         return sync_suffix(self, self.film)
 
-    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self.skip_browser:
-            return ModalJobMixin.invoke(self, context, event)
-        self._in_browser = True
-        return ExportHelper.invoke(self, context, event)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        if not self._in_browser:
-            return ModalJobMixin.execute(self, context)
-        # Blender frees an operator when its file browser is confirmed. A second one does the work.
-        settings = {name: getattr(self, name) for name in VIDEO_SETTINGS}
-        try:
-            result = bpy.ops.rosy.turntable("INVOKE_DEFAULT", skip_browser=True, **settings)
-        except RuntimeError as error:  # reported by the second operator
-            return report_operator_error(self, error)
-        return {"CANCELLED"} if result == {"CANCELLED"} else {"FINISHED"}
+    def ask(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str] | None:
+        """Ask for the path of the video."""
+        return None if self.skip_browser else ExportHelper.invoke(self, context, event)
 
     def begin(self, context: bpy.types.Context) -> Steps[Path]:
         path = Path(bpy.path.abspath(self.filepath))

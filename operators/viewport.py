@@ -1,22 +1,22 @@
-"""Operator: switch the live view of fields on or off in a 3D view."""
+"""Operators: switch the live view of fields on or off in a 3D view, and let its streaks drift."""
 
 from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.compositor.look import has_flow
 from ..rosy_addon.ui import live_views
 from ..rosy_addon.viewport import session
-from .poll import poll_view_3d
-from .reports import report_error
+from .base import IN_3D_VIEW, Condition, RosyOperator
 
 
-class ROSY_OT_viewport(bpy.types.Operator):
+class ROSY_OT_viewport(RosyOperator, bpy.types.Operator):
     """Draw the fields of all meshes in this 3D view at every redraw, without baking"""
 
     bl_idname = "rosy.viewport"
     bl_label = "Live Fields"
     bl_options = {"REGISTER"}
+    conditions = (IN_3D_VIEW,)
 
     show: bpy.props.EnumProperty(
         name="Show",
@@ -41,22 +41,32 @@ class ROSY_OT_viewport(bpy.types.Operator):
         ],
     )
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return poll_view_3d(cls, context)
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def act(self, context: bpy.types.Context) -> None:
         space = context.space_data
-        enable = not session.is_live(space) if self.show == "TOGGLE" else self.show == "ON"
-        if not enable:
+        if self.show == "ON" or (self.show == "TOGGLE" and not session.is_live(space)):
+            session.start(space, self.device.lower())
+        else:
             session.stop(space)
             live_views.decline(context.scene)
-            return {"FINISHED"}
-        try:
-            session.start(space, self.device.lower())
-        except RosyError as error:
-            return report_error(self, error)
-        return {"FINISHED"}
 
 
-CLASSES = (ROSY_OT_viewport,)
+class ROSY_OT_flow_play(RosyOperator, bpy.types.Operator):
+    """Let the streaks in live views drift, or stop them, without Blender's timeline"""
+
+    bl_idname = "rosy.flow_play"
+    bl_label = "Play Flow"
+    bl_options = {"REGISTER"}
+    conditions = (
+        IN_3D_VIEW,
+        Condition(lambda context: session.is_live(context.space_data), "Make this view live first"),
+        Condition(
+            lambda context: has_flow(context.scene.rosy.look),
+            "These streaks do not drift: set Flow, under Streaks",
+        ),
+    )
+
+    def act(self, context: bpy.types.Context) -> None:
+        session.play_flow(not session.is_flow_playing())
+
+
+CLASSES = (ROSY_OT_viewport, ROSY_OT_flow_play)

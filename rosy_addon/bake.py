@@ -22,7 +22,6 @@ from .scene.picture_state import read_picture_states
 from .scene.pictures import (
     BakeResult,
     OutputSettings,
-    RenderedView,
     apply_picture,
     check_targets,
     read_output_settings,
@@ -97,7 +96,7 @@ def bake(
     check_targets(scene_views.scene_data.objects, settings)
     states = read_picture_states(scene, depsgraph, sources, scene_views.scene_data.mesh_states)
     device = select_device(settings.device, look)
-    rendered_views = []
+    drawings = []
     for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
         view = replace(view, draws_thresholds=draws_thresholds)
         steps = image_steps(view, device, settings.as_float, workers=workers)
@@ -105,11 +104,10 @@ def bake(
         picture, image_data = yield from part(steps, start, stop)
         drawn_from = DrawnFrom(source, {None: states[index]}, device, picture_key(look, picture))
         hatching = Hatching(look, picture.line_count) if draws_thresholds else None
-        rendered_views.append(RenderedView(picture, image_data, view.camera, drawn_from, hatching))
+        drawings.append((view.camera, picture, image_data, drawn_from, hatching))
     yield Step(0.97, "applying the pictures")
     results = [
-        apply_picture(scene, scene_views.scene_data, rendered_view, settings)
-        for rendered_view in rendered_views
+        apply_picture(scene, scene_views.scene_data, settings, *drawing) for drawing in drawings
     ]
     update_backdrops(scene)
     update_keys(scene)

@@ -82,8 +82,7 @@ def bake_texture(
     look = read_look(scene.rosy) if look is None else look
     content = scene.rosy.texture_content.lower()
     settings = read_output_settings(scene) if settings is None else settings
-    for obj in objects:
-        uv_map_name(obj)
+    uv_maps = {obj: uv_map_name(obj) for obj in objects}
     check_targets(objects, settings)
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
@@ -94,29 +93,35 @@ def bake_texture(
     colors = texture_colors_values(look, content)
     color_attribute = color_attribute_of(scene, look) if colors else None
     drawn = []
-    for index, obj in enumerate(objects):
+    for index, (obj, uv_map) in enumerate(uv_maps.items()):
         start, stop = (0.98 * done / len(objects) for done in (index, index + 1))
-        source = read_texture_input(scene, depsgraph, obj, BAKE_CACHE, color_attribute)
+        instance, uv = read_texture_input(
+            scene, depsgraph, obj, uv_map, BAKE_CACHE, color_attribute
+        )
         BAKE_CACHE.evict_over_limit()
         state = read_texture_state(scene, depsgraph, obj)
-        inputs = source.instance, source.uv, look, texture_settings, lights, settings.as_float
+        inputs = instance, uv, look, texture_settings, lights, settings.as_float
         texture = yield Call(draw_texture_images, inputs, start, stop)
         hatching = None
         if content == "look" and texture.is_data:
             hatching = Hatching(look, texture.line_count)
-        warnings = (texture.note,) if texture.note else ()
-        drawn.append((source.source, texture.tiles, state, hatching, warnings))
+        drawn.append((obj, texture, state, hatching))
     yield Step(0.98, "applying the textures")
-    return [
-        TextureResult(
-            source.obj,
-            apply_texture(
-                scene, source, tiles, settings, state, content, hatching, is_udim=is_udim
-            ),
-            warnings,
+    results = []
+    for obj, texture, state, hatching in drawn:
+        image = apply_texture(
+            scene,
+            obj,
+            uv_maps[obj],
+            texture.tiles,
+            settings,
+            state,
+            content,
+            hatching,
+            is_udim=is_udim,
         )
-        for source, tiles, state, hatching, warnings in drawn
-    ]
+        results.append(TextureResult(obj, image, (texture.note,) if texture.note else ()))
+    return results
 
 
 def _lights_to_bake(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> list[Light]:

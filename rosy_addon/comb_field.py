@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import bpy
 import numpy as np
 
@@ -12,7 +10,6 @@ from .field.combing import Combing, start_combing
 from .field.guide_brush import BrushStroke, GuideBrush
 from .field.guided_system import guided_system
 from .field.rosy_field import RosyField
-from .field.surface import Surface
 from .scene.brush_surface import closest_faces
 from .scene.combed_guides import check_guides_storable, read_combed_guides, store_combed_guides
 from .scene.field_attributes import is_face_vector_field
@@ -23,30 +20,37 @@ from .worker.job import Call, Steps
 
 
 class CombStroke:
-    """A stroke that is being drawn; made by `start_stroke`.
+    """A stroke that is being drawn.
 
-    Attributes
+    Parameters
     ----------
     mesh : bpy.types.Mesh
-    surface : Surface
-    field : RosyField
-        Before the stroke.
+    brush : GuideBrush
+    reach : float
+        Distance from the strokes at which the field stays what it is, relative to `Surface.extent`.
+
+    Raises
+    ------
+    RosyError
+        If the mesh cannot be changed, its field cannot be read or is not a RoSy, or an attribute with the name
+        of the guides has another type.
     """
 
-    def __init__(
-        self,
-        mesh: bpy.types.Mesh,
-        surface: Surface,
-        field: RosyField,
-        combing: Combing,
-        stroke: BrushStroke,
-    ) -> None:
-        self.mesh = mesh
-        self.surface = surface
-        self.field = field
-        self._combing = combing
-        self._stroke = stroke
+    def __init__(self, mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> None:
+        check_writable(mesh)
+        check_guides_storable(mesh)
+        surface = mesh_surface(mesh, cache=BAKE_CACHE)
+        field = read_mesh_field(mesh, surface=surface, cache=BAKE_CACHE)
+        self.mesh, self._degree = mesh, field.degree
+        system = BAKE_CACHE.get_or_create(
+            ("guided system", surface, field.degree), lambda: guided_system(surface, field.degree)
+        )
+        guides = read_combed_guides(mesh, surface)
+        self._combing = start_combing(system, field, guides, reach * surface.extent)
+        locate = closest_faces(mesh, surface, BAKE_CACHE)
+        self._stroke = BrushStroke(system, self._combing.guides, brush, locate)
         self._vectors_before: np.ndarray | None = None
+        BAKE_CACHE.evict_over_limit()
 
     def extend(self, points: np.ndarray, pressure: np.ndarray) -> bool:
         """Go on to (n, 3) places on the surface at rest, with (n,) pressures. Return whether the field has changed."""
@@ -77,7 +81,7 @@ class CombStroke:
 
     def store(self) -> RosyField:
         """Store the field and its guides. Return the field."""
-        field = RosyField(self.field.degree, self._combing.vectors)
+        field = RosyField(self._degree, self._combing.vectors)
         assign_fields({self.mesh: field})
         store_combed_guides(self.mesh, self._combing.guide_vectors)
         return field
@@ -86,35 +90,3 @@ class CombStroke:
         """Take back what `show` has changed."""
         if self._vectors_before is not None:
             overwrite_vectors(self.mesh, self._vectors_before)
-
-
-def start_stroke(mesh: bpy.types.Mesh, brush: GuideBrush, reach: float) -> CombStroke:
-    """Prepare a stroke.
-
-    Parameters
-    ----------
-    mesh : bpy.types.Mesh
-    brush : GuideBrush
-    reach : float
-        Distance from the strokes at which the field stays what it is, relative to `Surface.extent`.
-
-    Raises
-    ------
-    RosyError
-        If the mesh cannot be changed, its field cannot be read or is not a RoSy, or an attribute with the name
-        of the guides has another type.
-    """
-    check_writable(mesh)
-    check_guides_storable(mesh)
-    surface = mesh_surface(mesh, cache=BAKE_CACHE)
-    field = read_mesh_field(mesh, surface=surface, cache=BAKE_CACHE)
-    degree = field.degree
-    system = BAKE_CACHE.get_or_create(
-        ("guided system", surface, degree), lambda: guided_system(surface, degree)
-    )
-    guides = read_combed_guides(mesh, surface)
-    combing = start_combing(system, field, guides, reach * surface.extent)
-    locate = closest_faces(mesh, surface, BAKE_CACHE)
-    stroke = BrushStroke(system, combing.guides, brush, locate)
-    BAKE_CACHE.evict_over_limit()
-    return CombStroke(mesh, surface, replace(field, source_directions=None), combing, stroke)

@@ -13,8 +13,8 @@ from .camera_planes import (
     remove_camera_planes,
 )
 from .cameras import camera_of_object
-from .compat import has_nodes_by_default
 from .look_properties import read_look
+from .node_builder import new_emissive_material
 from .owned_data import rollback_on_error
 from .read_view import scene_depsgraph
 
@@ -48,24 +48,9 @@ def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) 
     view = camera_of_object(scene, scene_depsgraph(scene), camera)
     corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)
     with rollback_on_error() as created:
-        material = _new_material(name, paper, scene.rosy.emission)
+        color = (*to_linear(from_hex(paper)).tolist(), 1.0)
+        material = new_emissive_material(name, color, scene.rosy.emission)
         created.append(material)
+        material.diffuse_color = color  # in views with Solid shading
+        material.use_backface_culling = True
         add_camera_plane(scene, camera, name, BACKDROP_TAG, corners, material, created)
-
-
-def _new_material(name: str, paper: str, strength: float) -> bpy.types.Material:
-    """Create a material that emits the color of the paper, given as ``#rrggbb``."""
-    material = bpy.data.materials.new(name)
-    color = (*to_linear(from_hex(paper)).tolist(), 1.0)
-    material.diffuse_color = color  # in views with Solid shading
-    material.use_backface_culling = True
-    if not has_nodes_by_default(material):
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    emission, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
-    emission.inputs["Color"].default_value = color
-    emission.inputs["Strength"].default_value = strength
-    links.new(emission.outputs["Emission"], output.inputs["Surface"])
-    emission.location, output.location = (-200, 0), (0, 0)
-    return material

@@ -10,6 +10,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -57,12 +58,12 @@ class BakeInfo:
     width, height : int
         Pixels.
     image : bpy.types.Image
-    stale_reason : str
-        Why the picture is out of date. Empty if it is up to date, as far as is known.
     is_shown : bool
         Whether any object shows the picture.
     frame_range : str
         First and last frame of a sequence. Empty for a single picture.
+    stale_reason : str
+        Why the picture is out of date. Empty if it is up to date, as far as is known.
     unknown_reason : str
         Why it is not known whether the picture is up to date. Empty if it is known.
     is_texture : bool
@@ -73,44 +74,18 @@ class BakeInfo:
     width: int
     height: int
     image: bpy.types.Image
-    stale_reason: str
     is_shown: bool
     frame_range: str = ""
+    stale_reason: str = ""
     unknown_reason: str = ""
     is_texture: bool = False
 
 
-@dataclass(frozen=True)
-class TextureSource:
-    """The surface that a texture shows.
+class RemovalCounts(NamedTuple):
+    """Numbers of objects whose modifier was removed, and of images that were deleted."""
 
-    Attributes
-    ----------
-    obj : bpy.types.Object
-    uv_map : str
-        Name of the UV map.
-    """
-
-    obj: bpy.types.Object
-    uv_map: str
-
-
-@dataclass(frozen=True)
-class RemovalCounts:
-    """Numbers of objects and datablocks that were removed from a scene.
-
-    Attributes
-    ----------
-    objects : int
-        Objects whose modifier was removed.
-    images, materials, node_groups : int
-        Datablocks that were deleted.
-    """
-
-    objects: int = 0
-    images: int = 0
-    materials: int = 0
-    node_groups: int = 0
+    objects: int
+    images: int
 
 
 @dataclass(frozen=True)
@@ -119,19 +94,22 @@ class DrawnFrom:
 
     Attributes
     ----------
-    source : bpy.types.Object, Camera, TextureSource or None
-        None for a sequence from the cameras that render the frames.
+    source : bpy.types.Object, Camera or None
+        None for a sequence from the cameras that render the frames. Of a texture, the object.
     states : dict of int or None to PictureState
         By frame; for a single picture the only key is None.
     device : {"cpu", "gpu"}
     key : PictureKey
         What the key of the picture says.
+    is_texture : bool
+        Whether it is a texture of an object.
     """
 
-    source: CameraSource | TextureSource | None
+    source: CameraSource | None
     states: Mapping[int | None, PictureState]
     device: str
     key: PictureKey = NO_KEY
+    is_texture: bool = False
 
 
 def store_record(
@@ -159,7 +137,7 @@ def store_record(
     frame_range : str
         First and last frame of a sequence.
     """
-    record = _find_or_add_record(scene, name, drawn_from.source)
+    record = _find_or_add_record(scene, name, drawn_from)
     _replace_datablocks(record, image, material)
     record.frames = frame_range
     record.width, record.height = size
@@ -176,21 +154,20 @@ def store_record(
 
 
 def _find_or_add_record(
-    scene: bpy.types.Scene, name: str, source: CameraSource | TextureSource | None
+    scene: bpy.types.Scene, name: str, drawn_from: DrawnFrom
 ) -> bpy.types.PropertyGroup:
     """Return the record of a camera, or of the scene if there is no camera, with its present name."""
-    records = scene.rosy.bakes
-    if isinstance(source, TextureSource):
-        record = _find_texture_record(scene, source.obj) or records.add()
-        record.name, record.camera, record.view = name, None, TEXTURE_VIEW
-        return record
-    if source is None:
-        camera, view = None, FRAME_CAMERAS
+    records, source = scene.rosy.bakes, drawn_from.source
+    camera, view, record = None, "", None
+    if drawn_from.is_texture:
+        view, record = TEXTURE_VIEW, _find_texture_record(scene, source) or records.add()
+    elif source is None:
+        view = FRAME_CAMERAS
         record = next((entry for entry in records if entry.view == view), None)
     elif isinstance(source, Camera):
-        camera, view, record = None, _view_to_json(source), None
+        view = _view_to_json(source)
     else:
-        camera, view = source, ""
+        camera = source
         record = next((entry for entry in records if entry.camera == camera), None)
     record = record or records.get(name) or records.add()
     record.name, record.camera, record.view = name, camera, view
@@ -312,25 +289,25 @@ def list_bakes(
     if for_panel and not recorded:
         SCENE_STATES.clear()
     reasons = _PresentReasons(scene, for_panel, automatic_device) if recorded else None
-    infos = []
-    for record in recorded:
-        info = BakeInfo(
+    infos = [
+        BakeInfo(
             camera_name(record),
             record.width,
             record.height,
             record.image,
-            "",
             record.material in shown,
             record.frames,
             is_texture=record.view == TEXTURE_VIEW,
+            **reasons.find(record),
         )
-        infos.append(replace(info, **reasons.find(record)))
+        for record in recorded
+    ]
     for material in shown - {record.material for record in scene.rosy.bakes}:
         image = image_of_material(material)
         if image is not None:
             name = material.name.removeprefix(NAME_PREFIX)
             note = "baked in another file or scene"
-            infos.append(BakeInfo(name, *image.size, image, "", True, unknown_reason=note))
+            infos.append(BakeInfo(name, *image.size, image, True, unknown_reason=note))
     return sorted(infos, key=lambda info: info.camera)
 
 
@@ -447,38 +424,18 @@ def _reached_objects(scene: bpy.types.Scene) -> set[bpy.types.Object]:
     return reached
 
 
-def remove_bakes(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object] | None = None
-) -> RemovalCounts:
-    """Remove baked pictures, their backdrops and their keys from a scene. Fields and saved files are kept.
-
-    Parameters
-    ----------
-    scene : bpy.types.Scene
-    objects : sequence of bpy.types.Object, optional
-        Remove the pictures from these objects only. An image and its material are deleted when no
-        object is left. By default all pictures are removed.
-    """
-    found = baked_objects(scene)
-    targets = found if objects is None else [obj for obj in objects if obj in found]
-    node_groups = 0
-    with _object_mode(targets):
-        for obj in targets:
-            node_groups += remove_picture_modifiers(obj)
+def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
+    """Remove baked pictures, their backdrops and their keys from a scene. Fields and saved files are kept."""
+    objects = baked_objects(scene)
+    with _object_mode(objects):
+        for obj in objects:
+            remove_picture_modifiers(obj)
             remove_applied_picture(obj.data)
-    if objects is None:
-        _clean_unused_meshes()
-    needed = set() if objects is None else _needed_materials(set(found) - set(targets))
-    images, materials = _remove_records(scene, needed)
+    _clean_unused_meshes()
+    image_count = _remove_records(scene)
     update_backdrops(scene)
     update_keys(scene)
-    unused = delete_unused()
-    return RemovalCounts(
-        len(targets),
-        images + unused["images"],
-        materials + unused["materials"],
-        node_groups + unused["node_groups"],
-    )
+    return RemovalCounts(len(objects), image_count + delete_unused())
 
 
 def _clean_unused_meshes() -> None:
@@ -489,23 +446,19 @@ def _clean_unused_meshes() -> None:
             remove_applied_picture(mesh)
 
 
-def _remove_records(scene: bpy.types.Scene, needed: set[bpy.types.Material]) -> tuple[int, int]:
-    """Remove the records without a needed material. Return the deleted images and materials."""
-    images = materials = 0
-    records = scene.rosy.bakes
-    for index in reversed(range(len(records))):
-        if records[index].material in needed:
-            continue
-        image, material, camera = (
-            getattr(records[index], name) for name in ("image", "material", "camera")
-        )
-        records.remove(index)
-        materials += 0 if _is_recorded(material) else delete_owned(material)
-        images += 0 if _is_recorded(image) else delete_owned(image)
+def _remove_records(scene: bpy.types.Scene) -> int:
+    """Remove the records. Return the number of deleted images."""
+    datablocks = [(record.image, record.material, record.camera) for record in scene.rosy.bakes]
+    scene.rosy.bakes.clear()
+    image_count = 0
+    for image, material, camera in datablocks:
+        if not _is_recorded(material):
+            delete_owned(material)
+        image_count += 0 if _is_recorded(image) else delete_owned(image)
         # Only the record kept it after it was deleted. Not every reference counts as a user.
         if camera is not None and not bpy.data.user_map(subset={camera})[camera]:
             bpy.data.objects.remove(camera)
-    return images, materials
+    return image_count
 
 
 @contextmanager
@@ -521,14 +474,3 @@ def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
     finally:
         if is_editing:
             bpy.ops.object.mode_set(mode="EDIT")
-
-
-def _needed_materials(objects: set[bpy.types.Object]) -> set[bpy.types.Material]:
-    """Return the materials of all pictures that some objects show or can show."""
-    needed: set[bpy.types.Material] = set()
-    for obj in objects:
-        needed |= shown_materials(obj)
-        for modifier in obj.modifiers:
-            if is_rosy_modifier(modifier):
-                needed |= projections_of_group(modifier.node_group).keys()
-    return needed

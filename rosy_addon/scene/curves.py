@@ -3,26 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import bpy
 import numpy as np
 
 from ..color import from_hex, to_linear
 from ..line_drawing.drawing_outputs import StrokeGeometry
-from .compat import has_nodes_by_default
+from .node_builder import new_emissive_material
 from .surface_strokes import attribute_values
 
 #: Called with each datablock that is created and the name that it should have.
 RegisterDatablock = Callable[[bpy.types.ID, str], None]
-
-#: Attributes of the points besides position and radius: name and data type.
-POINT_ATTRIBUTES = {
-    "opacity": "FLOAT",
-    "spacing": "FLOAT",
-    "member": "FLOAT_VECTOR",
-    "surface_normal": "FLOAT_VECTOR",
-    "face_index": "INT",
-}
 
 #: Attribute of the curves: the color of the family, RGBA, linear.
 INK_ATTRIBUTE = "ink"
@@ -50,55 +42,32 @@ def new_curves(
     strokes = geometry.strokes
     data.add_curves(np.diff(strokes.start).tolist())
     colors = np.array([[*to_linear(from_hex(color)), 1.0] for color in geometry.colors])
-    _set_attribute(data, "position", "FLOAT_VECTOR", "POINT", geometry.points)
-    _set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
-    _set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
+    set_attribute(data, "position", "FLOAT_VECTOR", "POINT", geometry.points)
+    set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
+    set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
     # Blender caches the number of curves of each type when curves are added. If these counts are
     # out of date, it writes past the end of its arrays. Adding no curves updates them.
     data.add_curves([])
-    _set_attribute(data, "family", "INT", "CURVE", strokes.family)
-    _set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
-    _set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colors[strokes.family])
-    values = {
-        "opacity": np.ones(len(geometry.points)),
-        "spacing": strokes.spacing,
-        "member": strokes.member,
-        "surface_normal": strokes.normal,
-        "face_index": strokes.face,
-    }
-    for key, data_type in POINT_ATTRIBUTES.items():
-        _set_attribute(data, key, data_type, "POINT", values[key])
+    set_attribute(data, "family", "INT", "CURVE", strokes.family)
+    set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
+    set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colors[strokes.family])
+    set_attribute(data, "opacity", "FLOAT", "POINT", np.ones(len(geometry.points)))
+    set_attribute(data, "spacing", "FLOAT", "POINT", strokes.spacing)
+    set_attribute(data, "member", "FLOAT_VECTOR", "POINT", strokes.member)
+    set_attribute(data, "surface_normal", "FLOAT_VECTOR", "POINT", strokes.normal)
+    set_attribute(data, "face_index", "INT", "POINT", strokes.face)
     if geometry.places is not None:
         for key, (data_type, column) in attribute_values(geometry.places).items():
-            _set_attribute(data, key, data_type, "POINT", column)
-    material = _new_material(name)
+            set_attribute(data, key, data_type, "POINT", column)
+    material = new_emissive_material(name, INK_ATTRIBUTE)
     register(material, name)
     data.materials.append(material)
     return data
 
 
-def _set_attribute(
-    data: bpy.types.ID, name: str, data_type: str, domain: str, values: np.ndarray
-) -> None:
-    """Write the values of an attribute, and create it if it is missing."""
+def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
+    """Write the values of an attribute of Curves or of a drawing, and create it if it is missing."""
     attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
     key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(data_type, "value")
     dtype = {"INT": np.int32, "INT8": np.int8}.get(data_type, np.float32)
     attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
-
-
-def _new_material(name: str) -> bpy.types.Material:
-    """Create an emissive material with the color of `INK_ATTRIBUTE`."""
-    material = bpy.data.materials.new(name)
-    if not has_nodes_by_default(material):
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    ink_color = nodes.new("ShaderNodeAttribute")
-    ink_color.attribute_name = INK_ATTRIBUTE
-    emission = nodes.new("ShaderNodeEmission")
-    output = nodes.new("ShaderNodeOutputMaterial")
-    links.new(ink_color.outputs["Color"], emission.inputs["Color"])
-    links.new(emission.outputs["Emission"], output.inputs["Surface"])
-    ink_color.location, emission.location, output.location = (-400, 0), (-200, 0), (0, 0)
-    return material

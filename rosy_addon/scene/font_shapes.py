@@ -8,6 +8,8 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
+from .meshes import read_collection, vertex_positions
+
 #: Points of each curve of a letter, for large letters too.
 CURVE_RESOLUTION = 6
 
@@ -53,13 +55,11 @@ def _flat_triangles(obj: bpy.types.Object) -> np.ndarray:
     mesh = obj.to_mesh()
     try:
         mesh.calc_loop_triangles()
-        points = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-        mesh.vertices.foreach_get("co", points)
-        corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
-        mesh.loop_triangles.foreach_get("vertices", corners)
+        points = vertex_positions(mesh)[:, :2].astype(np.float64)
+        corners = read_collection(mesh.loop_triangles, "vertices", np.int32, 3)
     finally:
         obj.to_mesh_clear()
-    triangles = points.reshape(-1, 3)[:, :2].astype(np.float64)[corners.reshape(-1, 3)]
+    triangles = points[corners]
     if len(triangles):
         triangles[..., 0] -= triangles[..., 0].min()
     return triangles

@@ -11,7 +11,7 @@ from ..color import from_hex, to_linear
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
 from .compat import has_grease_pencil_drawings
-from .curves import RegisterDatablock
+from .curves import RegisterDatablock, set_attribute
 
 #: Name of the layer for outlines: silhouettes, creases and borders.
 OUTLINE_LAYER = "Outline"
@@ -83,20 +83,11 @@ def _add_to_drawing(
     """Add strokes to a frame in Blender 4.3 and later."""
     drawing = frame.drawing
     drawing.add_strokes(point_counts.tolist())
-    for name, data_type, domain, key, values in (
-        ("position", "FLOAT_VECTOR", "POINT", "vector", points),
-        ("radius", "FLOAT", "POINT", "value", radius),
-        ("opacity", "FLOAT", "POINT", "value", opacity),
-        (
-            "material_index",
-            "INT",
-            "CURVE",
-            "value",
-            np.full(len(point_counts), material_index, np.int32),
-        ),
-    ):
-        attribute = drawing.attributes.get(name) or drawing.attributes.new(name, data_type, domain)
-        attribute.data.foreach_set(key, values.ravel())
+    set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
+    set_attribute(drawing, "radius", "FLOAT", "POINT", radius)
+    set_attribute(drawing, "opacity", "FLOAT", "POINT", opacity)
+    materials = np.full(len(point_counts), material_index)
+    set_attribute(drawing, "material_index", "INT", "CURVE", materials)
     drawing.tag_positions_changed()
 
 

@@ -14,7 +14,7 @@ from ..field.surface import Surface
 from .compat import is_annotation_in_space, scene_annotation
 from .face_values import read_face_vectors
 from .libraries import check_not_missing
-from .meshes import mesh_label, mesh_surface, read_attribute
+from .meshes import mesh_label, read_attribute, read_collection
 from .rest_shape import follow_mesh, read_rest_shape
 
 #: Object types that can guide a field: those with strokes, and all.
@@ -170,7 +170,7 @@ def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
     return values
 
 
-def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface | None = None) -> np.ndarray:
+def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one vector for each face; see `read_face_vectors`.
 
     Vectors that RoSy has stored are turned as the faces were turned since.
@@ -180,8 +180,8 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface | None = Non
     mesh : bpy.types.Mesh
     name : str
         Name of the attribute.
-    surface : Surface, optional
-        The surface of the mesh, if it has been read already.
+    surface : Surface
+        Of the mesh.
 
     Returns
     -------
@@ -196,7 +196,6 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface | None = Non
         raise RosyError(
             f"{mesh_label(mesh)} has no attribute '{name}' to follow: choose a vector attribute"
         )
-    surface = mesh_surface(mesh) if surface is None else surface
     return follow_mesh(read_rest_shape(mesh, name), read_face_vectors(mesh, name), surface)
 
 
@@ -236,9 +235,7 @@ def _split_strokes(attributes, offsets) -> list[np.ndarray]:
     )
     if not len(points):  # the offsets of an empty drawing cannot be read
         return []
-    start = np.empty(len(offsets), dtype=np.int32)
-    offsets.foreach_get("value", start)
-    return np.split(points, start[1:-1])
+    return np.split(points, read_collection(offsets, "value", np.int32)[1:-1])
 
 
 def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
@@ -261,6 +258,4 @@ def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
 
 def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
     """Read coordinates from a collection: (n, columns) float64."""
-    values = np.empty(columns * len(collection), dtype=np.float32)
-    collection.foreach_get(key, values)
-    return values.reshape(-1, columns).astype(np.float64)
+    return read_collection(collection, key, np.float32, columns).astype(np.float64)

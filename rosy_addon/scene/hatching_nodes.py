@@ -7,6 +7,8 @@ shows. It has only nodes of Blender, and works where RoSy is not installed.
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import add
 from typing import Any, NamedTuple
 
 import bpy
@@ -71,8 +73,8 @@ _INPUTS = (
 )
 
 
-def hatching_group() -> tuple[bpy.types.NodeTree, bool]:
-    """Return the node group, and whether it was created: it is made once for a file."""
+def hatching_group(created: list[bpy.types.ID]) -> bpy.types.NodeTree:
+    """Return the node group, which is made once for a file. A new one is appended to a list."""
     for group in bpy.data.node_groups:
         if (
             group.bl_idname == "ShaderNodeTree"
@@ -80,8 +82,9 @@ def hatching_group() -> tuple[bpy.types.NodeTree, bool]:
             and group.get(OWNED_TAG)
             and group.name.startswith(GROUP_NAME)
         ):
-            return group, False
-    return _new_hatching_group(), True
+            return group
+    created.append(_new_hatching_group())
+    return created[-1]
 
 
 def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None:
@@ -134,21 +137,18 @@ def _new_hatching_group() -> bpy.types.NodeTree:
     ):
         interface.new_socket(name, description=description, in_out="OUTPUT", socket_type=kind)
     build = NodeBuilder(group)
-    source = build("NodeGroupInput").outputs
-    _build_hatching(build, source, build("NodeGroupOutput").inputs)
+    _build_hatching(build, build("NodeGroupInput").outputs)
     return group
 
 
-def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
+def _build_hatching(build: NodeBuilder, source: Any) -> None:
     """Add the nodes between the inputs and the outputs of the group."""
 
     def number(name: str) -> Number:
         return Number(build, source[name])
 
     def luminance(color: bpy.types.NodeSocket) -> Number:
-        node = build("ShaderNodeRGBToBW")
-        build.connect(color, node.inputs["Color"])
-        return Number(build, node.outputs["Val"])
+        return Number(build, build("ShaderNodeRGBToBW", {"Color": color}).outputs["Val"])
 
     tone = _tone(number)
     paper = luminance(source["Paper"])
@@ -163,9 +163,7 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
     def transmittance(ink: bpy.types.NodeSocket) -> Number:
         return complement_if_light(luminance(ink)) / paper_light
 
-    solid = transmittance(source[INK_NAMES[0]])
-    for name in INK_NAMES[1:]:
-        solid = solid.at_least(transmittance(source[name]))
+    solid = reduce(Number.at_least, [transmittance(source[name]) for name in INK_NAMES])
     required = solid + complement_if_light(tone) * (1 - solid)
     highlights = number("Highlights") * tone
     inks = [
@@ -184,12 +182,8 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
         onset = layering * float(layer)
         weight = darkness.smoothstep(onset - ONSET_LEAD, onset + ONSET_RANGE)
         begun.append(weight * (layers > layer + 0.5) if layer else weight)
-    total = begun[0]
-    for weight in begun[1:]:
-        total = total + weight
-    total = total.at_least(1e-6)
-    thresholds = build("ShaderNodeSeparateColor")
-    build.connect(source["Thresholds"], thresholds.inputs["Color"])
+    total = reduce(add, begun).at_least(1e-6)
+    thresholds = build("ShaderNodeSeparateColor", {"Color": source["Thresholds"]})
     channels = [Number(build, socket) for socket in thresholds.outputs]
     spread = _filtered_spread(number("Spread"), channels)
     # Half the width of an even distribution with this spread, which is that of 2 t - 1 for thresholds t.
@@ -224,9 +218,8 @@ def _build_hatching(build: NodeBuilder, source: Any, sink: Any) -> None:
             bare = bare * (1 - covered)
             part = covered / (1 - bare).at_least(1e-6)
             ink_color = build.mix("RGBA", part.socket, ink_color, inks[layer])
-    build.connect(color, sink["Color"])
-    build.connect(ink_color, sink["Ink"])
-    build.connect((1 - bare).socket, sink["Coverage"])
+    coverage = (1 - bare).socket
+    build("NodeGroupOutput", {"Color": color, "Ink": ink_color, "Coverage": coverage})
 
 
 def _tone(number: Any) -> Number:
@@ -244,9 +237,6 @@ def _tone(number: Any) -> Number:
 
 def _filtered_spread(spread: Number, channels: list[Number]) -> Number:
     """Return the variance of the thresholds that a filter of the texture has averaged, as 2 t - 1."""
-    mean_square = None
-    for threshold in channels:
-        centered = threshold * 2 - 1.0
-        square = centered * centered
-        mean_square = square if mean_square is None else mean_square + square
-    return (spread - mean_square * (1 / MAX_LAYERS) - ROUNDING_SPREAD).at_least(0.0)
+    centered = [threshold * 2 - 1.0 for threshold in channels]
+    square_sum = reduce(add, [value * value for value in centered])
+    return (spread - square_sum * (1 / MAX_LAYERS) - ROUNDING_SPREAD).at_least(0.0)

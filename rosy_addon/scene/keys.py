@@ -203,22 +203,15 @@ def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.typ
     material.diffuse_color = (1.0, 1.0, 1.0, 0.0)
     material.use_backface_culling = True
     material.surface_render_method = "BLENDED"
-    links = build.tree.links
-    image_node = build(
-        "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
-    )
     # A quad without a UV map: its generated coordinates run from corner to corner.
-    links.new(build("ShaderNodeTexCoord").outputs["Generated"], image_node.inputs["Vector"])
-    emission, transparent = build("ShaderNodeEmission"), build("ShaderNodeBsdfTransparent")
-    emission.inputs["Strength"].default_value = strength
-    links.new(image_node.outputs["Color"], emission.inputs["Color"])
+    image_node = build.frame_image(image, build("ShaderNodeTexCoord").outputs["Generated"])
+    color = image_node.outputs["Color"]
+    emission = build("ShaderNodeEmission", {"Color": color, "Strength": strength})
+    transparent = build("ShaderNodeBsdfTransparent")
     backfacing = build("ShaderNodeNewGeometry").outputs["Backfacing"]
     opacity = build.math(
         "MULTIPLY", image_node.outputs["Alpha"], build.math("SUBTRACT", 1.0, backfacing)
     )
-    mix = build("ShaderNodeMixShader")
-    links.new(opacity, mix.inputs[0])
-    links.new(transparent.outputs["BSDF"], mix.inputs[1])
-    links.new(emission.outputs["Emission"], mix.inputs[2])
-    links.new(mix.outputs["Shader"], build("ShaderNodeOutputMaterial").inputs["Surface"])
+    shader = build.mix_shaders(opacity, transparent.outputs["BSDF"], emission.outputs["Emission"])
+    build("ShaderNodeOutputMaterial", {"Surface": shader})
     return material

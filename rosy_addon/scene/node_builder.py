@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
@@ -13,19 +14,25 @@ from .compat import has_nodes_by_default
 class NodeBuilder:
     """Adds nodes to a tree, laid out in rows from left to right.
 
-    Calling it adds a node of a type, and sets its properties.
+    Calling it adds a node of a type, sets its properties, and connects its inputs to sockets or
+    constants. Inputs are given by their numbers, or by the names of those that the properties enable.
     """
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self.tree = tree
         self.node_count = 0
 
-    def __call__(self, kind: str, **settings: Any) -> bpy.types.Node:
+    def __call__(
+        self, kind: str, inputs: Mapping[str | int, Any] | None = None, /, **settings: Any
+    ) -> bpy.types.Node:
         node = self.tree.nodes.new(kind)
         node.location = (180 * (self.node_count % 12), -220 * (self.node_count // 12))
         self.node_count += 1
         for name, value in settings.items():
             setattr(node, name, value)
+        enabled = {socket.name: socket for socket in node.inputs if socket.enabled}
+        for key, value in (inputs or {}).items():
+            self.connect(value, node.inputs[key] if isinstance(key, int) else enabled[key])
         return node
 
     def connect(self, value: Any, socket: bpy.types.NodeSocket) -> None:
@@ -37,18 +44,34 @@ class NodeBuilder:
 
     def math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
         """Add a math node, and return its output. Values are sockets or constants."""
-        node = self("ShaderNodeMath", operation=operation)
-        for value, socket in zip(values, node.inputs, strict=False):
-            self.connect(value, socket)
+        node = self("ShaderNodeMath", dict(enumerate(values)), operation=operation)
         return node.outputs["Value"]
+
+    def vector_math(self, operation: str, *values: Any) -> bpy.types.NodeSocket:
+        """Add a vector math node, and return its output. Values are sockets or constants."""
+        node = self("ShaderNodeVectorMath", dict(enumerate(values)), operation=operation)
+        return enabled_output(node)
+
+    def scaled(self, vector: bpy.types.NodeSocket, factor: Any) -> bpy.types.NodeSocket:
+        """Add a node that scales a vector, and return its output."""
+        inputs = {0: vector, "Scale": factor}
+        return self("ShaderNodeVectorMath", inputs, operation="SCALE").outputs[0]
 
     def mix(self, kind: str, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
         """Add a mix node for a data type, and return its output: a for factor 0, b for factor 1."""
-        node = self("ShaderNodeMix", data_type=kind)
-        enabled = {socket.name: socket for socket in node.inputs if socket.enabled}
-        for name, value in (("Factor", factor), ("A", a), ("B", b)):
-            self.connect(value, enabled[name])
-        return next(socket for socket in node.outputs if socket.enabled)
+        inputs = {"Factor": factor, "A": a, "B": b}
+        return enabled_output(self("ShaderNodeMix", inputs, data_type=kind))
+
+    def mix_shaders(self, factor: Any, a: Any, b: Any) -> bpy.types.NodeSocket:
+        """Add a node that mixes shaders, and return its output: a for factor 0, b for factor 1."""
+        return self("ShaderNodeMixShader", {0: factor, 1: a, 2: b}).outputs["Shader"]
+
+    def frame_image(
+        self, image: bpy.types.Image, coordinates: bpy.types.NodeSocket
+    ) -> bpy.types.Node:
+        """Add the node of an image that fills the coordinates from 0 to 1, without interpolation."""
+        settings = {"image": image, "interpolation": "Closest", "extension": "EXTEND"}
+        return self("ShaderNodeTexImage", {"Vector": coordinates}, **settings)
 
     def stored_attribute(
         self,
@@ -59,23 +82,22 @@ class NodeBuilder:
         value: bpy.types.NodeSocket,
     ) -> bpy.types.NodeSocket:
         """Add a node that stores a named attribute, and return the geometry with it."""
-        node = self("GeometryNodeStoreNamedAttribute", data_type=data_type, domain=domain)
-        node.inputs["Name"].default_value = name
-        self.tree.links.new(geometry, node.inputs["Geometry"])
-        enabled = (socket for socket in node.inputs if socket.name == "Value" and socket.enabled)
-        self.tree.links.new(value, next(enabled))
-        return node.outputs["Geometry"]
+        inputs = {"Geometry": geometry, "Name": name, "Value": value}
+        kind = "GeometryNodeStoreNamedAttribute"
+        return self(kind, inputs, data_type=data_type, domain=domain).outputs["Geometry"]
 
     def transformed(self, point: bpy.types.NodeSocket, rows: np.ndarray) -> bpy.types.NodeSocket:
         """Add nodes that multiply a point by a (3, 4) matrix, and return the output."""
-        combined = self("ShaderNodeCombineXYZ")
-        for axis, row in zip("XYZ", rows.tolist(), strict=True):
-            product = self("ShaderNodeVectorMath", operation="DOT_PRODUCT")
-            self.connect(point, product.inputs[0])
-            product.inputs[1].default_value = row[:3]
-            component = self.math("ADD", product.outputs["Value"], row[3])
-            self.tree.links.new(component, combined.inputs[axis])
-        return combined.outputs[0]
+        components = {
+            axis: self.math("ADD", self.vector_math("DOT_PRODUCT", point, row[:3]), row[3])
+            for axis, row in zip("XYZ", rows.tolist(), strict=True)
+        }
+        return self("ShaderNodeCombineXYZ", components).outputs[0]
+
+
+def enabled_output(node: bpy.types.Node) -> bpy.types.NodeSocket:
+    """Return the first output of a node that its properties enable."""
+    return next(socket for socket in node.outputs if socket.enabled)
 
 
 class Number:
@@ -132,10 +154,9 @@ class Number:
 
     def smoothstep(self, low: Number | float, high: Number | float) -> Number:
         """Return a smooth step from 0 at `low` to 1 at `high`."""
-        node = self.build("ShaderNodeMapRange", interpolation_type="SMOOTHSTEP")
-        for name, value in (("Value", self), ("From Min", low), ("From Max", high)):
-            socket = value.socket if isinstance(value, Number) else value
-            self.build.connect(socket, node.inputs[name])
+        low, high = (end.socket if isinstance(end, Number) else end for end in (low, high))
+        inputs = {"Value": self.socket, "From Min": low, "From Max": high}
+        node = self.build("ShaderNodeMapRange", inputs, interpolation_type="SMOOTHSTEP")
         return Number(self.build, node.outputs["Result"])
 
 
@@ -146,3 +167,23 @@ def new_empty_material(name: str) -> tuple[bpy.types.Material, NodeBuilder]:
         material.use_nodes = True
     material.node_tree.nodes.clear()
     return material, NodeBuilder(material.node_tree)
+
+
+def new_emissive_material(name: str, color: Any, strength: float = 1.0) -> bpy.types.Material:
+    """Create a material that emits a color: a constant, or the name of an attribute with the color."""
+    material, build = new_empty_material(name)
+    if isinstance(color, str):
+        color = build("ShaderNodeAttribute", attribute_name=color).outputs["Color"]
+    emission = build("ShaderNodeEmission", {"Color": color, "Strength": strength})
+    build("ShaderNodeOutputMaterial", {"Surface": emission.outputs["Emission"]})
+    return material
+
+
+def new_modifier_group(name: str) -> tuple[bpy.types.NodeTree, NodeBuilder, bpy.types.NodeSocket]:
+    """Create a geometry node group for a modifier. Return what adds nodes, and the incoming geometry, too."""
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group.is_modifier = True
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    build = NodeBuilder(group)
+    return group, build, build("NodeGroupInput").outputs["Geometry"]

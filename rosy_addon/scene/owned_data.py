@@ -65,15 +65,11 @@ def delete_owned(datablock: bpy.types.ID | None) -> int:
     return 1
 
 
-def delete_unused() -> dict[str, int]:
+def delete_unused() -> int:
     """Delete the node groups, materials and images that RoSy created and that nothing uses.
 
-    Returns
-    -------
-    dict of str to int
-        The numbers of deleted datablocks, by "node_groups", "materials" and "images".
+    Return the number of deleted images.
     """
-    counts = {"node_groups": 0, "materials": 0, "images": 0}
     # A geometry group uses its material, and that its image and its shader group.
     for name in ("node_groups", "materials", "node_groups", "images"):
         unused = [
@@ -82,5 +78,4 @@ def delete_unused() -> dict[str, int]:
             if block.get(OWNED_TAG) and not block.users and block.library is None
         ]
         bpy.data.batch_remove(unused)
-        counts[name] += len(unused)
-    return counts
+    return len(unused)

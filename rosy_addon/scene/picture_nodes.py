@@ -10,10 +10,11 @@ from collections.abc import Container
 import bpy
 import numpy as np
 
+from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
 from .compat import is_editable
 from .meshes import read_attribute
-from .node_builder import NodeBuilder, new_empty_material
+from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
 from .owned_data import KEY_TAG, OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
 from .texture_nodes import Hatching, hatching_shader
 
@@ -31,15 +32,14 @@ _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
 
 
 def new_material(
-    name: str,
     image: bpy.types.Image,
-    view_projection: np.ndarray,
+    camera: Camera,
+    created: list[bpy.types.ID],
     *,
-    window_coordinates: bool = False,
-    emission: float = 1.0,
-    diffuse: float = 0.0,
+    window_coordinates: bool,
+    emission: float,
+    diffuse: float,
     hatching: Hatching | None = None,
-    group: bpy.types.NodeTree | None = None,
 ) -> bpy.types.Material:
     """Create a material that shows a picture, the same in Cycles and EEVEE.
 
@@ -51,10 +51,12 @@ def new_material(
 
     Parameters
     ----------
-    name : str
     image : bpy.types.Image
-    view_projection : (4, 4) ndarray
-        World to clip space.
+        The material gets its name.
+    camera : Camera
+        From which the picture was drawn.
+    created : list of bpy.types.ID
+        Gets the new datablocks; see `owned_data.rollback_on_error`.
     window_coordinates : bool
         Map the picture to the frame of the current camera instead.
     emission : float
@@ -63,54 +65,37 @@ def new_material(
         Factor of the diffuse color.
     hatching : Hatching, optional
         How hatching is drawn, if the image has thresholds of ink and not colors.
-    group : bpy.types.NodeTree, optional
-        From `hatching_group`, for hatching.
     """
-    material, build = new_empty_material(name)
-    tree = build.tree
-    image_node = build(
-        "ShaderNodeTexImage", image=image, interpolation="Closest", extension="EXTEND"
-    )
+    material, build = new_empty_material(image.name)
+    created.append(material)
     is_inside = None
     if window_coordinates:
-        tree.links.new(build("ShaderNodeTexCoord").outputs["Window"], image_node.inputs["Vector"])
+        coordinates = build("ShaderNodeTexCoord").outputs["Window"]
     else:
-        clip = _clip_position(build, view_projection)
-        x, y, w = (clip.outputs[axis] for axis in "XYZ")
+        x, y, w = _clip_position(build, camera.projection @ camera.view).outputs
         max_abs_xy = build.math("MAXIMUM", build.math("ABSOLUTE", x), build.math("ABSOLUTE", y))
-        uv = build("ShaderNodeCombineXYZ")
-        for axis, value in (("X", x), ("Y", y)):
-            ratio = build.math("DIVIDE", value, w)
-            tree.links.new(build.math("MULTIPLY_ADD", ratio, 0.5, 0.5), uv.inputs[axis])
-        tree.links.new(uv.outputs[0], image_node.inputs["Vector"])
+        uv = {
+            axis: build.math("MULTIPLY_ADD", build.math("DIVIDE", value, w), 0.5, 0.5)
+            for axis, value in (("X", x), ("Y", y))
+        }
+        coordinates = build("ShaderNodeCombineXYZ", uv).outputs[0]
         is_inside = build.math("LESS_THAN", max_abs_xy, w)
-    output = build("ShaderNodeOutputMaterial")
+    image_node = build.frame_image(image, coordinates)
     if hatching is not None:
-        shader = hatching_shader(build, image_node, group, hatching)
+        shader = hatching_shader(build, image_node, hatching, created)
         if is_inside is not None:
-            outside, mix = build("ShaderNodeEmission"), build("ShaderNodeMixShader")
-            outside.inputs["Color"].default_value = _OUTSIDE_COLOR
-            tree.links.new(is_inside, mix.inputs[0])
-            tree.links.new(outside.outputs["Emission"], mix.inputs[1])
-            tree.links.new(shader, mix.inputs[2])
-            shader = mix.outputs["Shader"]
-        tree.links.new(shader, output.inputs["Surface"])
-        return material
-    color = image_node.outputs["Color"]
-    if is_inside is not None:
-        color = build.mix("RGBA", is_inside, _OUTSIDE_COLOR, color)
-    emission_node, diffuse_node = build("ShaderNodeEmission"), build("ShaderNodeBsdfDiffuse")
-    emission_node.inputs["Strength"].default_value = emission
-    tree.links.new(color, emission_node.inputs["Color"])
-    # A BSDF has no strength, so the diffuse factor scales the color.
-    scaled_color = build("ShaderNodeVectorMath", operation="SCALE")
-    scaled_color.inputs["Scale"].default_value = diffuse
-    tree.links.new(color, scaled_color.inputs[0])
-    tree.links.new(scaled_color.outputs[0], diffuse_node.inputs["Color"])
-    add_shader = build("ShaderNodeAddShader")
-    tree.links.new(emission_node.outputs[0], add_shader.inputs[0])
-    tree.links.new(diffuse_node.outputs[0], add_shader.inputs[1])
-    tree.links.new(add_shader.outputs[0], output.inputs["Surface"])
+            outside = build("ShaderNodeEmission", {"Color": _OUTSIDE_COLOR})
+            shader = build.mix_shaders(is_inside, outside.outputs["Emission"], shader)
+    else:
+        color = image_node.outputs["Color"]
+        if is_inside is not None:
+            color = build.mix("RGBA", is_inside, _OUTSIDE_COLOR, color)
+        emitted = build("ShaderNodeEmission", {"Color": color, "Strength": emission}).outputs[0]
+        # A BSDF has no strength, so the diffuse factor scales the color.
+        scaled_color = build.scaled(color, diffuse)
+        reflected = build("ShaderNodeBsdfDiffuse", {"Color": scaled_color}).outputs[0]
+        shader = build("ShaderNodeAddShader", {0: emitted, 1: reflected}).outputs[0]
+    build("ShaderNodeOutputMaterial", {"Surface": shader})
     return material
 
 
@@ -126,19 +111,12 @@ def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
     """Return a node whose outputs X, Y and Z are the clip-space x, y and w."""
-    links = build.tree.links
-    baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE)
+    baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE).outputs["Vector"]
     world_position = build("ShaderNodeNewGeometry").outputs["Position"]
     live_clip = build.transformed(world_position, _clip_rows(view_projection))
-    length = build("ShaderNodeVectorMath", operation="LENGTH")
-    links.new(baked_clip.outputs["Vector"], length.inputs[0])
-    has_baked_clip = build.math("GREATER_THAN", length.outputs["Value"], 0.0)
-    separate = build("ShaderNodeSeparateXYZ")
-    links.new(
-        build.mix("VECTOR", has_baked_clip, live_clip, baked_clip.outputs["Vector"]),
-        separate.inputs[0],
-    )
-    return separate
+    has_baked_clip = build.math("GREATER_THAN", build.vector_math("LENGTH", baked_clip), 0.0)
+    clip = build.mix("VECTOR", has_baked_clip, live_clip, baked_clip)
+    return build("ShaderNodeSeparateXYZ", {0: clip})
 
 
 def new_group(
@@ -155,27 +133,18 @@ def new_group(
     matrix : (4, 4) ndarray or None
         Object to clip space. None for objects with several instances, which get no attribute.
     """
-    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
-    group.is_modifier = True
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    build = NodeBuilder(group)
-    group_input = build("NodeGroupInput")
-    set_material = build("GeometryNodeSetMaterial")
-    set_material.inputs["Material"].default_value = material
+    group, build, geometry = new_modifier_group(name)
     material_index = build("GeometryNodeInputMaterialIndex").outputs[0]
-    geometry = build.stored_attribute(
-        group_input.outputs["Geometry"], MATERIAL_ATTRIBUTE, "INT", "FACE", material_index
-    )
-    group.links.new(geometry, set_material.inputs["Geometry"])
-    geometry = set_material.outputs["Geometry"]
+    geometry = build.stored_attribute(geometry, MATERIAL_ATTRIBUTE, "INT", "FACE", material_index)
+    inputs = {"Geometry": geometry, "Material": material}
+    geometry = build("GeometryNodeSetMaterial", inputs).outputs["Geometry"]
     if matrix is not None:
         position = build("GeometryNodeInputPosition").outputs[0]
         clip_position = build.transformed(position, _clip_rows(matrix))
         geometry = build.stored_attribute(
             geometry, CLIP_ATTRIBUTE, "FLOAT_VECTOR", "POINT", clip_position
         )
-    group.links.new(geometry, build("NodeGroupOutput").inputs["Geometry"])
+    build("NodeGroupOutput", {"Geometry": geometry})
     _add_projection(group, material, matrix)
     return group
 
@@ -261,13 +230,15 @@ def set_picture_modifier(
     node_group.name = f"RoSy {obj.name}"
 
 
-def remove_picture_modifiers(obj: bpy.types.Object) -> int:
-    """Remove RoSy's modifiers from an object, and return the number of deleted node groups."""
+def remove_picture_modifiers(obj: bpy.types.Object) -> None:
+    """Remove RoSy's modifiers and their node groups from an object."""
     existing = removable_modifiers(obj)
     node_groups = {modifier.node_group for modifier in existing}
     for modifier in existing:
         obj.modifiers.remove(modifier)
-    return sum(delete_owned(node_group) for node_group in node_groups if not node_group.users)
+    for node_group in node_groups:
+        if not node_group.users:
+            delete_owned(node_group)
 
 
 def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:

@@ -12,7 +12,7 @@ transformed, and slides over one that deforms.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,7 +35,6 @@ from .bake_records import (
 from .blender_images import load_sequence, new_image
 from .compat import is_editable
 from .file_names import picture_stem
-from .hatching_nodes import hatching_group
 from .keys import update_keys
 from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
 from .picture_nodes import (
@@ -80,28 +79,6 @@ class OutputSettings:
     folder: Path | None = None
     device: str = "cpu"
     relight: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class RenderedView:
-    """A picture and the camera that it was drawn from.
-
-    Attributes
-    ----------
-    picture : Picture
-    image_data : ImageData
-        The picture, converted for the output settings.
-    camera : Camera
-    drawn_from : DrawnFrom
-    hatching : Hatching or None
-        How the picture is drawn, if it has thresholds of ink.
-    """
-
-    picture: Picture
-    image_data: ImageData
-    camera: Camera
-    drawn_from: DrawnFrom
-    hatching: Hatching | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,8 +206,12 @@ def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings)
 def apply_picture(
     scene: bpy.types.Scene,
     scene_data: SceneData,
-    rendered_view: RenderedView,
-    settings: OutputSettings | None = None,
+    settings: OutputSettings,
+    camera: Camera,
+    picture: Picture,
+    image_data: ImageData,
+    drawn_from: DrawnFrom,
+    hatching: Hatching | None,
 ) -> BakeResult:
     """Apply a picture to the objects that it shows. An older one from the same camera is replaced.
 
@@ -240,67 +221,46 @@ def apply_picture(
     ----------
     scene : bpy.types.Scene
     scene_data : SceneData
-        The mesh instances that the picture was drawn from, and their objects.
-    rendered_view : RenderedView
-    settings : OutputSettings, optional
-        By default those of the scene.
+        The mesh instances that the picture was drawn from, and their objects, of which each passes
+        `check_targets`.
+    settings : OutputSettings
+    camera : Camera
+    picture : Picture
+    image_data : ImageData
+        The picture, converted for the output settings.
+    drawn_from : DrawnFrom
+    hatching : Hatching or None
+        How the picture is drawn, if it has thresholds of ink.
 
     Raises
     ------
     RosyError
-        See `check_targets`.
+        If the image cannot be saved.
     """
-    settings = read_output_settings(scene) if settings is None else settings
-    objects = list(dict.fromkeys(scene_data.objects))
-    check_targets(objects, settings)
-    name = rendered_view.camera.name
-    matrices = _object_to_clip_matrices(scene_data, rendered_view.camera)
     with rollback_on_error() as created:
         image = new_image(
-            f"RoSy {name}",
-            rendered_view.image_data,
+            f"RoSy {camera.name}",
+            image_data,
             as_float=settings.as_float,
-            is_color=rendered_view.hatching is None,
-            stem=None if settings.folder is None else settings.folder / picture_stem(name),
+            is_color=hatching is None,
+            stem=None if settings.folder is None else settings.folder / picture_stem(camera.name),
         )
         created.append(image)
-        group = None
-        if rendered_view.hatching is not None:
-            group, is_new = hatching_group()
-            if is_new:
-                created.append(group)
         material = new_material(
-            f"RoSy {name}",
             image,
-            rendered_view.camera.projection @ rendered_view.camera.view,
+            camera,
+            created,
             window_coordinates=settings.window_coordinates,
             emission=settings.emission,
             diffuse=settings.diffuse,
-            hatching=rendered_view.hatching,
-            group=group,
+            hatching=hatching,
         )
-        created.append(material)
-        node_groups = []
-        for obj in objects:
-            node_groups.append(new_group(f"RoSy {obj.name}", material, matrices[obj]))
-            created.append(node_groups[-1])
-    store_record(
-        scene,
-        name,
-        image,
-        material,
-        rendered_view.drawn_from,
-        size=rendered_view.image_data[:2],
-    )
-    _show_on_objects(objects, node_groups)
-    return BakeResult(
-        name,
-        image,
-        material,
-        tuple(objects),
-        rendered_view.picture,
-        (*scene_data.warnings, *_display_warnings(scene)),
-    )
+        matrices = _object_to_clip_matrices(scene_data, camera)
+        node_groups = _new_groups(material, matrices, created)
+    store_record(scene, camera.name, image, material, drawn_from, size=image_data[:2])
+    _show_on_objects(node_groups)
+    warnings = (*scene_data.warnings, *_display_warnings(scene))
+    return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
 
 
 def apply_sequence(
@@ -321,18 +281,15 @@ def apply_sequence(
         created.append(image)
         image.name = f"RoSy {sequence.name}"
         material = new_material(
-            image.name,
             image,
-            camera.projection @ camera.view,
+            camera,
+            created,
             window_coordinates=True,
             emission=settings.emission,
             diffuse=settings.diffuse,
         )
-        created.append(material)
         set_sequence_frames(material, sequence.first, sequence.last)
-        objects = list(dict.fromkeys(scene_data.objects))
-        node_groups = [new_group(f"RoSy {obj.name}", material, None) for obj in objects]
-        created += node_groups
+        node_groups = _new_groups(material, dict.fromkeys(scene_data.objects), created)
     store_record(
         scene,
         sequence.name,
@@ -342,18 +299,29 @@ def apply_sequence(
         size=(sequence.width, sequence.height),
         frame_range=f"{sequence.first} to {sequence.last}",
     )
-    _show_on_objects(objects, node_groups)
+    _show_on_objects(node_groups)
 
 
-def _show_on_objects(
-    objects: Sequence[bpy.types.Object], node_groups: Sequence[bpy.types.NodeTree]
-) -> None:
+def _new_groups(
+    material: bpy.types.Material,
+    matrices: Mapping[bpy.types.Object, np.ndarray | None],
+    created: list[bpy.types.ID],
+) -> dict[bpy.types.Object, bpy.types.NodeTree]:
+    """Create the node groups that show a picture on objects; see `new_group`."""
+    node_groups = {}
+    for obj, matrix in matrices.items():
+        node_groups[obj] = new_group(f"RoSy {obj.name}", material, matrix)
+        created.append(node_groups[obj])
+    return node_groups
+
+
+def _show_on_objects(node_groups: Mapping[bpy.types.Object, bpy.types.NodeTree]) -> None:
     """Show a picture that is recorded, by a node group for each object, and delete older groups.
 
     The older groups refer to the new picture by now, so they are replaced as a whole.
     """
     materials = recorded_materials()
-    for obj, node_group in zip(objects, node_groups, strict=True):
+    for obj, node_group in node_groups.items():
         set_picture_modifier(obj, node_group, materials)
     delete_unused()
 

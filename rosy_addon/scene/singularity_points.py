@@ -8,7 +8,9 @@ import bpy
 import numpy as np
 
 from ..errors import RosyError
+from ..field.rosy_field import RosyField
 from ..field.singularities import find_singularities
+from ..field.surface import Surface
 from ..field.validate import vertex_normals
 from .meshes import (
     evaluated_mesh,
@@ -71,13 +73,18 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
         instance = scene_data.instances[0]
         surface, field = instance.surface, instance.field
     else:
-        label = f"object '{obj.name}'"
-        surface = mesh_surface(obj.data, label)
-        field = read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
+        surface, field = _own_field(obj)
     vertex, index = find_singularities(surface.in_rest_shape(), field)
     points = surface.vertices[vertex].astype(np.float32)
     normals = vertex_normals(surface)[vertex].astype(np.float32)
     return Singularities(points, normals, index, field.degree)
+
+
+def _own_field(obj: bpy.types.Object) -> tuple[Surface, RosyField]:
+    """Return the surface and the field of an object's own mesh."""
+    label = f"object '{obj.name}'"
+    surface = mesh_surface(obj.data, label)
+    return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
 
 
 def read_editable_singularities(
@@ -92,9 +99,7 @@ def read_editable_singularities(
     RosyError
         If the field cannot be read.
     """
-    label = f"object '{obj.name}'"
-    surface = mesh_surface(obj.data, label)
-    field = read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
+    surface, field = _own_field(obj)
     vertex, index = find_singularities(surface, field)
     with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
         source = mesh_of_own_vertices(obj, mesh)
@@ -167,7 +172,8 @@ def read_singularity_points(
     RosyError
         If there is no such object, its points have no indices, or the degree does not allow them.
     """
-    source = scene.objects.get(name) if name else singularity_point_object(scene, obj)
+    own_points = next(iter(_point_objects(scene, obj)), None)
+    source = scene.objects.get(name) if name else own_points
     if source is None:
         missing = (
             f"object '{name}' is not in this scene"
@@ -213,34 +219,22 @@ def has_points(obj: bpy.types.Object) -> bool:
     return obj.type in ("MESH", "POINTCLOUD")
 
 
-def singularity_point_object(
-    scene: bpy.types.Scene, obj: bpy.types.Object
-) -> bpy.types.Object | None:
-    """Return the object of `add_singularity_points` for an object; None if there is none."""
-    return next(iter(_point_objects(scene, obj)), None)
-
-
-def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> list[bpy.types.Object]:
-    """Return the point objects of an object, or of all objects of a scene."""
+def _point_objects(scene: bpy.types.Scene, obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """Return the point objects of an object."""
     return [
         candidate
         for candidate in scene.objects
-        if isinstance(candidate.get(OWNED_TAG), str) and (obj is None or candidate.parent == obj)
+        if isinstance(candidate.get(OWNED_TAG), str) and candidate.parent == obj
     ]
 
 
-def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object | None = None) -> int:
-    """Delete the point objects of an object, or of all objects of a scene. Return their number."""
-    point_objects = _point_objects(scene, obj)
-    for point_object in point_objects:
+def remove_singularity_points(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
+    """Delete the point objects of an object."""
+    for point_object in _point_objects(scene, obj):
         data = point_object.data
         bpy.data.objects.remove(point_object)
         if not data.users:
-            collection = (
-                bpy.data.meshes if isinstance(data, bpy.types.Mesh) else bpy.data.pointclouds
-            )
-            collection.remove(data)
-    return len(point_objects)
+            bpy.data.batch_remove([data])
 
 
 def _new_point_cloud(name: str, count: int) -> bpy.types.ID:

@@ -8,22 +8,25 @@ object gets new data, and keeps its modifiers, name and collections.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import bpy
+import numpy as np
 from mathutils import Matrix
 
+from ..cache import content_hash
 from ..color import to_hex
 from ..compositor.family_hues import PALETTE
 from ..errors import RosyError
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
-from .compat import is_editable
-from .curves import new_curves
+from .compat import has_grease_pencil_drawings, is_editable
+from .curves import INK_ATTRIBUTE, new_curves
 from .grease_pencil import new_grease_pencil
 from .look_properties import read_settings
+from .meshes import read_collection
 from .owned_data import OWNED_TAG, rollback_on_error
-from .stroke_digest import stroke_digest
 from .surface_strokes import follow_surface, stop_following
 from .visible_objects import field_objects
 
@@ -32,6 +35,15 @@ DATA_BUILDERS: dict[str, Callable[..., bpy.types.ID]] = {
     "PENCIL": new_grease_pencil,
     "CURVES": new_curves,
 }
+
+#: Attributes that make up a stroke. Others, such as selections, may change without an edit.
+STROKE_ATTRIBUTES = ("position", "radius", "opacity", "material_index", INK_ATTRIBUTE)
+
+#: Properties of the points of a stroke before Blender 4.3, with their numbers of values.
+LEGACY_POINT_PROPERTIES = {"co": 3, "pressure": 1, "strength": 1}
+
+#: Names of the values in the items of attributes, and their numbers, by data type.
+_VALUES_BY_TYPE = {"FLOAT_VECTOR": ("vector", 3), "FLOAT_COLOR": ("color", 4)}
 
 
 def read_stroke_style(settings: bpy.types.PropertyGroup) -> StrokeStyle:
@@ -165,7 +177,7 @@ def edited_strokes(scene: bpy.types.Scene, kind: str, camera: str) -> bpy.types.
     None if there is no such object, or nobody has edited its strokes since they were drawn.
     """
     record = _find_record(scene, kind, camera)
-    if record is None or not record.digest or record.digest == stroke_digest(record.thing.data):
+    if record is None or not record.digest or record.digest == _digest(record.thing.data):
         return None
     return record.thing
 
@@ -191,7 +203,7 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
             records.remove(index)
     record = records.add()
     record.name, record.kind, record.thing = camera, kind, obj
-    record.digest = stroke_digest(obj.data)
+    record.digest = _digest(obj.data)
 
 
 def _delete_object(obj: bpy.types.Object) -> None:
@@ -209,3 +221,52 @@ def _remove_data(data: bpy.types.ID) -> None:
     materials = [material for material in data.materials if material and material.get(OWNED_TAG)]
     bpy.data.batch_remove([data])
     bpy.data.batch_remove([material for material in materials if not material.users])
+
+
+def _digest(data: bpy.types.ID) -> str:
+    """Return a digest of the strokes in Grease Pencil or Curves data.
+
+    It depends on layers, points, widths and inks, and not on what only Blender itself changes.
+    """
+    return content_hash(*_digest_parts(data)).hex()
+
+
+def _digest_parts(data: bpy.types.ID) -> list[object]:
+    """Return everything that the digest depends on."""
+    if isinstance(data, bpy.types.Curves):
+        return _attribute_parts(data.attributes, data.curve_offset_data)
+    styles = [None if material is None else material.grease_pencil for material in data.materials]
+    parts: list[object] = [None if style is None else tuple(style.color) for style in styles]
+    for layer in data.layers:
+        parts.append(layer.name if has_grease_pencil_drawings() else layer.info)
+        for frame in layer.frames:
+            parts.append(frame.frame_number)
+            if has_grease_pencil_drawings():
+                parts += _attribute_parts(frame.drawing.attributes, frame.drawing.curve_offsets)
+            else:
+                parts += _legacy_parts(frame)
+    return parts
+
+
+def _attribute_parts(attributes: Any, offsets: Any) -> list[object]:
+    """Return the values of `STROKE_ATTRIBUTES`, and where each stroke starts."""
+    position = attributes.get("position")
+    if position is None or not len(position.data):  # the offsets of an empty drawing are unreadable
+        return []
+    parts: list[object] = [read_collection(offsets, "value", np.float32)]
+    for name in STROKE_ATTRIBUTES:
+        attribute = attributes.get(name)
+        if attribute is not None:
+            key, columns = _VALUES_BY_TYPE.get(attribute.data_type, ("value", 1))
+            parts += [name, read_collection(attribute.data, key, np.float32, columns)]
+    return parts
+
+
+def _legacy_parts(frame: Any) -> list[object]:
+    """Return the strokes of a frame before Blender 4.3."""
+    parts: list[object] = []
+    for stroke in frame.strokes:
+        parts.append((stroke.line_width, stroke.material_index))
+        for name, columns in LEGACY_POINT_PROPERTIES.items():
+            parts.append(read_collection(stroke.points, name, np.float32, columns))
+    return parts

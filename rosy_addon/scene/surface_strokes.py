@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial, reduce
+
 import bpy
 
 from ..line_drawing.drawing_outputs import SurfacePoints
-from .node_builder import NodeBuilder
+from .node_builder import NodeBuilder, enabled_output, new_modifier_group
 from .owned_data import OWNED_TAG, STROKES_TAG
 
 #: Name of the modifier.
@@ -72,56 +74,36 @@ def _delete_unused(group: bpy.types.NodeTree | None) -> None:
 
 def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.types.NodeTree:
     """Create the node group, which moves points to their places on the evaluated surface."""
-    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group, build, strokes = new_modifier_group(name)
     group[OWNED_TAG] = group[STROKES_TAG] = True
-    group.is_modifier = True
-    for direction in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    build, links = NodeBuilder(group), group.links
-    strokes = build("NodeGroupInput").outputs["Geometry"]
-    info = build("GeometryNodeObjectInfo", transform_space="RELATIVE")
-    info.inputs["Object"].default_value = surface
+    info = build("GeometryNodeObjectInfo", {"Object": surface}, transform_space="RELATIVE")
     mesh = info.outputs["Geometry"]
-    weights = build("ShaderNodeSeparateXYZ")
-    links.new(_named(build, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR"), weights.inputs[0])
+    weights = build("ShaderNodeSeparateXYZ", {0: _named(build, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR")})
     position, normal = (
         _weighted_mean(build, mesh, build(kind).outputs[0], weights)
         for kind in ("GeometryNodeInputPosition", "GeometryNodeInputNormal")
     )
-    unit_normal = build("ShaderNodeVectorMath", operation="NORMALIZE")
-    links.new(normal, unit_normal.inputs[0])
-    height = build("ShaderNodeVectorMath", operation="SCALE")
-    links.new(unit_normal.outputs[0], height.inputs[0])
-    links.new(_named(build, HEIGHT_ATTRIBUTE, "FLOAT"), height.inputs["Scale"])
-    size = build("GeometryNodeAttributeDomainSize")
-    links.new(mesh, size.inputs[0])
-    is_same = build("FunctionNodeCompare", data_type="INT", operation="EQUAL")
-    first, second = (socket for socket in is_same.inputs if socket.enabled)
-    links.new(size.outputs["Point Count"], first)
-    second.default_value = vertex_count
-    moved = build("GeometryNodeSetPosition")
-    links.new(strokes, moved.inputs["Geometry"])
-    links.new(is_same.outputs[0], moved.inputs["Selection"])
-    links.new(_vector(build, "ADD", position, height.outputs[0]), moved.inputs["Position"])
-    links.new(moved.outputs["Geometry"], build("NodeGroupOutput").inputs["Geometry"])
+    unit_normal = build.vector_math("NORMALIZE", normal)
+    height = build.scaled(unit_normal, _named(build, HEIGHT_ATTRIBUTE, "FLOAT"))
+    size = build("GeometryNodeAttributeDomainSize", {0: mesh}).outputs["Point Count"]
+    inputs = {"A": size, "B": vertex_count}
+    is_same = build("FunctionNodeCompare", inputs, data_type="INT", operation="EQUAL")
+    moved = build(
+        "GeometryNodeSetPosition",
+        {
+            "Geometry": strokes,
+            "Selection": is_same.outputs[0],
+            "Position": build.vector_math("ADD", position, height),
+        },
+    )
+    build("NodeGroupOutput", {"Geometry": moved.outputs["Geometry"]})
     return group
-
-
-def _vector(
-    build: NodeBuilder, operation: str, a: bpy.types.NodeSocket, b: bpy.types.NodeSocket
-) -> bpy.types.NodeSocket:
-    """Add a vector math node, and return its output."""
-    node = build("ShaderNodeVectorMath", operation=operation)
-    build.tree.links.new(a, node.inputs[0])
-    build.tree.links.new(b, node.inputs[1])
-    return node.outputs[0]
 
 
 def _named(build: NodeBuilder, name: str, data_type: str) -> bpy.types.NodeSocket:
     """Add a node that reads an attribute of the points, and return its output."""
-    node = build("GeometryNodeInputNamedAttribute", data_type=data_type)
-    node.inputs["Name"].default_value = name
-    return next(socket for socket in node.outputs if socket.enabled)
+    kind = "GeometryNodeInputNamedAttribute"
+    return enabled_output(build(kind, {"Name": name}, data_type=data_type))
 
 
 def _weighted_mean(
@@ -131,14 +113,10 @@ def _weighted_mean(
     weights: bpy.types.Node,
 ) -> bpy.types.NodeSocket:
     """Add nodes that interpolate a vector of the vertices of the triangle of a point."""
-    links, total = build.tree.links, None
+    terms = []
     for name, weight in zip(VERTEX_ATTRIBUTES, weights.outputs, strict=True):
-        sample = build("GeometryNodeSampleIndex", data_type="FLOAT_VECTOR", domain="POINT")
-        links.new(mesh, sample.inputs["Geometry"])
-        links.new(value, next(s for s in sample.inputs if s.name == "Value" and s.enabled))
-        links.new(_named(build, name, "INT"), sample.inputs["Index"])
-        term = build("ShaderNodeVectorMath", operation="SCALE")
-        links.new(next(socket for socket in sample.outputs if socket.enabled), term.inputs[0])
-        links.new(weight, term.inputs["Scale"])
-        total = term.outputs[0] if total is None else _vector(build, "ADD", total, term.outputs[0])
-    return total
+        inputs = {"Geometry": mesh, "Value": value, "Index": _named(build, name, "INT")}
+        kind = "GeometryNodeSampleIndex"
+        sample = build(kind, inputs, data_type="FLOAT_VECTOR", domain="POINT")
+        terms.append(build.scaled(enabled_output(sample), weight))
+    return reduce(partial(build.vector_math, "ADD"), terms)

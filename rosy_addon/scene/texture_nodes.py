@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 
 from ..compositor.look import Look
-from .hatching_nodes import set_hatching_look
+from .hatching_nodes import hatching_group, set_hatching_look
 from .node_builder import NodeBuilder, new_empty_material
 
 #: Strength and roughness of brushed metal.
 ANISOTROPY, BRUSHED_ROUGHNESS = 0.8, 0.3
-
-
-def new_texture_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.types.Material:
-    """Create a material that shows a texture of colors on a UV map, lit like any other surface.
-
-    Parameters
-    ----------
-    name : str
-    image : bpy.types.Image
-    uv_map : str
-        Name of the UV map.
-    """
-    material, build = new_empty_material(name)
-    tree = build.tree
-    image_node = _image_on_map(build, image, uv_map)
-    shader = build("ShaderNodeBsdfPrincipled")
-    output = build("ShaderNodeOutputMaterial")
-    shader.inputs["Roughness"].default_value = 1.0
-    tree.links.new(image_node.outputs["Color"], shader.inputs["Base Color"])
-    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
-    return material
 
 
 class Hatching(NamedTuple):
@@ -51,158 +31,127 @@ class Hatching(NamedTuple):
     line_count: int
 
 
-def new_hatching_material(
+def new_texture_material(
     name: str,
     image: bpy.types.Image,
     uv_map: str,
-    group: bpy.types.NodeTree,
-    hatching: Hatching,
+    add_shader: Callable[[NodeBuilder, bpy.types.Node], bpy.types.NodeSocket],
 ) -> bpy.types.Material:
-    """Create a material that draws the hatching of a texture of thresholds; see `hatching_shader`.
+    """Create a material that shows a texture on a UV map.
 
     Parameters
     ----------
     name : str
     image : bpy.types.Image
-        Thresholds; see `compositor.ink_thresholds`.
     uv_map : str
         Name of the UV map.
-    group : bpy.types.NodeTree
-        From `hatching_group`.
-    hatching : Hatching
+    add_shader : callable
+        Adds nodes for the node of the image, and returns the shader, such as `color_shader`.
     """
     material, build = new_empty_material(name)
-    shader = hatching_shader(build, _image_on_map(build, image, uv_map), group, hatching)
-    build.tree.links.new(shader, build("ShaderNodeOutputMaterial").inputs["Surface"])
+    coordinates = build("ShaderNodeUVMap", uv_map=uv_map).outputs["UV"]
+    image_node = build("ShaderNodeTexImage", {"Vector": coordinates}, image=image)
+    build("ShaderNodeOutputMaterial", {"Surface": add_shader(build, image_node)})
     return material
+
+
+def color_shader(build: NodeBuilder, image_node: bpy.types.Node) -> bpy.types.NodeSocket:
+    """Add a shader with the colors of an image, lit like any other surface."""
+    inputs = {"Base Color": image_node.outputs["Color"], "Roughness": 1.0}
+    return build("ShaderNodeBsdfPrincipled", inputs).outputs["BSDF"]
 
 
 def hatching_shader(
     build: NodeBuilder,
     image_node: bpy.types.Node,
-    group: bpy.types.NodeTree,
     hatching: Hatching,
+    created: list[bpy.types.ID],
 ) -> bpy.types.NodeSocket:
     """Add nodes that draw hatching from an image of thresholds, as dense as the light asks.
 
     In EEVEE, the tone is the diffuse light on the surface. Cycles has no shader that returns the light;
     there it is the ambient occlusion.
 
+    Parameters
+    ----------
+    build : NodeBuilder
+    image_node : bpy.types.Node
+        Of an image of thresholds; see `compositor.ink_thresholds`.
+    hatching : Hatching
+    created : list of bpy.types.ID
+        Gets the node group of hatching if it is new; see `owned_data.rollback_on_error`.
+
     Returns
     -------
     bpy.types.NodeSocket
         The shader.
     """
-    tree, look = build.tree, hatching.look
+    look, image_color = hatching.look, image_node.outputs["Color"]
     # Has no effect, but Blender's exporter of glTF takes the color of the first emission, and follows all
     # links before it, which takes long in the group.
-    exported = build("ShaderNodeEmission", label="For Exporters")
-    tree.links.new(image_node.outputs["Color"], exported.inputs["Color"])
-    light = build("ShaderNodeShaderToRGB")
-    white = build("ShaderNodeBsdfDiffuse")
-    white.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
-    tree.links.new(white.outputs["BSDF"], light.inputs["Shader"])
-    luminance = build("ShaderNodeRGBToBW")
-    tree.links.new(light.outputs["Color"], luminance.inputs["Color"])
+    exported = build("ShaderNodeEmission", {"Color": image_color}, label="For Exporters")
+    white = build("ShaderNodeBsdfDiffuse", {"Color": (1.0, 1.0, 1.0, 1.0)})
+    light = build("ShaderNodeShaderToRGB", {"Shader": white.outputs["BSDF"]})
+    luminance = build("ShaderNodeRGBToBW", {"Color": light.outputs["Color"]})
     # Alpha is 1. Cycles ignores the node of the light and its links, and takes the value of the socket.
     occlusion = build("ShaderNodeAmbientOcclusion")
     tone = build.mix("FLOAT", 0.0, occlusion.outputs["AO"], luminance.outputs["Val"])
-    tree.links.new(light.outputs["Alpha"], tone.node.inputs["Factor"])
-    ink = build("ShaderNodeGroup", node_tree=group)
+    build.connect(light.outputs["Alpha"], tone.node.inputs["Factor"])
+    inputs = {"Thresholds": image_color, "Spread": image_node.outputs["Alpha"], "Tone": tone}
+    ink = build("ShaderNodeGroup", inputs, node_tree=hatching_group(created))
     set_hatching_look(ink, look, hatching.line_count)
-    tree.links.new(image_node.outputs["Color"], ink.inputs["Thresholds"])
-    tree.links.new(image_node.outputs["Alpha"], ink.inputs["Spread"])
-    tree.links.new(tone, ink.inputs["Tone"])
-    emission = build("ShaderNodeEmission")
     color = ink.outputs["Ink" if look.clear_paper else "Color"]
-    tree.links.new(color, emission.inputs["Color"])
-    surface = emission.outputs["Emission"]
+    surface = build("ShaderNodeEmission", {"Color": color}).outputs["Emission"]
     if look.clear_paper:
-        transparent, mix = build("ShaderNodeBsdfTransparent"), build("ShaderNodeMixShader")
-        tree.links.new(ink.outputs["Coverage"], mix.inputs[0])
-        tree.links.new(transparent.outputs["BSDF"], mix.inputs[1])
-        tree.links.new(surface, mix.inputs[2])
-        surface = mix.outputs["Shader"]
-    unmixed = build("ShaderNodeMixShader")
-    unmixed.inputs[0].default_value = 0.0
-    tree.links.new(surface, unmixed.inputs[1])
-    tree.links.new(exported.outputs["Emission"], unmixed.inputs[2])
-    return unmixed.outputs["Shader"]
+        transparent = build("ShaderNodeBsdfTransparent").outputs["BSDF"]
+        surface = build.mix_shaders(ink.outputs["Coverage"], transparent, surface)
+    return build.mix_shaders(0.0, surface, exported.outputs["Emission"])
 
 
-def new_anisotropy_material(name: str, image: bpy.types.Image, uv_map: str) -> bpy.types.Material:
-    """Create a metal that is brushed along the directions of an anisotropy map.
+def brushed_metal_shader(
+    build: NodeBuilder, image_node: bpy.types.Node, uv_map: str
+) -> bpy.types.NodeSocket:
+    """Add a metal that is brushed along the directions of an anisotropy map.
 
     Nodes and links are those that Blender's importer of glTF makes, in front of which the direction is mirrored
     where the UV map is. So its exporter recognizes the map.
 
     Parameters
     ----------
-    name : str
-    image : bpy.types.Image
-        From `surface_texture.direction_maps`.
+    build : NodeBuilder
+    image_node : bpy.types.Node
+        Of an image from `surface_texture.direction_maps`.
     uv_map : str
         Name of the UV map.
     """
-    material, build = new_empty_material(name)
-    tree = build.tree
-    image_node = _image_on_map(build, image, uv_map)
-    decoded = build("ShaderNodeVectorMath", operation="MULTIPLY_ADD")
-    decoded.inputs[1].default_value, decoded.inputs[2].default_value = (2, 2, 1), (-1, -1, 0)
-    tree.links.new(image_node.outputs["Color"], decoded.inputs[0])
-    component = build("ShaderNodeSeparateXYZ")
-    tree.links.new(decoded.outputs["Vector"], component.inputs[0])
-    angle = build("ShaderNodeMath", operation="ARCTAN2")
-    tree.links.new(component.outputs["X"], angle.inputs[1])
-    tangent = build("ShaderNodeTangent", direction_type="UV_MAP", uv_map=uv_map)
-    tree.links.new(_along_bitangent(build, decoded, tangent, uv_map), angle.inputs[0])
+    color = image_node.outputs["Color"]
+    decoded = build.vector_math("MULTIPLY_ADD", color, (2, 2, 1), (-1, -1, 0))
+    x, _, length = build("ShaderNodeSeparateXYZ", {0: decoded}).outputs
+    tangent = build("ShaderNodeTangent", direction_type="UV_MAP", uv_map=uv_map).outputs["Tangent"]
+    angle = build.math("ARCTAN2", _along_bitangent(build, decoded, tangent, uv_map), x)
     # Highlights are drawn out along the tangent, and across the strokes of a brush.
-    rotation = build.math("ADD", angle.outputs[0], np.pi / 2)
+    rotation = build.math("ADD", angle, np.pi / 2)
     rotation.node.label = "Rotation"
-    strength = build.math("MULTIPLY", component.outputs["Z"], ANISOTROPY)
+    strength = build.math("MULTIPLY", length, ANISOTROPY)
     strength.node.label = "Strength"
-    shader, output = build("ShaderNodeBsdfPrincipled"), build("ShaderNodeOutputMaterial")
-    shader.inputs["Metallic"].default_value = 1.0
-    shader.inputs["Roughness"].default_value = BRUSHED_ROUGHNESS
-    turns = build.math("DIVIDE", rotation, 2 * np.pi)
-    for socket, name in (
-        (strength, "Anisotropic"),
-        (turns, "Anisotropic Rotation"),
-        (tangent.outputs["Tangent"], "Tangent"),
-    ):
-        tree.links.new(socket, shader.inputs[name])
-    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
-    return material
+    inputs = {
+        "Metallic": 1.0,
+        "Roughness": BRUSHED_ROUGHNESS,
+        "Anisotropic": strength,
+        "Anisotropic Rotation": build.math("DIVIDE", rotation, 2 * np.pi),
+        "Tangent": tangent,
+    }
+    return build("ShaderNodeBsdfPrincipled", inputs).outputs["BSDF"]
 
 
 def _along_bitangent(
-    build: NodeBuilder, decoded: bpy.types.Node, tangent: bpy.types.Node, uv_map: str
+    build: NodeBuilder, decoded: bpy.types.NodeSocket, tangent: bpy.types.NodeSocket, uv_map: str
 ) -> bpy.types.NodeSocket:
     """Add nodes for the component along the bitangent. Blender turns to the left where the map is mirrored, too."""
-    links = build.tree.links
     # In the tangent space of the map, this color is the bitangent.
-    bitangent = build("ShaderNodeNormalMap", uv_map=uv_map)
-    bitangent.inputs["Color"].default_value = (0.5, 1.0, 0.5, 1.0)
-    left, normal = (
-        build("ShaderNodeVectorMath", operation="CROSS_PRODUCT"),
-        build("ShaderNodeNewGeometry"),
-    )
-    links.new(normal.outputs["Normal"], left.inputs[0])
-    links.new(tangent.outputs["Tangent"], left.inputs[1])
-    handedness = build("ShaderNodeVectorMath", operation="DOT_PRODUCT")
-    links.new(left.outputs["Vector"], handedness.inputs[0])
-    links.new(bitangent.outputs["Normal"], handedness.inputs[1])
-    mirrored = build("ShaderNodeVectorMath", operation="SCALE")
-    links.new(decoded.outputs["Vector"], mirrored.inputs[0])
-    links.new(build.math("SIGN", handedness.outputs["Value"]), mirrored.inputs["Scale"])
-    component = build("ShaderNodeSeparateXYZ")
-    links.new(mirrored.outputs["Vector"], component.inputs[0])
-    return component.outputs["Y"]
-
-
-def _image_on_map(build: NodeBuilder, image: bpy.types.Image, uv_map: str) -> bpy.types.Node:
-    """Add the node of an image on a UV map."""
-    coordinates = build("ShaderNodeUVMap", uv_map=uv_map)
-    image_node = build("ShaderNodeTexImage", image=image)
-    build.tree.links.new(coordinates.outputs["UV"], image_node.inputs["Vector"])
-    return image_node
+    bitangent = build("ShaderNodeNormalMap", {"Color": (0.5, 1.0, 0.5, 1.0)}, uv_map=uv_map)
+    normal = build("ShaderNodeNewGeometry").outputs["Normal"]
+    left = build.vector_math("CROSS_PRODUCT", normal, tangent)
+    handedness = build.vector_math("DOT_PRODUCT", left, bitangent.outputs["Normal"])
+    mirrored = build.scaled(decoded, build.math("SIGN", handedness))
+    return build("ShaderNodeSeparateXYZ", {0: mirrored}).outputs["Y"]

@@ -7,7 +7,7 @@ material slots and modifiers are not changed. Its record is among those of the p
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import partial
 
 import bpy
 import numpy as np
@@ -16,10 +16,9 @@ from ..cache import Cache
 from ..errors import RosyError
 from ..image_io.image_data import ImageData
 from ..projection.gbuffer import MeshInstance
-from .bake_records import DrawnFrom, TextureSource, recorded_materials, store_record
+from .bake_records import DrawnFrom, recorded_materials, store_record
 from .blender_images import new_image, new_tiled_image
 from .file_names import picture_stem
-from .hatching_nodes import hatching_group
 from .meshes import evaluated_mesh, read_uvs
 from .owned_data import delete_unused, rollback_on_error
 from .picture_nodes import new_group, set_picture_modifier
@@ -29,28 +28,11 @@ from .read_request import ReadRequest, nonfinite_policy
 from .scene_reader import read_scene
 from .texture_nodes import (
     Hatching,
-    new_anisotropy_material,
-    new_hatching_material,
+    brushed_metal_shader,
+    color_shader,
+    hatching_shader,
     new_texture_material,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class TextureInput:
-    """What a texture is drawn from.
-
-    Attributes
-    ----------
-    instance : MeshInstance
-        With a field, in world space. If the object has several instances, one of them.
-    uv : (C, 2) float32 ndarray
-        u and v at its corners.
-    source : TextureSource
-    """
-
-    instance: MeshInstance
-    uv: np.ndarray
-    source: TextureSource
 
 
 def uv_map_name(obj: bpy.types.Object) -> str:
@@ -73,36 +55,44 @@ def read_texture_input(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     obj: bpy.types.Object,
-    cache: Cache | None = None,
-    color_attribute: str | None = None,
-) -> TextureInput:
+    uv_map: str,
+    cache: Cache,
+    color_attribute: str | None,
+) -> tuple[MeshInstance, np.ndarray]:
     """Read an object with a field, and the UV map of its texture, as it is evaluated.
 
     If `color_attribute` is given, the numbers of this attribute are read for the color map.
 
+    Returns
+    -------
+    instance : MeshInstance
+        With a field, in world space. If the object has several instances, one of them.
+    uv : (C, 2) float32 ndarray
+        u and v at its corners.
+
     Raises
     ------
     RosyError
-        If there is no field, no UV map or no such attribute, or a modifier loses one of them.
+        If there is no field or no such attribute, or a modifier loses one of them or the UV map.
     """
-    name = uv_map_name(obj)
     request = ReadRequest(nonfinite_policy(scene), color_attribute=color_attribute)
     instance = read_scene(depsgraph, [obj], request, cache).instances[0]
     with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
-        uv = read_uvs(mesh, name, f"object '{obj.name}'", "the texture")
-    return TextureInput(instance, uv, TextureSource(obj, name))
+        uv = read_uvs(mesh, uv_map, f"object '{obj.name}'", "the texture")
+    return instance, uv
 
 
 def apply_texture(
     scene: bpy.types.Scene,
-    source: TextureSource,
+    obj: bpy.types.Object,
+    uv_map: str,
     tiles: Mapping[int, ImageData],
     settings: OutputSettings,
     state: PictureState,
-    content: str = "look",
-    hatching: Hatching | None = None,
+    content: str,
+    hatching: Hatching | None,
     *,
-    is_udim: bool = False,
+    is_udim: bool,
 ) -> bpy.types.Image:
     """Show a texture on its object, and return its image. An older one is replaced.
 
@@ -111,14 +101,16 @@ def apply_texture(
     Parameters
     ----------
     scene : bpy.types.Scene
-    source : TextureSource
+    obj : bpy.types.Object
+    uv_map : str
+        Name of the UV map.
     tiles : mapping of int to ImageData
         One picture, or UDIM tiles by their numbers.
     settings : OutputSettings
     state : PictureState
     content : str
         What the image shows; see `surface_texture.draw.CONTENTS`.
-    hatching : Hatching, optional
+    hatching : Hatching or None
         How hatching is drawn, if the image has thresholds of ink and not colors.
     is_udim : bool
         Whether the image has UDIM tiles.
@@ -128,7 +120,6 @@ def apply_texture(
     RosyError
         If the file cannot be written.
     """
-    obj = source.obj
     name = f"RoSy {obj.name}"
     stem = None
     if settings.folder is not None:
@@ -143,22 +134,17 @@ def apply_texture(
         else:
             image = new_image(name, first, **arguments)
         created.append(image)
+        add_shader = color_shader
         if content == "anisotropy":
-            material = new_anisotropy_material(name, image, source.uv_map)
-        elif hatching is None:
-            material = new_texture_material(name, image, source.uv_map)
-        else:
-            group, is_new = hatching_group()
-            if is_new:
-                created.append(group)
-            material = new_hatching_material(name, image, source.uv_map, group, hatching)
+            add_shader = partial(brushed_metal_shader, uv_map=uv_map)
+        elif hatching is not None:
+            add_shader = partial(hatching_shader, hatching=hatching, created=created)
+        material = new_texture_material(name, image, uv_map, add_shader)
         created.append(material)
         node_group = new_group(name, material, None)
         created.append(node_group)
-    size = first.width, first.height
-    store_record(
-        scene, obj.name, image, material, DrawnFrom(source, {None: state}, "cpu"), size=size
-    )
+    drawn_from = DrawnFrom(obj, {None: state}, "cpu", is_texture=True)
+    store_record(scene, obj.name, image, material, drawn_from, size=(first.width, first.height))
     # The object keeps its pictures, but no other texture.
     set_picture_modifier(obj, node_group, recorded_materials(textures=False))
     delete_unused()

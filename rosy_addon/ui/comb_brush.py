@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import gpu
 import numpy as np
 from bpy_extras.view3d_utils import (
     region_2d_to_location_3d,
     region_2d_to_origin_3d,
     region_2d_to_vector_3d,
 )
-from gpu_extras.batch import batch_for_shader
 from gpu_extras.presets import draw_circle_2d
 from mathutils import Vector
 
@@ -25,6 +23,7 @@ from ..scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
 from ..scene.meshes import mesh_surface, read_attribute
 from ..viewport import session
+from .view_lines import draw_lines, to_pixels
 
 #: Color of the cursor, and those of dashes on faces without and with a firm guide.
 CURSOR_COLOR = (1.0, 1.0, 1.0, 0.8)
@@ -80,10 +79,11 @@ class BrushMouse:
         if is_face_vector_field(mesh, GUIDE_ATTRIBUTE):
             guides = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
             is_guided = np.linalg.norm(guides[face], axis=1) > STROKE_FIRMNESS
-        matrix = np.array(self._view.perspective_matrix @ self._obj.matrix_world)
-        clip = ends @ matrix[:, :3].T + matrix[:, 3]
-        size = np.array([self._region.width, self._region.height])
-        return (clip[..., :2] / np.maximum(clip[..., 3:], 1e-6) + 1) / 2 * size, is_guided
+        matrix = np.array(self._obj.matrix_world)
+        world = ends @ matrix[:3, :3].T + matrix[:3, 3]
+        pixels = to_pixels(self._region, self._view, world)
+        is_visible = np.isfinite(pixels).all(axis=(1, 2))
+        return pixels[is_visible], is_guided[is_visible]
 
 
 class _Cursor:
@@ -118,22 +118,12 @@ class _Cursor:
 
 
 #: Emptied by `unregister`.
-_CURSOR = _Cursor()
-
-
-def start_stroke(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
-    """Return the places on an object, which stay until `end_stroke`."""
-    return _CURSOR.hold(context, obj)
-
-
-def end_stroke() -> None:
-    """Let the cursor read the object again."""
-    _CURSOR.release()
+CURSOR = _Cursor()
 
 
 def unregister() -> None:
     """Forget the object, and stop watching for changes."""
-    _CURSOR.release()
+    CURSOR.release()
     for handlers, handler in _app_handlers():
         if handler in handlers:
             handlers.remove(handler)
@@ -152,13 +142,13 @@ def _app_handlers() -> list[tuple[Any, Any]]:
 
 def _after_change(*_: Any) -> None:
     """Read the object again at the next redraw of the cursor."""
-    if not _CURSOR.is_held:
-        _CURSOR.release()
+    if not CURSOR.is_held:
+        CURSOR.release()
 
 
 def _before_other_data(*_: Any) -> None:
     """Forget the object, which will not exist any more."""
-    _CURSOR.release()
+    CURSOR.release()
 
 
 def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
@@ -167,24 +157,6 @@ def draw_settings(layout: bpy.types.UILayout, settings: Any) -> None:
     layout.prop(settings, "reach")
     layout.prop(settings, "front_faces")
     layout.row(heading="Mirror").prop(settings, "mirror", toggle=True, text="")
-
-
-def _draw_dashes(
-    ends: np.ndarray, color: tuple[float, ...], offset: tuple[int, int], scale: float
-) -> None:
-    """Draw lines between (K, 2, 2) positions in the region."""
-    if not len(ends):
-        return
-    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    shader.bind()
-    shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
-    shader.uniform_float("lineWidth", DASH_WIDTH * scale)
-    shader.uniform_float("color", color)
-    points = ends.reshape(-1, 2) + np.array(offset)
-    points_3d = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
-    gpu.state.blend_set("ALPHA")
-    batch_for_shader(shader, "LINES", {"pos": points_3d}).draw(shader)
-    gpu.state.blend_set("NONE")
 
 
 class CombTool:
@@ -242,13 +214,14 @@ class CombTool:
         if obj is None or not has_field(obj) or session.is_live(context.space_data):
             return
         with suppress(RosyError):  # combing reports it
-            places = _CURSOR.mouse_of(context, obj)
+            places = CURSOR.mouse_of(context, obj)
             place = places.place((mouse[0] - region.x, mouse[1] - region.y))
             if place is not None:
                 ends, is_guided = places.dashes(place, 1.5 * places.radius(place, comb.size))
-                scale = context.preferences.system.ui_scale
+                ends = ends + (region.x, region.y)
+                width = DASH_WIDTH * context.preferences.system.ui_scale
                 for chosen, color in ((~is_guided, FREE_COLOR), (is_guided, GUIDED_COLOR)):
-                    _draw_dashes(ends[chosen], color, (region.x, region.y), scale)
+                    draw_lines("LINES", ends[chosen].reshape(-1, 2), color, width)
 
 
 class VIEW3D_TOOL_rosy_comb(CombTool, bpy.types.WorkSpaceTool):

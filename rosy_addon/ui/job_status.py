@@ -1,8 +1,36 @@
-"""The progress of the running job, for the panels."""
+"""The progress of the running job, for the panels, and the start of the helper that computes.
+
+The helper starts before the first job, so that no click waits for it.
+"""
 
 from __future__ import annotations
 
+from contextlib import suppress
+
+import bpy
+
+from ..worker.helper import HELPER, HelperLostError
 from ..worker.job import Step
+from .preferences import uses_helper
 
 #: How far the job has come that runs in a window; None if there is none.
 current: Step | None = None
+
+_has_started = False
+
+
+def start_helper_once(context: bpy.types.Context) -> None:
+    """Start the helper at the first call, unless the preferences switch it off."""
+    global _has_started
+    if _has_started or bpy.app.background or not uses_helper(context):
+        return
+    _has_started = True
+    with suppress(HelperLostError):
+        HELPER.start()
+
+
+def unregister() -> None:
+    """End the helper, and forget the job."""
+    global current, _has_started
+    HELPER.close()
+    current, _has_started = None, False

@@ -1,18 +1,24 @@
-"""The panels of the look of pictures: presets, the settings of a look, and output."""
+"""The panels of the look of pictures: presets, the settings of a look, output, and the key in renders."""
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ..compositor.look import Look, colors_values, is_hatched
+from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
+from ..compositor.picture_key import fixed_color_range
 from ..errors import as_sentence
 from ..settings import Setting, Switch, panel_settings, settings_of
 from . import preset_library
-from .sidebar import SidebarPanel, draw_cycles_hint, use_property_columns
+from .sidebar import (
+    SidebarPanel,
+    draw_cycles_hint,
+    draw_wrapped,
+    use_property_columns,
+    wrap_to_sidebar,
+)
 
 #: Labels of the panels of a look's settings by their keys, from top to bottom.
 LOOK_PANELS = {
@@ -55,6 +61,9 @@ TONE_SOURCE_OF_SETTING = {
     "tone_picture": "picture",
 }
 
+#: The parts of a key, and the settings of each.
+KEY_PARTS = {"key_bar": ("key_title",), "key_legend": ("key_counts",), "key_scale": ()}
+
 #: Properties that hold a name in a collection of the active mesh, with that collection.
 SEARCH_COLLECTIONS = {
     "color_attribute": "attributes",
@@ -87,7 +96,7 @@ class VIEW3D_PT_rosy_look(SidebarPanel, bpy.types.Panel):
         if entry is not None:
             lines = column.column(align=True)
             lines.scale_y, lines.active = 0.8, False
-            for line in _wrap_to_sidebar(entry.preset.description, context):
+            for line in wrap_to_sidebar(entry.preset.description, context):
                 lines.label(text=line)
 
 
@@ -121,12 +130,6 @@ class VIEW3D_MT_rosy_presets(bpy.types.Menu):
         export.preset = settings.preset_name
         for error in preset_library.load_errors():
             layout.label(text=as_sentence(error), icon="ERROR")
-
-
-def _wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
-    """Return a text as lines that fit into the sidebar."""
-    char_width = 6.5 * context.preferences.system.ui_scale  # pixels, average
-    return textwrap.wrap(text, max(int(context.region.width / char_width) - 6, 12))
 
 
 def _make_settings_panel(
@@ -230,6 +233,45 @@ def _draw_tone_source(column: bpy.types.UILayout, context: bpy.types.Context) ->
             _draw_name(row, owner, name, mesh_object)
 
 
+class VIEW3D_PT_rosy_look_key(SidebarPanel, bpy.types.Panel):
+    """What explains a picture in renders."""
+
+    bl_label = "Key"
+    bl_parent_id = "VIEW3D_PT_rosy_look"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.rosy, "key", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.rosy
+        use_property_columns(layout)
+        layout.active = settings.key
+        column = layout.column()
+        for part, names in KEY_PARTS.items():
+            column.prop(settings, part)
+            for name in names:
+                row = column.row()
+                row.active = getattr(settings, part)
+                row.prop(settings, name)
+        column.prop(settings, "key_caption")
+        column.prop(settings, "key_size")
+        if settings.key and settings.key_bar and _range_may_differ(settings):
+            draw_wrapped(
+                layout,
+                context,
+                ["For numbers on the color bar of animations, set Color > Top Value"],
+            )
+
+
+def _range_may_differ(settings: bpy.types.PropertyGroup) -> bool:
+    """Whether a scene has an animation whose frames may have ranges of their own."""
+    look = settings.look
+    is_animated = any(record.frames for record in settings.bakes)
+    has_colors = colors_magnitude(look) or colors_values(look)
+    return is_animated and has_colors and fixed_color_range(look) is None
+
+
 CLASSES = (
     VIEW3D_MT_rosy_presets,
     VIEW3D_PT_rosy_look,
@@ -241,4 +283,5 @@ CLASSES = (
     _make_settings_panel(
         "Advanced", "VIEW3D_PT_rosy", "advanced", panel_settings(Look, ""), ("undefined",)
     ),
+    VIEW3D_PT_rosy_look_key,
 )

@@ -16,18 +16,15 @@ from ..scene.visible_objects import field_objects
 from ..viewport import session
 from ..viewport.view3d import redraw
 from . import job_status, overlay
-from .generator_settings import generator_setting_names
-from .helper_start import start_helper_once
+from .operator_settings import draw_convert_settings, draw_generator_settings, draw_settings
 from .sidebar import (
     SidebarPanel,
+    closed_panel,
     draw_cycles_hint,
     draw_progress,
     draw_wrapped,
     use_property_columns,
 )
-
-#: Placeholder texts of empty settings of the generator.
-PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
 
 #: Types of shading in which a 3D view does not show the pictures.
 SHADING_WITHOUT_MATERIALS = ("WIREFRAME", "SOLID")
@@ -39,7 +36,7 @@ class VIEW3D_PT_rosy(SidebarPanel, bpy.types.Panel):
     bl_label = "RoSy"
 
     def draw(self, context: bpy.types.Context) -> None:
-        start_helper_once(context)
+        job_status.start_helper_once(context)
         layout = self.layout
         use_property_columns(layout)
         objects = field_objects(context.view_layer)
@@ -79,30 +76,19 @@ def _draw_existing_field(
         "rosy.singularities", text="Singularities", icon="OVERLAY", depress=is_shown
     )
     button.show = "NONE" if is_shown else "OVERLAY"
-    header, body = layout.panel("rosy_convert_field", default_closed=True)
-    header.label(text="Convert")
-    if body is not None:
+    if (body := closed_panel(layout, "convert_field", "Convert")) is not None:
         _draw_convert_settings(body, context)
     other_fields = other_field_names(mesh)
-    if other_fields:
-        header, body = layout.panel("rosy_compare_field", default_closed=True)
-        header.label(text="Compare")
-        if body is not None:
-            _draw_compare_settings(body, context, other_fields)
-    header, body = layout.panel("rosy_another_field", default_closed=True)
-    header.label(text="Make Another Field")
-    if body is not None:
+    if other_fields and (body := closed_panel(layout, "compare_field", "Compare")) is not None:
+        _draw_compare_settings(body, context, other_fields)
+    if (body := closed_panel(layout, "another_field", "Make Another Field")) is not None:
         _draw_new_field(body, context)
 
 
 def _draw_convert_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings and the button of the conversion, and the menu of storage formats."""
     settings = context.window_manager.operator_properties_last("rosy.field_convert")
-    column = layout.column()
-    for name in ("new_degree", "angle", "smooth", "pair_distance", "magnitude"):
-        column.prop(settings, name)
-    if settings.magnitude == "values":
-        column.prop(settings, "values")
+    draw_convert_settings(layout.column(), settings)
     layout.operator("rosy.field_convert")
     layout.operator_menu_enum("rosy.field_store", "form", text="Store As")
 
@@ -112,20 +98,15 @@ def _draw_compare_settings(
 ) -> None:
     """Draw the settings and the button of the comparison with another field."""
     settings = context.window_manager.operator_properties_last("rosy.field_compare")
-    column = layout.column()
-    column.prop(settings, "other", placeholder=other_fields[0] if len(other_fields) == 1 else "")
-    column.prop(settings, "use_as_color")
+    only_other = other_fields[0] if len(other_fields) == 1 else ""
+    draw_settings(layout.column(), settings, "other", "use_as_color", other=only_other)
     layout.operator("rosy.field_compare")
 
 
 def _draw_new_field(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings of the generator and the buttons that make or import a field."""
     settings = context.window_manager.operator_properties_last("rosy.field_generate")
-    column = layout.column()
-    column.prop(settings, "kind")
-    column.prop(settings, "degree")
-    for name in generator_setting_names(settings):
-        column.prop(settings, name, placeholder=PLACEHOLDERS.get(name, ""))
+    draw_generator_settings(layout.column(), settings)
     row = layout.row()
     row.scale_y = 1.5
     row.operator("rosy.field_generate", icon="FORCE_VORTEX")
@@ -195,9 +176,7 @@ def bake_label(bake_infos: list[BakeInfo]) -> str:
 
 def _draw_texture_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the settings and the button of textures."""
-    header, body = layout.panel("rosy_texture", default_closed=True)
-    header.label(text="Texture")
-    if body is None:
+    if (body := closed_panel(layout, "texture", "Texture")) is None:
         return
     obj = context.view_layer.objects.active
     column = body.column()

@@ -28,51 +28,38 @@ DOT_DIAMETER = 9.0
 SURFACE_OFFSET = 0.004
 
 
-class _Overlay:
-    """The singularities that are shown, by the names of their objects, and the draw handlers."""
+#: The singularities that are shown, by the names of their objects. Emptied by `hide`, which `unregister` calls.
+_SINGULARITIES: dict[str, Singularities] = {}
 
-    def __init__(self) -> None:
-        self.singularities: dict[str, Singularities] = {}
-        self.handlers: list[Any] = []
-
-    def add_handlers(self) -> None:
-        """Start drawing."""
-        for handlers, handler in _app_handlers():
-            if handler not in handlers:
-                handlers.append(handler)
-        if not self.handlers and not bpy.app.background:
-            add = bpy.types.SpaceView3D.draw_handler_add
-            self.handlers.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
-            self.handlers.append(add(_draw_labels, (), "WINDOW", "POST_PIXEL"))
-
-    def remove_handlers(self) -> None:
-        """Stop drawing."""
-        for handlers, handler in _app_handlers():
-            if handler in handlers:
-                handlers.remove(handler)
-        while self.handlers:
-            bpy.types.SpaceView3D.draw_handler_remove(self.handlers.pop(), "WINDOW")
-
-
-#: Emptied by `hide`, which `unregister` calls.
-_OVERLAY = _Overlay()
+#: The draw handlers, while something is shown.
+DRAW_HANDLERS: list[Any] = []
 
 
 def show(object_name: str, singularities: Singularities) -> None:
     """Show the singularities of an object, in place of those shown before."""
-    _OVERLAY.singularities[object_name] = singularities
-    _OVERLAY.add_handlers()
+    _SINGULARITIES[object_name] = singularities
+    for handlers, handler in _app_handlers():
+        if handler not in handlers:
+            handlers.append(handler)
+    if not DRAW_HANDLERS and not bpy.app.background:
+        add = bpy.types.SpaceView3D.draw_handler_add
+        DRAW_HANDLERS.append(add(_draw_dots, (), "WINDOW", "POST_VIEW"))
+        DRAW_HANDLERS.append(add(_draw_labels, (), "WINDOW", "POST_PIXEL"))
     redraw()
 
 
 def hide(object_name: str | None = None) -> None:
     """Hide the singularities of an object, or of all objects if no name is given."""
     if object_name is None:
-        _OVERLAY.singularities.clear()
+        _SINGULARITIES.clear()
     else:
-        _OVERLAY.singularities.pop(object_name, None)
-    if not _OVERLAY.singularities:
-        _OVERLAY.remove_handlers()
+        _SINGULARITIES.pop(object_name, None)
+    if not _SINGULARITIES:
+        for handlers, handler in _app_handlers():
+            if handler in handlers:
+                handlers.remove(handler)
+        while DRAW_HANDLERS:
+            bpy.types.SpaceView3D.draw_handler_remove(DRAW_HANDLERS.pop(), "WINDOW")
     redraw()
 
 
@@ -81,7 +68,7 @@ def refresh(context: bpy.types.Context, meshes: Container[bpy.types.Mesh]) -> No
 
     They are hidden if they cannot be read, for example because a modifier loses the field.
     """
-    for name, shown_before in list(_OVERLAY.singularities.items()):
+    for name, shown_before in list(_SINGULARITIES.items()):
         obj = context.view_layer.objects.get(name)
         if obj is None or obj.data not in meshes:
             continue
@@ -115,17 +102,12 @@ def _read_again(*_: Any) -> None:
 
 def is_shown(object_name: str) -> bool:
     """Return whether the singularities of an object are shown."""
-    return object_name in _OVERLAY.singularities
+    return object_name in _SINGULARITIES
 
 
 def shown(object_name: str) -> Singularities | None:
     """Return the singularities of an object that are shown, or None."""
-    return _OVERLAY.singularities.get(object_name)
-
-
-def has_handlers() -> bool:
-    """Return whether there are draw handlers."""
-    return bool(_OVERLAY.handlers)
+    return _SINGULARITIES.get(object_name)
 
 
 def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
@@ -133,7 +115,7 @@ def _visible_singularities() -> list[tuple[bpy.types.Object, Singularities]]:
     view_layer = bpy.context.view_layer
     candidates = (
         (view_layer.objects.get(name), singularities)
-        for name, singularities in _OVERLAY.singularities.items()
+        for name, singularities in _SINGULARITIES.items()
     )
     return [
         (obj, singularities)

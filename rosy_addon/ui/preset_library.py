@@ -114,11 +114,6 @@ def load_errors() -> list[str]:
     return _LIBRARY.load_errors
 
 
-def preset_keys() -> list[str]:
-    """Return the keys of all presets."""
-    return list(entries())
-
-
 def user_preset_keys() -> list[str]:
     """Return the keys of the user's own presets."""
     return [key for key, entry in entries().items() if entry.is_user]
@@ -132,7 +127,7 @@ def preset_name(key: str) -> str:
 
 def search_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:
     """Return the keys of all presets, for the search of a text property."""
-    return preset_keys()
+    return list(entries())
 
 
 def search_user_presets(_owner: Any, _context: Any, _typed: str) -> list[str]:

@@ -70,6 +70,14 @@ COLOR_ARGUMENTS = {
     "max": 1,
     "default": (0.0, 0.0, 0.0),
 }
+BRUSH_STRENGTH = {
+    "name": "Strength",
+    "description": "How much of its effect the brush has",
+    "subtype": "FACTOR",
+    "min": 0.0,
+    "max": 1.0,
+    "default": 1.0,
+}
 TEXTURE_CONTENT_ITEMS = [(name.upper(), name.capitalize(), text) for name, text in CONTENTS.items()]
 IMAGE_FORMAT_ITEMS = [
     ("BYTE", "8-Bit sRGB", "Display values in a .png file: small, and readable by most programs"),
@@ -90,9 +98,7 @@ def _setting_property(setting: Setting) -> Any:
             return bpy.props.EnumProperty(items=items, **arguments)
         case Color():
             arguments["default"] = from_hex(setting.default).tolist()
-            return bpy.props.FloatVectorProperty(
-                subtype="COLOR_GAMMA", size=3, min=0, max=1, **arguments
-            )
+            return bpy.props.FloatVectorProperty(**COLOR_ARGUMENTS | arguments)
         case Switch():
             return bpy.props.BoolProperty(**arguments)
         case Number(low=low, high=high, is_integer=True):
@@ -252,14 +258,7 @@ class RosyComb(bpy.types.PropertyGroup):
         soft_max=500,
         default=50,
     )
-    strength: bpy.props.FloatProperty(
-        name="Strength",
-        description="How much of its effect the brush has",
-        subtype="FACTOR",
-        min=0.0,
-        max=1.0,
-        default=1.0,
-    )
+    strength: bpy.props.FloatProperty(**BRUSH_STRENGTH)
 
 
 class RosyScene(bpy.types.PropertyGroup):

@@ -5,9 +5,7 @@ from __future__ import annotations
 import bpy
 
 from . import (
-    helper_start,
     job_status,
-    key_panel,
     live_views,
     look_panels,
     main_panel,
@@ -19,7 +17,7 @@ from . import (
 )
 
 #: Modules with classes to register. Panels are shown in this order.
-MODULES = (preferences, main_panel, look_panels, key_panel, strokes_panel)
+MODULES = (preferences, main_panel, look_panels, strokes_panel)
 
 
 def register() -> None:
@@ -44,5 +42,4 @@ def unregister() -> None:
     properties.unregister()
     preset_library.unregister()
     overlay.hide()
-    job_status.current = None
-    helper_start.unregister()
+    job_status.unregister()

@@ -39,14 +39,23 @@ def draw_wrapped(
     icon: str = "INFO",
 ) -> None:
     """Draw messages as sentences, each in as many lines as the width of the region needs."""
-    width = context.region.width / context.preferences.system.ui_scale - MARGIN_PIXELS
     for message in messages:
         column = layout.column(align=True)
-        rows = textwrap.wrap(
-            as_sentence(message), max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS)
-        )
-        for index, row in enumerate(rows):
+        for index, row in enumerate(wrap_to_sidebar(as_sentence(message), context)):
             column.label(text=row, icon="BLANK1" if index else icon)
+
+
+def wrap_to_sidebar(text: str, context: bpy.types.Context) -> list[str]:
+    """Return a text as rows that fit into the region."""
+    width = context.region.width / context.preferences.system.ui_scale - MARGIN_PIXELS
+    return textwrap.wrap(text, max(int(width / CHARACTER_PIXELS), MIN_CHARACTERS))
+
+
+def closed_panel(layout: bpy.types.UILayout, key: str, title: str) -> bpy.types.UILayout | None:
+    """Add a panel that is closed at first. Return its layout; None while it is closed."""
+    header, body = layout.panel(f"rosy_{key}", default_closed=True)
+    header.label(text=title)
+    return body
 
 
 def draw_progress(layout: bpy.types.UILayout) -> None:

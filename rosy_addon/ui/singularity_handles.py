@@ -10,10 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import gpu
 import numpy as np
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
-from gpu_extras.batch import batch_for_shader
 
 from ..errors import RosyError
 from ..scene.field_attributes import has_field
@@ -22,6 +20,7 @@ from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singu
 from ..viewport.singularity_dots import is_occluded
 from ..viewport.view3d import redraw
 from . import overlay
+from .view_lines import draw_lines, to_pixels
 
 #: Distance in pixels from the mouse up to which a handle is grabbed.
 GRAB_DISTANCE = 16.0
@@ -73,13 +72,13 @@ class Drag:
         context = bpy.context
         if context.region != self._region:
             return
-        points = _to_pixels(context, _to_world(self._obj, self._ends))
+        points = to_pixels(context.region, context.region_data, _to_world(self._obj, self._ends))
         angle = np.linspace(0, 2 * np.pi, RING_SEGMENTS + 1)
         ring = RING_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-        ring *= context.preferences.system.ui_scale
-        _draw_line(context, points[-1] + ring)
-        if len(points) > 1:
-            _draw_line(context, points)
+        scale = context.preferences.system.ui_scale
+        for line in (points[-1] + scale * ring, points):
+            if np.isfinite(line).all():
+                draw_lines("LINE_STRIP", line, RING_COLOR, LINE_WIDTH * scale)
 
 
 def start_drag(
@@ -148,7 +147,8 @@ def _handle_under(
     shown = overlay.shown(obj.name)
     assert shown is not None and shown.vertex is not None
     points = overlay.offset_points(obj, shown)
-    distance = np.linalg.norm(_to_pixels(context, points) - np.array(mouse), axis=1)
+    pixels = to_pixels(context.region, context.region_data, points)
+    distance = np.linalg.norm(pixels - np.array(mouse), axis=1)
     reach = GRAB_DISTANCE * context.preferences.system.ui_scale
     for position in np.argsort(distance):
         if not distance[position] <= reach:
@@ -162,32 +162,6 @@ def _to_world(obj: bpy.types.Object, points: np.ndarray) -> np.ndarray:
     """(K, 3) points of object space in world space."""
     matrix = np.array(obj.matrix_world)
     return points @ matrix[:3, :3].T + matrix[:3, 3]
-
-
-def _to_pixels(context: bpy.types.Context, points: np.ndarray) -> np.ndarray:
-    """(K, 2) positions in the region of (K, 3) points of world space; infinite behind the camera."""
-    matrix = np.array(context.region_data.perspective_matrix)
-    clip = points @ matrix[:, :3].T + matrix[:, 3]
-    size = np.array([context.region.width, context.region.height])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        pixels = (clip[:, :2] / clip[:, 3:] + 1) / 2 * size
-    pixels[clip[:, 3] <= 0] = np.inf
-    return pixels
-
-
-def _draw_line(context: bpy.types.Context, points: np.ndarray) -> None:
-    """Draw a line through (n, 2) positions in the region."""
-    if not np.isfinite(points).all():
-        return
-    shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    shader.bind()
-    shader.uniform_float("viewportSize", (context.region.width, context.region.height))
-    shader.uniform_float("lineWidth", LINE_WIDTH * context.preferences.system.ui_scale)
-    shader.uniform_float("color", RING_COLOR)
-    points_3d = np.column_stack([points, np.zeros(len(points))]).astype(np.float32)
-    gpu.state.blend_set("ALPHA")
-    batch_for_shader(shader, "LINE_STRIP", {"pos": points_3d}).draw(shader)
-    gpu.state.blend_set("NONE")
 
 
 class VIEW3D_TOOL_rosy_singularities(bpy.types.WorkSpaceTool):

@@ -8,7 +8,7 @@ from ..line_drawing.style import StrokeStyle
 from ..scene.stroke_objects import stroke_objects
 from ..settings import panel_settings, settings_of
 from . import job_status
-from .sidebar import SidebarPanel, draw_progress, use_property_columns
+from .sidebar import SidebarPanel, closed_panel, draw_progress, use_property_columns
 
 #: Icons of stroke objects by type. The type of Grease Pencil was renamed in Blender 4.3.
 STROKE_ICONS = {
@@ -51,8 +51,7 @@ class VIEW3D_PT_rosy_strokes(SidebarPanel, bpy.types.Panel):
         for title, names in STROKE_PANELS.items():
             if title == "Singularities" and settings.kind != "FILE":
                 continue
-            header, body = layout.panel(f"rosy_strokes_{title.lower()}", default_closed=True)
-            header.label(text=title)
+            body = closed_panel(layout, f"strokes_{title.lower()}", title)
             if body is not None:
                 _draw_stroke_settings(body, settings, names)
         if settings.kind == "FILE":

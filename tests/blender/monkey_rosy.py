@@ -444,7 +444,7 @@ def strokes_remove(monkey):
 
 @action(1.5, uses_rosy=True)
 def preset_apply(monkey):
-    keys = rosy("rosy_addon.ui.preset_library").preset_keys()
+    keys = list(rosy("rosy_addon.ui.preset_library").entries())
     if monkey.chance(0.3):
         bpy.context.scene.rosy.preset = monkey.pick(keys)
     else:

@@ -166,7 +166,7 @@ def singularities_as_dots():
     with in_view():
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
         bpy.ops.view3d.view_selected()
-    assert not overlay.has_handlers()
+    assert not overlay.DRAW_HANDLERS
     yield from save_screenshot("panel-5-no-singularities")
     without = count_dots("panel-5-no-singularities")
     with in_view():
@@ -176,7 +176,7 @@ def singularities_as_dots():
     assert orange > 200 and blue > 200, (orange, blue)
     with in_view():
         bpy.ops.rosy.singularities(show="NONE")
-    assert not overlay.has_handlers()
+    assert not overlay.DRAW_HANDLERS
     yield from save_screenshot("panel-7-hidden")
     assert np.abs(count_dots("panel-7-hidden") - without).max() < 100
 

@@ -150,7 +150,7 @@ def test_messages_name_the_object_and_not_its_mesh(scene):
         second.select_set(obj == second)
         for read in (
             lambda: read_mesh_field(mesh),
-            lambda: guide_vectors(mesh, "wind"),
+            lambda: guide_vectors(mesh, "wind", mesh_surface(mesh)),
             lambda: read_face_scalars(mesh, "weight"),
             lambda: marked_edges(mesh, "SHARP"),
         ):
@@ -262,7 +262,7 @@ def test_writing(scene, monkey):
 
 def test_guide_objects(scene, monkey):
     with pytest.raises(RosyError, match="has no attribute 'flow' to follow: choose a vector"):
-        guide_vectors(monkey.data, "flow")
+        guide_vectors(monkey.data, "flow", mesh_surface(monkey.data))
     spline = bpy.data.curves.new("Line", "CURVE").splines.new("POLY")
     line = link(bpy.data.objects.new("Line", bpy.data.curves["Line"]))
     spline.points.add(1)

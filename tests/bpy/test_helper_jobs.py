@@ -8,7 +8,7 @@ import pytest
 from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.bake_texture import bake_texture
-from rosy.rosy_addon.comb_field import start_stroke
+from rosy.rosy_addon.comb_field import CombStroke
 from rosy.rosy_addon.draw_strokes import draw_strokes
 from rosy.rosy_addon.field.guide_brush import GuideBrush
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
@@ -96,7 +96,7 @@ def difference(run_with, where, scene, monkey):
 def combed_field(run_with, where, scene, monkey):
     vectors = []
     for x in (-0.3, 0.3):  # the second stroke uses what the helper has kept
-        stroke = start_stroke(monkey.data, GuideBrush(0.4, 1.0, "comb", False, True), 0.1)
+        stroke = CombStroke(monkey.data, GuideBrush(0.4, 1.0, "comb", False, True), 0.1)
         points = np.stack([np.linspace(x - 0.1, x + 0.1, 5), np.full(5, -0.8), np.full(5, 0.3)])
         stroke.extend(points.T, np.ones(5))
         stroke.lift()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 
 import numpy as np
 
@@ -72,7 +73,7 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
     import bpy
 
     from rosy_addon.scene.blender_images import new_image
-    from rosy_addon.scene.texture_nodes import new_anisotropy_material
+    from rosy_addon.scene.texture_nodes import brushed_metal_shader, new_texture_material
 
     scene, obj = bpy.context.scene, bpy.context.object
     obj.data.shade_smooth()
@@ -83,7 +84,9 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
         pixels = draw_texture(instance, uv, look, TEXTURE_SIDE, content="anisotropy").rgba
         image_data = image_of_pixels(pixels, as_float=False, is_color=False)
         image = new_image("map", image_data, is_color=False)
-        material = new_anisotropy_material("metal", image, obj.data.uv_layers.active.name)
+        uv_map = obj.data.uv_layers.active.name
+        add_shader = partial(brushed_metal_shader, uv_map=uv_map)
+        material = new_texture_material("metal", image, uv_map, add_shader)
         obj.data.materials.clear()
         obj.data.materials.append(material)
         panels.append(Panel(_rendered(scene), label))

@@ -1,0 +1,229 @@
+"""Operators: apply, save, rename, delete, import and export presets of looks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy_extras.io_utils import ExportHelper, ImportHelper
+
+from ..rosy_addon.errors import RosyError
+from ..rosy_addon.preset_files.store import (
+    MAX_DESCRIPTION_LENGTH,
+    MAX_NAME_LENGTH,
+    Preset,
+    load_preset,
+    preset_key,
+    read_preset,
+    remove_preset,
+    rename_preset,
+    save_preset,
+    write_preset,
+)
+from ..rosy_addon.scene.look_properties import read_look
+from ..rosy_addon.scene.paths import user_presets_folder
+from ..rosy_addon.ui import preset_library
+from ..rosy_addon.viewport.view3d import redraw
+from .base import Condition, RosyOperator
+
+#: Arguments of properties that several operators have.
+PRESET_ARGUMENTS = {
+    "name": "Preset",
+    "description": "Name of the preset. Empty: the active preset of the scene",
+}
+DESCRIPTION_ARGUMENTS = {
+    "name": "Description",
+    "description": "What the look is like, or what it is for",
+    "maxlen": MAX_DESCRIPTION_LENGTH,
+}
+REPLACE_ARGUMENTS = {
+    "name": "Replace Existing",
+    "description": "Replace your preset of the same name",
+    "options": {"SKIP_SAVE"},
+}
+
+HAS_USER_PRESETS = Condition(
+    lambda _: preset_library.user_preset_keys(), "You have no presets yet: save one first"
+)
+
+
+def _draw_name_and_description(operator: Any) -> None:
+    """Draw the name and description of a preset in an operator's dialog."""
+    operator.layout.use_property_split = True
+    operator.layout.prop(operator, "name")
+    operator.layout.prop(operator, "sentence")
+
+
+def _target_preset(operator: Any, context: bpy.types.Context) -> str:
+    """Return the key of the preset that an operator acts on; by default the scene's."""
+    return operator.preset or context.scene.rosy.preset_name
+
+
+class ROSY_OT_preset_apply(RosyOperator, bpy.types.Operator):
+    """Replace the look of the scene with the look of this preset"""
+
+    bl_idname = "rosy.preset_apply"
+    bl_label = "Apply Preset"
+    bl_options = {"REGISTER", "UNDO"}
+
+    preset: bpy.props.StringProperty(
+        name="Preset",
+        description="Name of a preset, or path of a .json file",
+        search=preset_library.search_presets,
+        search_options={"SUGGESTION"},
+    )
+
+    def act(self, context: bpy.types.Context) -> None:
+        preset_library.apply_preset(context.scene.rosy, self.preset)
+
+
+class ROSY_OT_preset_save(RosyOperator, bpy.types.Operator):
+    """Save the look of this scene as one of your presets"""
+
+    bl_idname = "rosy.preset_save"
+    bl_label = "Save Preset"
+    bl_options = {"REGISTER"}
+
+    name: bpy.props.StringProperty(
+        name="Name", description="Name of the preset", maxlen=MAX_NAME_LENGTH
+    )
+    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
+    replace: bpy.props.BoolProperty(**REPLACE_ARGUMENTS)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        entry = preset_library.active_entry(context.scene.rosy)
+        if entry is not None and entry.is_user:
+            self.name, self.sentence = entry.preset.name, entry.preset.description
+        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Save")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_name_and_description(self)
+        if _is_user_preset(self.name):
+            self.layout.label(text="You already have a preset of this name", icon="INFO")
+            self.layout.prop(self, "replace")
+
+    def act(self, context: bpy.types.Context) -> None:
+        settings = context.scene.rosy
+        preset = Preset(self.name.strip(), self.sentence.strip(), read_look(settings))
+        settings.preset_name = save_preset(preset, user_presets_folder(), replace=self.replace)
+        self.report({"INFO"}, f"Saved preset '{preset.name}'")
+        redraw()
+
+
+def _is_user_preset(name: str) -> bool:
+    """Return whether the user has a preset of this name."""
+    try:
+        return preset_key(name) in preset_library.user_preset_keys()
+    except RosyError:
+        return False
+
+
+class ROSY_OT_preset_rename(RosyOperator, bpy.types.Operator):
+    """Change the name or the description of one of your presets"""
+
+    bl_idname = "rosy.preset_rename"
+    bl_label = "Rename Preset"
+    bl_options = {"REGISTER"}
+    conditions = (HAS_USER_PRESETS,)
+
+    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
+    name: bpy.props.StringProperty(
+        name="Name", description="New name of the preset", maxlen=MAX_NAME_LENGTH
+    )
+    sentence: bpy.props.StringProperty(**DESCRIPTION_ARGUMENTS)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        entry = preset_library.entries().get(_target_preset(self, context))
+        if entry is not None:
+            self.name, self.sentence = entry.preset.name, entry.preset.description
+        return context.window_manager.invoke_props_dialog(self, width=400, confirm_text="Rename")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        _draw_name_and_description(self)
+
+    def act(self, context: bpy.types.Context) -> None:
+        old, name = _target_preset(self, context), self.name.strip()
+        old_name = preset_library.preset_name(old)
+        new = rename_preset(old, name, self.sentence.strip(), user_presets_folder())
+        preset_library.rename_references(old, new)
+        self.report({"INFO"}, f"Renamed preset '{old_name}' to '{name}'")
+        redraw()
+
+
+class ROSY_OT_preset_remove(RosyOperator, bpy.types.Operator):
+    """Delete one of your presets. The look of the scene does not change"""
+
+    bl_idname = "rosy.preset_remove"
+    bl_label = "Delete Preset"
+    bl_options = {"REGISTER"}
+    conditions = (HAS_USER_PRESETS,)
+
+    preset: bpy.props.StringProperty(search=preset_library.search_user_presets, **PRESET_ARGUMENTS)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        name = preset_library.preset_name(_target_preset(self, context))
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title=f"Delete the preset '{name}'?",
+            message="This cannot be undone",
+            confirm_text="Delete",
+            icon="WARNING",
+        )
+
+    def act(self, context: bpy.types.Context) -> None:
+        key = _target_preset(self, context)
+        name = preset_library.preset_name(key)
+        remove_preset(key, user_presets_folder())
+        self.report({"INFO"}, f"Deleted preset '{name}'")
+        redraw()
+
+
+class ROSY_OT_preset_import(RosyOperator, bpy.types.Operator, ImportHelper):
+    """Add a preset from a file to your presets"""
+
+    bl_idname = "rosy.preset_import"
+    bl_label = "Import Preset"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".json"
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+    replace: bpy.props.BoolProperty(**REPLACE_ARGUMENTS)
+
+    def act(self, context: bpy.types.Context) -> None:
+        preset = read_preset(bpy.path.abspath(self.filepath))
+        save_preset(preset, user_presets_folder(), replace=self.replace)
+        self.report({"INFO"}, f"Added preset '{preset.name}' to your presets")
+        redraw()
+
+
+class ROSY_OT_preset_export(RosyOperator, bpy.types.Operator, ExportHelper):
+    """Write a preset to a file that others can import"""
+
+    bl_idname = "rosy.preset_export"
+    bl_label = "Export Preset"
+    bl_options = {"REGISTER"}
+
+    filename_ext = ".json"
+    filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
+    preset: bpy.props.StringProperty(search=preset_library.search_presets, **PRESET_ARGUMENTS)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.filepath = f"{Path(_target_preset(self, context)).stem}.json"
+        return ExportHelper.invoke(self, context, event)
+
+    def act(self, context: bpy.types.Context) -> None:
+        path = Path(bpy.path.abspath(self.filepath))
+        write_preset(path, load_preset(_target_preset(self, context), user_presets_folder()))
+        self.report({"INFO"}, f"Wrote {path}")
+
+
+CLASSES = (
+    ROSY_OT_preset_apply,
+    ROSY_OT_preset_save,
+    ROSY_OT_preset_rename,
+    ROSY_OT_preset_remove,
+    ROSY_OT_preset_import,
+    ROSY_OT_preset_export,
+)

@@ -7,7 +7,7 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,27 +116,6 @@ class Row:
     legend: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Page:
-    """What a figure shows, from top to bottom.
-
-    Attributes
-    ----------
-    rows : sequence of Row
-        Each may take several lines of the grid.
-    table : list of list of str
-        The first row has the titles. Empty without a table.
-    caption : str
-    scale_bar : (float, str) or None
-        Its length in pixels, and its text.
-    """
-
-    rows: Sequence[Row]
-    table: list[list[str]]
-    caption: str = ""
-    scale_bar: tuple[float, str] | None = None
-
-
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     """Return the contents of a file with figures: pages of a .pdf, or a single .svg or .png.
 
@@ -207,23 +186,6 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     return max(int(room / columns * dpi), 1)
 
 
-def draw_page(page: Page, width: float, columns: int, dpi: int) -> Figure:
-    """Draw a figure.
-
-    Parameters
-    ----------
-    page : Page
-        Its pictures have the width `panel_width`.
-    width : float
-        Inches. The height follows from the contents.
-    columns : int
-        Of the grid of panels.
-    dpi : int
-        Pixels of pictures in an inch.
-    """
-    return _Layout(page, width, columns, dpi, _figure_class()(dpi=dpi)).draw()
-
-
 @lru_cache(maxsize=1)
 def _figure_class() -> type[Figure]:
     """Return the class of figures, which notebooks show without pyplot."""
@@ -240,33 +202,70 @@ def _figure_class() -> type[Figure]:
     return NotebookFigure
 
 
-class _Layout:
-    """The places of the parts of a figure, in inches from its upper left corner."""
+@dataclass(frozen=True, eq=False)
+class Page:
+    """What a figure shows, from top to bottom. Places are in inches from its upper left corner.
 
-    def __init__(self, page: Page, width: float, columns: int, dpi: int, figure: Figure) -> None:
-        self.page, self.columns, self.dpi, self.figure = page, columns, dpi, figure
-        self.width = width
-        first = (
-            next(panel for row in page.rows for panel in row.panels if panel is not None)
-            if (page.rows)
-            else None
-        )
-        self.panel_size = (
-            (0.0, 0.0)
-            if first is None
-            else (first.picture.shape[1] / dpi, first.picture.shape[0] / dpi)
-        )
-        self.has_letters = sum(panel is not None for row in page.rows for panel in row.panels) > 1
-        letters = max(int(width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
-        self.caption = [
-            line
-            for paragraph in page.caption.splitlines()
-            for line in textwrap.wrap(paragraph, letters) or [""]
-        ]
-        self.height = self._table_top() + self._table_height() + self._caption_height()
-        figure.set_size_inches(width, max(self.height, 0.1))
+    Attributes
+    ----------
+    rows : sequence of Row
+        Each may take several lines of the grid. The pictures have the width `panel_width`.
+    table : list of list of str
+        The first row has the titles. Empty without a table.
+    caption : str
+    scale_bar : (float, str) or None
+        Its length in pixels, and its text.
+    width : float
+        Inches. The height follows from the contents.
+    columns : int
+        Of the grid of panels.
+    dpi : int
+        Pixels of pictures in an inch.
+    """
+
+    rows: Sequence[Row]
+    table: list[list[str]]
+    caption: str
+    scale_bar: tuple[float, str] | None
+    width: float
+    columns: int
+    dpi: int
+
+    @cached_property
+    def _figure(self) -> Figure:
+        """The figure that is drawn."""
+        size = self.width, max(self._height, 0.1)
+        return _figure_class()(figsize=size, dpi=self.dpi)
 
     # --- places --------------------------------------------------------------------------------
+
+    @cached_property
+    def _panels(self) -> list[Panel]:
+        return [panel for row in self.rows for panel in row.panels if panel is not None]
+
+    @cached_property
+    def _panel_size(self) -> tuple[float, float]:
+        height, width = self._panels[0].picture.shape[:2] if self._panels else (0, 0)
+        return width / self.dpi, height / self.dpi
+
+    @cached_property
+    def _caption_lines(self) -> list[str]:
+        letters = max(int(self.width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
+        return [
+            line
+            for paragraph in self.caption.splitlines()
+            for line in textwrap.wrap(paragraph, letters) or [""]
+        ]
+
+    @cached_property
+    def _height(self) -> float:
+        height = sum(self._row_height(row) + ROW_GAP for row in self.rows) + self._table_height
+        lines = self._caption_lines
+        return height + ((len(lines) + 0.5) * _text_height(TITLE_SIZE) if lines else 0.0)
+
+    @property
+    def _table_height(self) -> float:
+        return (len(self.table) + 1) * _text_height(TEXT_SIZE) * 1.15 if self.table else 0.0
 
     def _row_height(self, row: Row) -> float:
         lines = -(-len(row.panels) // self.columns)
@@ -275,55 +274,44 @@ class _Layout:
     def _line_height(self, row: Row) -> float:
         has_notes = any(panel is not None and panel.note for panel in row.panels)
         note = _text_height(TEXT_SIZE) if has_notes else 0.0
-        return self._title_height(row) + self.panel_size[1] + note
+        return self._title_height(row) + self._panel_size[1] + note
 
     def _title_height(self, row: Row) -> float:
         has_titles = any(panel is not None and panel.title for panel in row.panels)
         return TITLE_HEIGHT if has_titles else 0.0
 
-    def _table_top(self) -> float:
-        return sum(self._row_height(row) + ROW_GAP for row in self.page.rows)
-
-    def _table_height(self) -> float:
-        rows = len(self.page.table)
-        return (rows + 1) * _text_height(TEXT_SIZE) * 1.15 if rows else 0.0
-
-    def _caption_height(self) -> float:
-        return (len(self.caption) + 0.5) * _text_height(TITLE_SIZE) if self.caption else 0.0
-
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
         """Add axes with their upper left corner and size in inches, on whole pixels."""
-        unit = self.dpi * self.width, self.dpi * self.height
-        x, y = round(left * self.dpi), round((self.height - top - height) * self.dpi)
+        unit = self.dpi * self.width, self.dpi * self._height
+        x, y = round(left * self.dpi), round((self._height - top - height) * self.dpi)
         size = round(width * self.dpi), round(height * self.dpi)
         place = x / unit[0], y / unit[1], size[0] / unit[0], size[1] / unit[1]
-        return self.figure.add_axes(place)
+        return self._figure.add_axes(place)
 
     def _text(self, left: float, top: float, text: str, size: float, **options: object) -> None:
         """Write a line of text whose upper left corner is at a place in inches."""
         baseline = top + 0.8 * _text_height(size)
-        place = left / self.width, 1 - baseline / self.height
-        self.figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
+        place = left / self.width, 1 - baseline / self._height
+        self._figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
 
     # --- drawing -------------------------------------------------------------------------------
 
     def draw(self) -> Figure:
         """Draw all parts."""
-        top, number = 0.0, 0
-        for row in self.page.rows:
-            number = self._draw_row(row, top, number)
+        top = 0.0
+        for row in self.rows:
+            self._draw_row(row, top)
             top += self._row_height(row) + ROW_GAP
-        if self.page.table:
+        if self.table:
             self._draw_table(top)
-        top += self._table_height()
-        for line_number, line in enumerate(self.caption):
-            offset = (line_number + 0.25) * _text_height(TITLE_SIZE)
-            self._text(0.0, top + offset, line, TITLE_SIZE)
-        return self.figure
+        top += self._table_height
+        for number, line in enumerate(self._caption_lines):
+            self._text(0.0, top + (number + 0.25) * _text_height(TITLE_SIZE), line, TITLE_SIZE)
+        return self._figure
 
-    def _draw_row(self, row: Row, top: float, number: int) -> int:
-        """Draw the panels of a row and its keys; return the number of panels so far."""
-        panel_width, panel_height = self.panel_size
+    def _draw_row(self, row: Row, top: float) -> None:
+        """Draw the panels of a row and its keys."""
+        panel_width, panel_height = self._panel_size
         legend, title_height = row.legend, self._title_height(row)
         for place, panel in enumerate(row.panels):
             line, column = divmod(place, self.columns)
@@ -335,22 +323,21 @@ class _Layout:
                     self._text(left, line_top + offset, text, TEXT_SIZE)
                 legend = ""
                 continue
-            letter = f"({chr(ord('a') + number % 26)}) " if self.has_letters else ""
+            number = self._panels.index(panel)
+            letter = f"({chr(ord('a') + number % 26)}) " if len(self._panels) > 1 else ""
             self._text(left, line_top, letter + panel.title, TITLE_SIZE)
             axes = self._axes(left, line_top + title_height, panel_width, panel_height)
             _draw_panel(axes, panel, self.dpi)
+            note_top = line_top + title_height + panel_height
             if panel.note:
-                note_top = line_top + title_height + panel_height
                 self._text(left, note_top, panel.note, TEXT_SIZE)
-            if self.page.scale_bar is not None and number == 0:
-                _draw_scale_bar(axes, *self.page.scale_bar, self.dpi)
-            number += 1
+            if self.scale_bar is not None and number == 0:
+                _draw_scale_bar(axes, *self.scale_bar, self.dpi)
         self._draw_keys(row, top)
-        return number
 
     def _draw_keys(self, row: Row, top: float) -> None:
         """Draw the color bar and the legend of the singularities of a row, in the column of keys."""
-        left = self.columns * (self.panel_size[0] + GAP) + GAP
+        left = self.columns * (self._panel_size[0] + GAP) + GAP
         top += self._title_height(row)
         marks = [
             marks
@@ -362,9 +349,9 @@ class _Layout:
         entries = _legend_entries(marks)
         legend_height = len(entries) * _text_height(TEXT_SIZE) * 1.2
         if row.color_bar is not None:
-            height = self.panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)
-            self._draw_color_bar(row.color_bar, left, top, max(height, 0.5 * self.panel_size[1]))
-        bottom = top + self.panel_size[1] - legend_height
+            height = self._panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)
+            self._draw_color_bar(row.color_bar, left, top, max(height, 0.5 * self._panel_size[1]))
+        bottom = top + self._panel_size[1] - legend_height
         for number, (text, color, diameter) in enumerate(entries):
             line_top = bottom + number * _text_height(TEXT_SIZE) * 1.2
             middle = (
@@ -401,7 +388,7 @@ class _Layout:
         """Draw a table with lines above, below and under its titles."""
         from matplotlib.lines import Line2D
 
-        table, height = self.page.table, _text_height(TEXT_SIZE) * 1.15
+        table, height = self.table, _text_height(TEXT_SIZE) * 1.15
         widths = np.array([max(map(_text_width, column)) for column in zip(*table, strict=True)])
         # The text is smaller if the columns are too wide for the figure.
         room, least_gap = self.width, _text_width("mm") * (len(widths) - 1)
@@ -415,9 +402,9 @@ class _Layout:
                 left = 0.0 if column == 0 else float(right[column])
                 self._text(left, line_top, text, size, ha="left" if column == 0 else "right")
         for offset, line_width in ((0.1, 0.8), (1.25, 0.5), (len(table) + 0.55, 0.8)):
-            y = 1 - (top + offset * height) / self.height
+            y = 1 - (top + offset * height) / self._height
             line = Line2D([0, 1], [y, y], linewidth=line_width, color=INK)
-            self.figure.add_artist(line)
+            self._figure.add_artist(line)
 
 
 def _text_height(size: float) -> float:

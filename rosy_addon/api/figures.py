@@ -263,9 +263,12 @@ def load_drawing() -> ModuleType:
     """
     try:
         from ..external import matplotlib_figure
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if error.name is not None and error.name.startswith("matplotlib"):
+            raise RosyError(
+                "figures are drawn by matplotlib: pip install rosyfields[figures]"
+            ) from None
         raise RosyError("figures need the Python package rosyfields, with matplotlib") from None
-    matplotlib_figure.check_matplotlib()
     return matplotlib_figure
 
 

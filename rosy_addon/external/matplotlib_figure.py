@@ -1,4 +1,7 @@
-"""Figures of pictures with their keys, drawn by matplotlib as vectors and text."""
+"""Figures of pictures with their keys, drawn by matplotlib as vectors and text.
+
+`api.figures` imports this module when a figure is drawn, and says so if matplotlib is missing.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,19 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from functools import cached_property
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba_array
+from matplotlib.figure import Figure as Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.textpath import text_to_path
 
 from ..annotation.index_labels import placed_labels
 from ..annotation.round_numbers import MINUS
@@ -23,10 +35,6 @@ from ..annotation.singularity_marks import (
 )
 from ..errors import RosyError
 from ..field.singularities import format_index
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Figure
 
 #: Sizes of text in points: titles, everything else.
 TITLE_SIZE, TEXT_SIZE = 8.0, 7.0
@@ -132,9 +140,6 @@ def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     RosyError
         If a text between dollar signs is not a formula that matplotlib can read.
     """
-    import matplotlib
-    from matplotlib.backends.backend_pdf import PdfPages
-
     fonts = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "rosyfields"}
     contents = io.BytesIO()
     try:
@@ -154,22 +159,6 @@ def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     return contents.getvalue()
 
 
-def check_matplotlib() -> None:
-    """Check that matplotlib is installed.
-
-    Raises
-    ------
-    RosyError
-        If not.
-    """
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError:
-        raise RosyError(
-            "figures are drawn by matplotlib: pip install rosyfields[figures]"
-        ) from None
-
-
 def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     """Return the width of a panel in pixels.
 
@@ -186,20 +175,13 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     return max(int(room / columns * dpi), 1)
 
 
-@lru_cache(maxsize=1)
-def _figure_class() -> type[Figure]:
-    """Return the class of figures, which notebooks show without pyplot."""
-    from matplotlib.figure import Figure
+class NotebookFigure(Figure):
+    """A figure that a notebook shows as a picture, without pyplot."""
 
-    class NotebookFigure(Figure):
-        """A figure that a notebook shows as a picture."""
-
-        def _repr_png_(self) -> bytes:
-            contents = io.BytesIO()
-            self.savefig(contents, format="png")
-            return contents.getvalue()
-
-    return NotebookFigure
+    def _repr_png_(self) -> bytes:
+        contents = io.BytesIO()
+        self.savefig(contents, format="png")
+        return contents.getvalue()
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +217,7 @@ class Page:
     def _figure(self) -> Figure:
         """The figure that is drawn."""
         size = self.width, max(self._height, 0.1)
-        return _figure_class()(figsize=size, dpi=self.dpi)
+        return NotebookFigure(figsize=size, dpi=self.dpi)
 
     # --- places --------------------------------------------------------------------------------
 
@@ -368,10 +350,6 @@ class Page:
 
     def _draw_color_bar(self, bar: ColorBar, left: float, top: float, height: float) -> None:
         """Draw a color bar with ticks and its label."""
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colorbar import Colorbar
-        from matplotlib.colors import LinearSegmentedColormap, Normalize
-
         axes = self._axes(left, top, 0.12, height)
         colors = LinearSegmentedColormap.from_list("rosy", bar.stops)
         low, high = sorted((bar.low, bar.high))
@@ -386,8 +364,6 @@ class Page:
 
     def _draw_table(self, top: float) -> None:
         """Draw a table with lines above, below and under its titles."""
-        from matplotlib.lines import Line2D
-
         table, height = self.table, _text_height(TEXT_SIZE) * 1.15
         widths = np.array([max(map(_text_width, column)) for column in zip(*table, strict=True)])
         # The text is smaller if the columns are too wide for the figure.
@@ -414,9 +390,6 @@ def _text_height(size: float) -> float:
 
 def _text_width(text: str) -> float:
     """Return the width of a text in the size `TEXT_SIZE`, in inches."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
     font = FontProperties(size=TEXT_SIZE)
     width, _, _ = text_to_path.get_text_width_height_descent(text, font, ismath=False)
     return width / POINTS
@@ -442,8 +415,6 @@ def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
 
 def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) -> None:
     """Draw dots or rings, and the labels beside visible dots."""
-    from matplotlib.colors import to_rgba_array
-
     marks = marks.in_drawing_order()
     signs = np.sign(marks.index).astype(int)
     colors = to_rgba_array([COLOR_BY_SIGN[sign] for sign in signs.tolist()])

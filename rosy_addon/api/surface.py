@@ -213,9 +213,9 @@ def _read_arrays(path: Path, step: int | None) -> MeshArrays:
     """
     if path.suffix.lower() in READERS:
         return MeshArrays(*read_polygons(path))
-    simulation_suffixes = _simulation_suffixes()
-    if path.suffix.lower() not in simulation_suffixes:
-        *suffixes, last = (*READERS, *simulation_suffixes)
+    known = (*READERS, *simulation_suffixes())
+    if path.suffix.lower() not in known:
+        *suffixes, last = known
         raise RosyError(
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
@@ -227,7 +227,7 @@ def _read_arrays(path: Path, step: int | None) -> MeshArrays:
     return MeshArrays(*mesh.polygons, None, mesh.point_arrays, mesh.cell_arrays)
 
 
-def _simulation_suffixes() -> tuple[str, ...]:
+def simulation_suffixes() -> tuple[str, ...]:
     """Return the suffixes of the files of simulations: none in the extension for Blender."""
     try:
         from ..external.simulation_files import SUFFIXES

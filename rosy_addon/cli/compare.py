@@ -9,23 +9,25 @@ from typing import Any
 from .. import api
 from ..api.figures import LINES, check_figure_path, load_drawing
 from ..api.pictures import picture_look
+from ..api.surface import simulation_suffixes
 from ..errors import RosyError
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
 from ..field.singularity_matching import DEFAULT_REACH
-from .extras import Extras
-from .look import add_look_options, requested_preset, requested_settings
 from .mesh_field import printed_warnings, read_field
 from .options import (
+    add_direction_options,
+    add_look_options,
     add_subcommand,
     add_workers_option,
     check_output,
     float_between,
     int_between,
+    requested_preset,
+    requested_settings,
 )
 from .streams import print_line
-from .view import add_direction_options
 
 #: Generators that need nothing but the mesh and a degree.
 GENERATORS = {
@@ -37,10 +39,10 @@ GENERATORS = {
 }
 
 
-def add_compare_command(subparsers: Any, extras: Extras) -> None:
+def add_compare_command(subparsers: Any) -> None:
     """Add the command `compare`."""
     parser = add_subcommand(subparsers, "compare", run_compare)
-    suffixes = [*READERS, *extras.simulation_suffixes]
+    suffixes = [*READERS, *simulation_suffixes()]
     parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
     parser.add_argument(
         "fields",

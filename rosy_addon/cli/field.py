@@ -14,16 +14,15 @@ from ..errors import RosyError, counted
 from ..field.curvature import MAGNITUDES
 from ..field.field_io import WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
-from .extras import Extras
 from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings, read_field
 from .options import add_subcommand, check_output, float_between
 from .streams import print_line
 
 
-def add_field_command(subparsers: Any, extras: Extras) -> None:
+def add_field_command(subparsers: Any) -> None:
     """Add the command `field`."""
     parser = add_subcommand(subparsers, "field", run_field)
-    add_mesh_options(parser, extras)
+    add_mesh_options(parser)
     parser.add_argument(
         "-o", "--output", required=True, type=Path, metavar="OUT", help=", ".join(WRITE_SUFFIXES)
     )
@@ -77,10 +76,10 @@ def run_field(options: argparse.Namespace) -> None:
     field.save(options.output)
 
 
-def add_info_command(subparsers: Any, extras: Extras) -> None:
+def add_info_command(subparsers: Any) -> None:
     """Add the command `info`."""
     parser = add_subcommand(subparsers, "info", run_info)
-    add_mesh_options(parser, extras)
+    add_mesh_options(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
         "--against",

@@ -6,31 +6,29 @@ import argparse
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from .. import api
+from ..api.generators import generated, uv_map
+from ..api.surface import simulation_suffixes
 from ..errors import RosyError, RosyWarning
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.guide_strokes import read_guide_strokes
-from ..field.generate import GENERATORS
+from ..field.generate import GENERATORS, GeneratorSettings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .extras import Extras
 from .options import float_between, float_tuple, int_between, print_note
 
 
-def add_mesh_options(
-    parser: argparse.ArgumentParser, extras: Extras, *, allow_scene: bool = False
-) -> None:
+def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = False) -> None:
     """Add MESH, FIELD and the options that generate a field.
 
     Parameters
     ----------
     parser : argparse.ArgumentParser
-    extras : Extras
-        MESH may also be the file of a simulation, if they can read it.
     allow_scene : bool
         Whether MESH may be a .blend file, or absent.
     """
@@ -46,7 +44,7 @@ def add_mesh_options(
     parser.add_argument(
         "field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ_SUFFIXES)
     )
-    of_array = ", 1 for an array of vectors" if extras.simulation_suffixes else ""
+    of_array = ", 1 for an array of vectors" if simulation_suffixes() else ""
     parser.add_argument(
         "--degree",
         type=int,
@@ -126,15 +124,15 @@ def add_mesh_options(
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
     )
-    _add_simulation_options(parser, extras)
+    _add_simulation_options(parser)
 
 
-def _add_simulation_options(parser: argparse.ArgumentParser, extras: Extras) -> None:
+def _add_simulation_options(parser: argparse.ArgumentParser) -> None:
     """Add the options for files of simulations, if these can be read."""
     parser.set_defaults(array=None, step=None)
-    if not extras.simulation_suffixes:
+    if not simulation_suffixes():
         return
-    suffixes = ", ".join(extras.simulation_suffixes)
+    suffixes = ", ".join(simulation_suffixes())
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
     parser.add_argument(
         "--array",
@@ -159,7 +157,7 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
         check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    is_simulation = options.mesh.suffix.lower() in options.extras.simulation_suffixes
+    is_simulation = options.mesh.suffix.lower() in simulation_suffixes()
     names = ("field", "generate", "strokes", "guides", "singularities")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
     for name in ("array", "step"):
@@ -209,45 +207,31 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
     kind = options.generate or ("guided" if has_guides else "form")
     if options.singularities is not None and options.generate is None:
         kind = "prescribed"
-    match kind:
-        case "form":
-            return api.form(surface, degree)
-        case "smoothest":
-            return api.smoothest(surface, degree)
-        case "curvature":
-            return api.curvature(surface, degree, reach=options.reach)
-        case "features":
-            return api.features(surface, degree, sharp_angle=np.radians(options.sharp_angle))
-        case "prescribed":
-            if options.singularities is None:
-                raise RosyError(
-                    f"{options.mesh}: give the singularities: --singularities FILE.sings"
-                )
-            return api.prescribed(
-                surface,
-                options.singularities,
-                options.degree,
-                vectors=_guides(options, surface, options.degree),
-                reach=options.reach,
-                add_missing=options.add_missing,
-            )
-        case "axis":
-            return api.along_axis(surface, options.axis, degree)
-        case "uv":
-            return api.along_uv(surface, degree)
-        case "guided":
-            strokes = [] if options.strokes is None else read_guide_strokes(options.strokes)
-            return api.guided(
-                surface,
-                degree,
-                strokes=strokes,
-                vectors=_guides(options, surface, degree),
-                uv=options.uv,
-                reach=options.reach,
-                vectors_have_firmness=options.firmness,
-            )
-        case kind:
-            raise RosyError(f"unknown generator '{kind}': choose {', '.join(GENERATORS)}")
+    if kind == "prescribed":
+        if options.singularities is None:
+            raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
+        return api.prescribed(
+            surface,
+            options.singularities,
+            options.degree,
+            vectors=_guides(options, surface, options.degree),
+            reach=options.reach,
+            add_missing=options.add_missing,
+        )
+    if kind == "guided":
+        return api.guided(
+            surface,
+            degree,
+            strokes=[] if options.strokes is None else read_guide_strokes(options.strokes),
+            vectors=_guides(options, surface, degree),
+            uv=options.uv,
+            reach=options.reach,
+            vectors_have_firmness=options.firmness,
+        )
+    settings = GeneratorSettings(kind, options.axis, options.reach, np.radians(options.sharp_angle))
+    if kind == "uv":
+        settings = replace(settings, uv=uv_map(surface))
+    return generated(surface, settings, degree)
 
 
 def _guides(

@@ -1,17 +1,25 @@
-"""Helpers shared by the commands: value types for argparse, and notes to the user."""
+"""Options that several commands share: of the output, the view and the look; and notes to the user."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import re
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW, VERTEX_COLOR, picture_look
+from ..compositor.look import Look
 from ..errors import RosyError
 from ..file_io import check_writable
+from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
+from ..projection.camera import check_size
+from ..projection.up_axis import UP_AXIS_MATRIX
+from ..settings import settings_of, stored_key
 from .streams import print_error
 
 
@@ -122,3 +130,164 @@ def print_note(text: str) -> None:
     """Print a note to the error stream, unless it is empty."""
     if text:
         print_error(text)
+
+
+def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:
+    """Add the options of the view. `size` is the default of --size."""
+    add_direction_options(parser)
+    parser.add_argument(
+        "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"
+    )
+    parser.add_argument(
+        "--ortho", action="store_true", help="orthographic projection instead of perspective"
+    )
+
+
+def add_direction_options(parser: argparse.ArgumentParser) -> None:
+    """Add --view and --up."""
+    parser.add_argument(
+        "--view",
+        type=float_tuple(2, "AZ,EL"),
+        default=DEFAULT_VIEW,
+        metavar="AZ,EL",
+        help="azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from "
+        "above",
+    )
+    parser.add_argument(
+        "--up",
+        choices=list(UP_AXIS_MATRIX),
+        help="upward axis of the file; by default y for .obj and .off, otherwise z",
+    )
+
+
+def requested_size(options: argparse.Namespace) -> tuple[int, int]:
+    """Return the size of the picture in pixels."""
+    return check_size(*(options.size or DEFAULT_SIZE))
+
+
+def add_look_options(parser: argparse.ArgumentParser) -> None:
+    """Add --preset and --set."""
+    parser.add_argument(
+        "--preset",
+        metavar="NAME",
+        help=f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
+        "`presets` lists them",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"one setting of the look, after the preset: {', '.join(settings_of(Look))}",
+    )
+
+
+def add_flow_option(parser: argparse.ArgumentParser) -> None:
+    """Add --flow, which is short for a setting of the look."""
+    parser.add_argument(
+        "--flow",
+        dest="set",
+        action="append",
+        default=[],
+        type="flow={}".format,
+        metavar="PIXELS",
+        help="let streaks drift along the field by this many pixels per picture, as --set flow=PIXELS does",
+    )
+
+
+def add_color_option(parser: argparse.ArgumentParser) -> None:
+    """Add --color-values."""
+    parser.add_argument(
+        "--color-values",
+        metavar="NAME",
+        help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
+        "property of a .ply file",
+    )
+
+
+def add_tone_options(parser: argparse.ArgumentParser) -> None:
+    """Add the sources of the tone that belong to the mesh."""
+    parser.add_argument(
+        "--tone-attribute",
+        metavar="NAME",
+        help="take the tone from a vertex property of a .ply file, or from the vertex colors: "
+        f"'{VERTEX_COLOR}'",
+    )
+    parser.add_argument(
+        "--tone-image",
+        type=Path,
+        metavar="IMAGE.png",
+        help="take the tone from an image on the UV map of an .obj file",
+    )
+
+
+def requested_preset(options: argparse.Namespace) -> Path | None:
+    """Return the file of --preset, or None."""
+    return find_preset_file(options.preset, user_presets_folder()) if options.preset else None
+
+
+def requested_settings(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings of --set."""
+    return dict(_parse_setting(text) for text in options.set)
+
+
+def requested_look(options: argparse.Namespace, default: Look) -> Look:
+    """Return the look of --preset, by default `default`, with the settings of --set."""
+    preset = requested_preset(options)
+    look = default if preset is None else read_preset(preset).look
+    return look.with_settings(requested_settings(options))
+
+
+def picture_arguments(options: argparse.Namespace) -> dict[str, Any]:
+    """Return what the options say about a picture, as arguments of `api.render`.
+
+    Raises
+    ------
+    RosyError
+        If they are not possible.
+    """
+    sources = {
+        option: getattr(options, f"tone_{option}", None)
+        for option in ("attribute", "image", "picture")
+    }
+    given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
+    if len(given) > 1:
+        raise RosyError(f"give either {given[0]} or {given[1]}, not both")
+    preset, settings = requested_preset(options), requested_settings(options)
+    # Mistakes are reported before the mesh is read.
+    picture_look(str(options.mesh), preset, settings, sources, options.color_values is not None)
+    arguments = {
+        "view": options.view,
+        "size": requested_size(options),
+        "orthographic": options.ortho,
+        "preset": preset,
+        "color_values": options.color_values,
+        "tone_values": sources["attribute"],
+        "tone_image": sources["image"],
+        "workers": options.workers,
+    }
+    return arguments | settings
+
+
+def _parse_setting(text: str) -> tuple[str, Any]:
+    """Return the name and the value of NAME=VALUE, converted to the type of the setting."""
+    name, separator, value = text.partition("=")
+    name, settings = stored_key(name), settings_of(Look)
+    if not separator:
+        raise RosyError(f"--set {text}: expected NAME=VALUE")
+    if name not in settings:
+        raise RosyError(f"--set {text}: unknown setting '{name}': choose {', '.join(settings)}")
+    try:
+        return name, settings[name].parse(value)
+    except ValueError:
+        expected = "a whole number" if isinstance(settings[name].default, int) else "a number"
+        raise RosyError(f"--set {text}: expected {expected}") from None
+
+
+def user_presets_folder() -> Path:
+    """Return the folder of the user's presets: in Blender, the one of the extension."""
+    if sys.modules.get("bpy") is None:
+        return default_user_folder()
+    from ..scene.paths import user_presets_folder
+
+    return user_presets_folder()

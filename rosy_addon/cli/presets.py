@@ -1,21 +1,18 @@
-"""The command `presets`, and the folder of the user's presets."""
+"""The command `presets`."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
-from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
 from ..preset_files.store import (
-    default_user_folder,
     merge_preset_files,
     read_preset,
     user_preset_files,
 )
-from .options import add_subcommand, print_note
+from .options import add_subcommand, print_note, user_presets_folder
 from .streams import print_line
 
 
@@ -45,12 +42,3 @@ def run_presets(options: argparse.Namespace) -> None:
             f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}"
         )
     print_line(f"Your presets are in {folder}")
-
-
-def user_presets_folder() -> Path:
-    """Return the folder of the user's presets: in Blender, the one of the extension."""
-    if sys.modules.get("bpy") is None:
-        return default_user_folder()
-    from ..scene.paths import user_presets_folder
-
-    return user_presets_folder()

@@ -6,6 +6,8 @@ import argparse
 import os
 import re
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,19 +19,18 @@ from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..rendering.mesh_view import check_light
-from .extras import Extras
+from ..settings import Choice, Number, Setting, Switch, settings_of
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_object_option, add_subcommand, check_output
+from .options import (
+    add_object_option,
+    add_subcommand,
+    add_view_options,
+    check_output,
+    float_between,
+    requested_size,
+)
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
-from .stroke_style import (
-    add_pen_options,
-    add_style_options,
-    pen_of,
-    stroke_style_of,
-    style_overrides,
-)
-from .view import add_view_options, requested_size
 
 #: Default values of the options that are only for mesh files, and only for .blend files.
 MESH_ONLY_DEFAULTS = {
@@ -48,11 +49,11 @@ PAGE_OPTIONS = {
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 
 
-def add_strokes_command(subparsers: Any, extras: Extras) -> None:
+def add_strokes_command(subparsers: Any) -> None:
     """Add the command `strokes`."""
     parser = add_subcommand(subparsers, "strokes", run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
-    add_mesh_options(parser, extras, allow_scene=True)
+    add_mesh_options(parser, allow_scene=True)
     parser.add_argument(
         "-o",
         "--output",
@@ -194,3 +195,93 @@ def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_
             raise RosyError(
                 f"{options.mesh or 'the open file'}: {option} applies only to {file_kind}"
             )
+
+
+#: Placeholders of numbers in the help, by their units.
+METAVARS = {"pixels": "PX", "length": "UNITS", "spacings": "SPACINGS", "": "AMOUNT"}
+
+
+def add_style_options(parser: argparse.ArgumentParser) -> None:
+    """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
+
+    The unit follows from the option: `--spacing` is in pixels, `--distance` in units of the mesh.
+    """
+    for name, setting in settings_of(StrokeStyle).items():
+        if name != "unit":
+            _add_setting_option(parser, setting)
+
+
+def _add_setting_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
+    """Add the option of a setting, with its range or choices, help text and default."""
+    option = f"--{setting.name.replace('_', '-')}"
+    add = partial(parser.add_argument, option, default=argparse.SUPPRESS)
+    text = setting.text[0].lower() + setting.text[1:]
+    match setting:
+        case Switch():
+            add(action=argparse.BooleanOptionalAction, help=text)
+        case Choice(options=options, default=default):
+            add(choices=tuple(options), help=f"{text} ({default})")
+        case Number(low=low, high=high, unit=unit, default=default):
+            help_text = f"{text} ({default:g})"
+            add(type=float_between(low, high), metavar=METAVARS[unit], help=help_text)
+        case _:
+            raise TypeError(f"setting '{setting.name}' has no option")
+
+
+def stroke_style_of(options: argparse.Namespace, base: StrokeStyle) -> StrokeStyle:
+    """Return the style with the fields that the options override."""
+    overrides = style_overrides(options)
+    if "spacing" in overrides or "distance" in overrides:
+        overrides["unit"] = "world" if "distance" in overrides else "pixels"
+    return replace(base, **overrides)
+
+
+def style_overrides(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the settings of `StrokeStyle` that the options override."""
+    values = vars(options)
+    return {name: values[name] for name in settings_of(StrokeStyle) if name in values}
+
+
+def add_pen_options(parser: argparse.ArgumentParser) -> None:
+    """Add options for the fields of `Pen`. Those not given are not set."""
+    add = partial(parser.add_argument, default=argparse.SUPPRESS)
+    add(
+        "--width",
+        type=float_between(0.01, 1e3),
+        metavar="PX",
+        help=f"width of the strokes ({Pen.width:g})",
+    )
+    add(
+        "--plotter",
+        action=argparse.BooleanOptionalAction,
+        help="lines of constant width, without paper, in an order that keeps the pen travel short",
+    )
+    add(
+        "--mm",
+        dest="millimetres",
+        type=float_between(1.0, 1e5),
+        metavar="WIDTH",
+        help="width of the page in millimeters",
+    )
+    add(
+        "--colours",
+        "--colors",
+        metavar="C,C,...",
+        help="SVG colors of the layers (#000000)",
+    )
+    add("--paper", action=argparse.BooleanOptionalAction, help="white paper behind the strokes")
+
+
+def pen_of(options: argparse.Namespace, base: Pen) -> Pen:
+    """Return the pen with the fields that the options override."""
+    values = vars(options)
+    overrides = {
+        name: values[name] for name in ("width", "millimetres", "plotter") if name in values
+    }
+    if "colours" in values:
+        overrides |= {"colours": values["colours"].split(","), "outline": None}
+    if values.get("plotter"):
+        overrides["paper"] = None
+    elif "paper" in values:
+        overrides["paper"] = Pen.paper if values["paper"] else None
+    return replace(base, **overrides)

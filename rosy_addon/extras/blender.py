@@ -26,8 +26,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
-from ..cli.bake_workers import uses_workers
-from ..cli.presets import user_presets_folder
+from ..cli.bake import uses_workers
+from ..cli.options import user_presets_folder
 from ..errors import RosyError
 from ..turntable_video import Encoder
 from ..worker.program import run_program

@@ -6,10 +6,9 @@ import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from ..cli.extras import Extras
+from ..cli.parser import Extras
 from ..cli.parser import main as cli_main
 from ..cli.streams import use_output
-from ..external.simulation_files import SUFFIXES
 from .blender import PACKAGE, BlenderRunner, blender_encoder
 from .cluster import run_on_cluster
 from .film import add_film_command
@@ -21,7 +20,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     extras = Extras(
         program=(sys.executable, "-m", PACKAGE),
         run_on_cluster=run_on_cluster,
-        simulation_suffixes=SUFFIXES,
         add_commands=(add_film_command,),
         find_blender_encoder=blender_encoder,
         run_in_blender=BlenderRunner(arguments),
@@ -44,7 +42,6 @@ def main_in_blender(argv: Sequence[str], output: TextIO, frames_are_drawn: bool)
     use_output(output)
     extras = Extras(
         run_on_cluster=run_on_cluster,
-        simulation_suffixes=SUFFIXES,
         run_in_blender=lambda *_: None,
         frames_are_drawn=frames_are_drawn,
     )

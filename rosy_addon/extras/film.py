@@ -13,18 +13,22 @@ from .. import api
 from ..api.films import MAX_BETWEEN
 from ..api.mesh_objects import MeshArrays
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
-from ..cli.look import add_flow_option, add_look_options, requested_preset, requested_settings
 from ..cli.mesh_field import printed_warnings
 from ..cli.options import (
+    add_flow_option,
+    add_look_options,
     add_subcommand,
+    add_view_options,
     add_workers_option,
     check_output,
     int_between,
     print_note,
+    requested_preset,
+    requested_settings,
+    requested_size,
 )
-from ..cli.render import add_rate_option, video_encoder
+from ..cli.pictures import add_rate_option, video_encoder
 from ..cli.streams import print_line
-from ..cli.view import add_view_options, requested_size
 from ..errors import RosyError
 from ..external.simulation_files import SUFFIXES, Step, in_order, list_steps
 from ..field.array_field import SurfaceArrays, array_field

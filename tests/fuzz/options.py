@@ -28,7 +28,7 @@ FILE_OPTIONS = {
         "camera",
         "frames",
     ),
-    *("singularities", "all_cameras", "out", "save", "jobs", "scheduler"),
+    *("singularities", "all_cameras", "out", "save", "jobs", "scheduler", "array", "step"),
     "fields",
 }
 

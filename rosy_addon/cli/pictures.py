@@ -1,4 +1,4 @@
-"""The commands `render` and `turntable`: pictures and videos of a mesh file."""
+"""The commands `render`, `turntable` and `texture`: pictures, videos and textures of a mesh file."""
 
 from __future__ import annotations
 
@@ -9,32 +9,35 @@ from typing import Any
 
 from .. import api
 from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIDEO_SIZE, find_ffmpeg
+from ..api.textures import UDIM_TOKEN, texture_look
 from ..errors import RosyError
+from ..surface_texture.draw import CONTENTS, DEFAULT_MARGIN, MAX_MARGIN, MAX_SIZE, MIN_SIZE
+from ..surface_texture.draw import DEFAULT_SIZE as DEFAULT_TEXTURE_SIZE
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
-from .extras import Extras
-from .look import (
+from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings
+from .options import (
     add_color_option,
     add_flow_option,
     add_look_options,
-    add_tone_options,
-    picture_arguments,
-)
-from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import (
     add_subcommand,
+    add_tone_options,
+    add_view_options,
     add_workers_option,
     check_output,
     float_between,
+    float_tuple,
     int_between,
+    picture_arguments,
+    requested_preset,
+    requested_settings,
 )
 from .streams import print_line
-from .view import add_view_options
 
 
-def add_render_command(subparsers: Any, extras: Extras) -> None:
+def add_render_command(subparsers: Any) -> None:
     """Add the command `render`."""
     parser = add_subcommand(subparsers, "render", run_render)
-    add_mesh_options(parser, extras)
+    add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
     add_view_options(parser, DEFAULT_SIZE)
     add_workers_option(parser)
@@ -58,10 +61,10 @@ def run_render(options: argparse.Namespace) -> None:
     picture.save(options.output)
 
 
-def add_turntable_command(subparsers: Any, extras: Extras) -> None:
+def add_turntable_command(subparsers: Any) -> None:
     """Add the command `turntable`."""
     parser = add_subcommand(subparsers, "turntable", run_turntable)
-    add_mesh_options(parser, extras)
+    add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
     parser.add_argument(
         "--pictures",
@@ -140,3 +143,67 @@ def video_encoder(options: argparse.Namespace) -> Encoder | None:
     if encode is None:
         raise RosyError(f"{options.output}: {NO_ENCODER}")
     return encode
+
+
+def add_texture_command(subparsers: Any) -> None:
+    """Add the command `texture`."""
+    parser = add_subcommand(subparsers, "texture", run_texture)
+    add_mesh_options(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        type=Path,
+        metavar="OUT.png",
+        help=f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own",
+    )
+    parser.add_argument(
+        "--size",
+        type=int_between(MIN_SIZE, MAX_SIZE),
+        default=DEFAULT_TEXTURE_SIZE,
+        metavar="N",
+        help="width and height in texels (%(default)d)",
+    )
+    parser.add_argument(
+        "--margin",
+        type=int_between(0, MAX_MARGIN),
+        default=DEFAULT_MARGIN,
+        metavar="N",
+        help="width of the margin around charts, in texels (%(default)d)",
+    )
+    parser.add_argument(
+        "--light-direction",
+        type=float_tuple(3, "X,Y,Z"),
+        metavar="X,Y,Z",
+        help="direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
+        "for a shader",
+    )
+    parser.add_argument(
+        "--content",
+        choices=list(CONTENTS),
+        default="look",
+        help="; ".join(f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()),
+    )
+    add_look_options(parser)
+
+
+def run_texture(options: argparse.Namespace) -> None:
+    """Draw the field of a mesh file as a texture for its UV map."""
+    check_output(options, ".png")
+    preset, settings = requested_preset(options), requested_settings(options)
+    # Mistakes are reported before the mesh is read.
+    texture_look(preset, settings)
+    surface, field = load_mesh_and_field(options)
+    with printed_warnings():
+        texture = api.texture(
+            surface,
+            field,
+            size=options.size,
+            margin=options.margin,
+            light_direction=options.light_direction,
+            content=options.content,
+            udim=UDIM_TOKEN in options.output.name,
+            preset=preset,
+            **settings,
+        )
+    texture.save(options.output)

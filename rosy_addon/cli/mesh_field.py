@@ -20,7 +20,8 @@ from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .options import float_between, float_tuple, int_between, print_note
+from .options import float_between, float_tuple, int_between
+from .scene import print_warnings
 
 
 def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = False) -> None:
@@ -189,15 +190,14 @@ def read_field(
 
 @contextmanager
 def printed_warnings() -> Iterator[None]:
-    """Print the warnings that are issued in a ``with`` block as notes."""
+    """Print the warnings that are issued in a ``with`` block as notes, each text once."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RosyWarning)
         try:
             yield
         finally:
-            for warning in caught:
-                if issubclass(warning.category, RosyWarning):
-                    print_note(str(warning.message))
+            notes = (each for each in caught if issubclass(each.category, RosyWarning))
+            print_warnings(str(note.message) for note in notes)
 
 
 def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Field:

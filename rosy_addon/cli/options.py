@@ -1,4 +1,4 @@
-"""Options that several commands share: of the output, the view and the look; and notes to the user."""
+"""Options that several commands share: of the output, the view and the look."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from ..preset_files.store import default_user_folder, find_preset_file, preset_k
 from ..projection.camera import check_size
 from ..projection.up_axis import UP_AXIS_MATRIX
 from ..settings import settings_of, stored_key
-from .streams import print_error
 
 
 def check_output(options: argparse.Namespace, suffix: str = "") -> None:
@@ -124,12 +123,6 @@ def add_subcommand(
     parser = subparsers.add_parser(name, help=text, description=text)
     parser.set_defaults(run=function)
     return parser
-
-
-def print_note(text: str) -> None:
-    """Print a note to the error stream, unless it is empty."""
-    if text:
-        print_error(text)
 
 
 def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:

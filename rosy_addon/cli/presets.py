@@ -12,8 +12,8 @@ from ..preset_files.store import (
     read_preset,
     user_preset_files,
 )
-from .options import add_subcommand, print_note, user_presets_folder
-from .streams import print_line
+from .options import add_subcommand, user_presets_folder
+from .streams import print_error, print_line
 
 
 def add_presets_command(subparsers: Any) -> None:
@@ -29,7 +29,7 @@ def run_presets(options: argparse.Namespace) -> None:
         try:
             preset = read_preset(path)
         except RosyError as error:
-            print_note(str(error))
+            print_error(str(error))
             continue
         facts = {"preset": key, "name": preset.name, "description": preset.description}
         records.append(facts | {"own": path.parent == folder})

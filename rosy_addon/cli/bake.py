@@ -85,7 +85,7 @@ def run_bake(options: argparse.Namespace) -> None:
     _check_bake_options(options)
     if options.out is None and not options.save:
         raise RosyError("the pictures would not be saved: give --out DIR, --save, or both")
-    if uses_workers(options) and not options.extras.frames_are_drawn:
+    if uses_workers(options) and not options.extras.is_in_blender:
         run_workers(options)
         if not options.save:
             return

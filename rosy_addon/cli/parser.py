@@ -50,8 +50,8 @@ class Extras:
     run_in_blender : function, optional
         Runs the command in a Blender and exits with its status, given the options, the verb and the
         .blend file. Returns if the command can run in this process.
-    frames_are_drawn : bool
-        Whether other processes have drawn the frames of this command.
+    is_in_blender : bool
+        Whether this is the Blender that runs a command again. Other processes have drawn its frames already.
     """
 
     program: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class Extras:
     add_commands: tuple[Callable[[Any], None], ...] = ()
     find_blender_encoder: Callable[[str | None], Encoder | None] | None = None
     run_in_blender: Callable[[argparse.Namespace, str, Path | None], None] | None = None
-    frames_are_drawn: bool = False
+    is_in_blender: bool = False
 
 
 NO_EXTRAS = Extras()

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .. import api
+from ..api.drawings import draw_strokes
 from ..api.pictures import DEFAULT_VIEW
 from ..errors import RosyError
 from ..frame_workers import parse_frames
@@ -88,32 +88,13 @@ def run_strokes(options: argparse.Namespace) -> None:
         _draw_scene_strokes(options)
         return
     _reject_options(options, SCENE_ONLY_DEFAULTS, ".blend files")
-    arguments = _drawing_arguments(options)
-    surface, field = load_mesh_and_field(options)
-    api.strokes(surface, field, **arguments).save(options.output)
-
-
-def _drawing_arguments(options: argparse.Namespace) -> dict[str, Any]:
-    """Return what the options say about a drawing, as arguments of `api.strokes`.
-
-    Raises
-    ------
-    RosyError
-        If they are not possible.
-    """
     # Mistakes are reported before the mesh is read.
     style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    return style_overrides(options) | {
-        "view": options.view,
-        "size": requested_size(options),
-        "orthographic": options.ortho,
-        "width": pen.width,
-        "colors": pen.colours,
-        "paper": pen.paper,
-        "millimeters": pen.millimetres,
-        "plotter": pen.plotter,
-    }
+    size = requested_size(options)
+    surface, field = load_mesh_and_field(options)
+    drawing = draw_strokes(surface, field, style, pen, options.view, size, options.ortho)
+    drawing.save(options.output)
 
 
 def _draw_scene_strokes(options: argparse.Namespace) -> None:
@@ -230,16 +211,11 @@ def _add_setting_option(parser: argparse.ArgumentParser, setting: Setting) -> No
 
 def stroke_style_of(options: argparse.Namespace, base: StrokeStyle) -> StrokeStyle:
     """Return the style with the fields that the options override."""
-    overrides = style_overrides(options)
+    values = vars(options)
+    overrides = {name: values[name] for name in settings_of(StrokeStyle) if name in values}
     if "spacing" in overrides or "distance" in overrides:
         overrides["unit"] = "world" if "distance" in overrides else "pixels"
     return replace(base, **overrides)
-
-
-def style_overrides(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the settings of `StrokeStyle` that the options override."""
-    values = vars(options)
-    return {name: values[name] for name in settings_of(StrokeStyle) if name in values}
 
 
 def add_pen_options(parser: argparse.ArgumentParser) -> None:

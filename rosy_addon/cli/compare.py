@@ -21,6 +21,7 @@ from .options import (
     add_look_options,
     add_subcommand,
     add_workers_option,
+    api_arguments,
     check_output,
     float_between,
     int_between,
@@ -82,6 +83,7 @@ def add_compare_command(subparsers: Any) -> None:
     )
     parser.add_argument(
         "--match-reach",
+        dest="reach",
         type=float_between(0.0, 10.0),
         default=DEFAULT_REACH,
         metavar="SHARE",
@@ -125,7 +127,10 @@ def add_compare_command(subparsers: Any) -> None:
     )
     add_direction_options(parser)
     parser.add_argument(
-        "--perspective", action="store_true", help="perspective projection instead of orthographic"
+        "--perspective",
+        dest="orthographic",
+        action="store_false",
+        help="perspective projection instead of orthographic",
     )
     add_workers_option(parser)
     add_look_options(parser)
@@ -139,30 +144,22 @@ def run_compare(options: argparse.Namespace) -> None:
         check_output(options)
         picture_look(str(options.mesh), preset, settings, {})
         load_drawing()
-    comparison = api.compare(_load_fields(options), reach=options.match_reach)
+    comparison = api.compare(_load_fields(options), reach=options.reach)
     if options.output is not None:
-        _draw(options, comparison, {"preset": preset, **settings})
+        _draw(options, comparison)
     write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
     print_line(write[options.format]())
 
 
-def _draw(
-    options: argparse.Namespace, comparison: api.Comparison, settings: dict[str, Any]
-) -> None:
+def _draw(options: argparse.Namespace, comparison: api.Comparison) -> None:
     """Write the figures."""
-    names = ("columns", "width", "dpi", "view", "lines", "workers", "scale_bar", "color_label")
-    arguments = {name: getattr(options, name) for name in names} | settings
-    arguments["orthographic"] = not options.perspective
+    arguments = api_arguments(options, api.figure)
     rest = ("differences", "table") if comparison.differences else ("table",)
     if options.output.suffix.lower() == ".pdf":
-        pages = [
-            api.figure(comparison, caption=options.caption, **arguments),
-            api.figure(comparison, parts=rest, **arguments),
-        ]
+        second_page = arguments | {"parts": rest, "caption": ""}
+        pages = [api.figure(comparison, **arguments), api.figure(comparison, **second_page)]
     else:
-        pages = [
-            api.figure(comparison, parts=("fields", *rest), caption=options.caption, **arguments)
-        ]
+        pages = [api.figure(comparison, parts=("fields", *rest), **arguments)]
     api.save_figures(options.output, pages)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import re
 import sys
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW, VERTEX_COLOR, picture_look
+from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..errors import RosyError
 from ..file_io import check_writable
@@ -132,7 +133,10 @@ def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | No
         "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"
     )
     parser.add_argument(
-        "--ortho", action="store_true", help="orthographic projection instead of perspective"
+        "--ortho",
+        dest="orthographic",
+        action="store_true",
+        help="orthographic projection instead of perspective",
     )
 
 
@@ -151,11 +155,6 @@ def add_direction_options(parser: argparse.ArgumentParser) -> None:
         choices=list(UP_AXIS_MATRIX),
         help="upward axis of the file; by default y for .obj and .off, otherwise z",
     )
-
-
-def requested_size(options: argparse.Namespace) -> tuple[int, int]:
-    """Return the size of the picture in pixels."""
-    return check_size(*(options.size or DEFAULT_SIZE))
 
 
 def add_look_options(parser: argparse.ArgumentParser) -> None:
@@ -188,20 +187,20 @@ def add_flow_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_color_option(parser: argparse.ArgumentParser) -> None:
-    """Add --color-values."""
+def add_picture_options(parser: argparse.ArgumentParser, size: tuple[int, int]) -> None:
+    """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
+    add_view_options(parser, size)
+    add_workers_option(parser)
+    add_look_options(parser)
     parser.add_argument(
         "--color-values",
         metavar="NAME",
         help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
         "property of a .ply file",
     )
-
-
-def add_tone_options(parser: argparse.ArgumentParser) -> None:
-    """Add the sources of the tone that belong to the mesh."""
     parser.add_argument(
         "--tone-attribute",
+        dest="tone_values",
         metavar="NAME",
         help="take the tone from a vertex property of a .ply file, or from the vertex colors: "
         f"'{VERTEX_COLOR}'",
@@ -231,35 +230,31 @@ def requested_look(options: argparse.Namespace, default: Look) -> Look:
     return look.with_settings(requested_settings(options))
 
 
-def picture_arguments(options: argparse.Namespace) -> dict[str, Any]:
-    """Return what the options say about a picture, as arguments of `api.render`.
+def api_arguments(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
+    """Return the options that are named like keyword parameters of a function, and the settings of the look."""
+    names = inspect.getfullargspec(function).kwonlyargs
+    arguments = {name: value for name, value in vars(options).items() if name in names}
+    return arguments | {"preset": requested_preset(options)} | requested_settings(options)
+
+
+def picture_arguments(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
+    """Return what the options say about a picture of a mesh, as arguments of a function of `api`.
 
     Raises
     ------
     RosyError
         If they are not possible.
     """
-    sources = {
-        option: getattr(options, f"tone_{option}", None)
-        for option in ("attribute", "image", "picture")
-    }
+    sources = {"attribute": options.tone_values, "image": options.tone_image}
+    sources["picture"] = getattr(options, "tone_picture", None)
     given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
     if len(given) > 1:
         raise RosyError(f"give either {given[0]} or {given[1]}, not both")
     preset, settings = requested_preset(options), requested_settings(options)
     # Mistakes are reported before the mesh is read.
     picture_look(str(options.mesh), preset, settings, sources, options.color_values is not None)
-    arguments = {
-        "view": options.view,
-        "size": requested_size(options),
-        "orthographic": options.ortho,
-        "preset": preset,
-        "color_values": options.color_values,
-        "tone_values": sources["attribute"],
-        "tone_image": sources["image"],
-        "workers": options.workers,
-    }
-    return arguments | settings
+    check_size(*options.size)
+    return api_arguments(options, function)
 
 
 def _parse_setting(text: str) -> tuple[str, Any]:

@@ -16,13 +16,11 @@ from ..surface_texture.draw import DEFAULT_SIZE as DEFAULT_TEXTURE_SIZE
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
 from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings
 from .options import (
-    add_color_option,
     add_flow_option,
     add_look_options,
+    add_picture_options,
     add_subcommand,
-    add_tone_options,
-    add_view_options,
-    add_workers_option,
+    api_arguments,
     check_output,
     float_between,
     float_tuple,
@@ -39,11 +37,7 @@ def add_render_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "render", run_render)
     add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
-    add_view_options(parser, DEFAULT_SIZE)
-    add_workers_option(parser)
-    add_look_options(parser)
-    add_color_option(parser)
-    add_tone_options(parser)
+    add_picture_options(parser, DEFAULT_SIZE)
     parser.add_argument(
         "--tone-picture",
         type=Path,
@@ -55,10 +49,9 @@ def add_render_command(subparsers: Any) -> None:
 def run_render(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file as a picture."""
     check_output(options, ".png")
-    arguments = picture_arguments(options)
+    arguments = picture_arguments(options, api.render)
     surface, field = load_mesh_and_field(options)
-    picture = api.render(surface, field, tone_picture=options.tone_picture, **arguments)
-    picture.save(options.output)
+    api.render(surface, field, **arguments).save(options.output)
 
 
 def add_turntable_command(subparsers: Any) -> None:
@@ -73,22 +66,17 @@ def add_turntable_command(subparsers: Any) -> None:
         metavar="N",
         help="pictures in a full turn (%(default)d)",
     )
-    add_rate_option(parser)
-    add_flow_option(parser)
+    add_motion_options(parser)
     parser.add_argument(
         "--still",
         action="store_true",
         help="leave the camera where it is: only streaks drift, as --flow says",
     )
-    add_view_options(parser, DEFAULT_VIDEO_SIZE)
-    add_workers_option(parser)
-    add_look_options(parser)
-    add_color_option(parser)
-    add_tone_options(parser)
+    add_picture_options(parser, DEFAULT_VIDEO_SIZE)
 
 
-def add_rate_option(parser: argparse.ArgumentParser) -> None:
-    """Add --rate, of a video."""
+def add_motion_options(parser: argparse.ArgumentParser) -> None:
+    """Add --rate, of a video, and --flow."""
     parser.add_argument(
         "--rate",
         type=float_between(0.1, 1000.0),
@@ -96,6 +84,7 @@ def add_rate_option(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="pictures per second (%(default)g)",
     )
+    add_flow_option(parser)
 
 
 def run_turntable(options: argparse.Namespace) -> None:
@@ -104,16 +93,13 @@ def run_turntable(options: argparse.Namespace) -> None:
     check_video_path(options.output)
     if options.pictures < 2:
         raise RosyError("a turntable needs 2 or more --pictures")
-    arguments = picture_arguments(options)
+    arguments = picture_arguments(options, api.turntable)
     encode = video_encoder(options)
     surface, field = load_mesh_and_field(options)
     api.turntable(
         surface,
         field,
         path=options.output,
-        pictures=options.pictures,
-        rate=options.rate,
-        still=options.still,
         encode=encode,
         on_picture=lambda number: print_line(f"picture {number} of {options.pictures}"),
         **arguments,
@@ -190,20 +176,10 @@ def add_texture_command(subparsers: Any) -> None:
 def run_texture(options: argparse.Namespace) -> None:
     """Draw the field of a mesh file as a texture for its UV map."""
     check_output(options, ".png")
-    preset, settings = requested_preset(options), requested_settings(options)
     # Mistakes are reported before the mesh is read.
-    texture_look(preset, settings)
+    texture_look(requested_preset(options), requested_settings(options))
     surface, field = load_mesh_and_field(options)
+    udim = UDIM_TOKEN in options.output.name
     with printed_warnings():
-        texture = api.texture(
-            surface,
-            field,
-            size=options.size,
-            margin=options.margin,
-            light_direction=options.light_direction,
-            content=options.content,
-            udim=UDIM_TOKEN in options.output.name,
-            preset=preset,
-            **settings,
-        )
+        texture = api.texture(surface, field, udim=udim, **api_arguments(options, api.texture))
     texture.save(options.output)

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from ..api.drawings import draw_strokes
-from ..api.pictures import DEFAULT_VIEW
+from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
 from ..errors import RosyError
 from ..frame_workers import parse_frames
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
+from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
 from ..settings import Choice, Number, Setting, Switch, settings_of
 from .mesh_field import add_mesh_options, load_mesh_and_field
@@ -27,7 +28,6 @@ from .options import (
     add_view_options,
     check_output,
     float_between,
-    requested_size,
 )
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
@@ -36,7 +36,7 @@ from .streams import print_line
 MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
     **dict.fromkeys(("array", "step", "singularities")),
-    **dict.fromkeys(("uv", "undefined", "ortho"), False),
+    **dict.fromkeys(("uv", "undefined", "orthographic"), False),
     "view": DEFAULT_VIEW,
 }
 #: The options that are only for pictures, with the names of their values.
@@ -46,6 +46,9 @@ PAGE_OPTIONS = {
     "--colors": "colours",
     "--paper": "paper",
 }
+#: What users give for a value, if it has another name.
+OPTION_NAMES = {"field": "FIELD", "orthographic": "--ortho"}
+
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 
 
@@ -91,9 +94,9 @@ def run_strokes(options: argparse.Namespace) -> None:
     # Mistakes are reported before the mesh is read.
     style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    size = requested_size(options)
+    size = check_size(*(options.size or DEFAULT_SIZE))
     surface, field = load_mesh_and_field(options)
-    drawing = draw_strokes(surface, field, style, pen, options.view, size, options.ortho)
+    drawing = draw_strokes(surface, field, style, pen, options.view, size, options.orthographic)
     drawing.save(options.output)
 
 
@@ -172,7 +175,7 @@ def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_
     """
     for name, default in defaults.items():
         if getattr(options, name) != default:
-            option = "FIELD" if name == "field" else "--" + name.replace("_", "-")
+            option = OPTION_NAMES.get(name, "--" + name.replace("_", "-"))
             raise RosyError(
                 f"{options.mesh or 'the open file'}: {option} applies only to {file_kind}"
             )

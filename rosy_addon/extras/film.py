@@ -16,18 +16,17 @@ from ..api.mesh_objects import MeshArrays
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
 from ..cli.mesh_field import printed_warnings
 from ..cli.options import (
-    add_flow_option,
     add_look_options,
     add_subcommand,
     add_view_options,
     add_workers_option,
+    api_arguments,
     check_output,
     int_between,
     requested_preset,
     requested_settings,
-    requested_size,
 )
-from ..cli.pictures import add_rate_option, video_encoder
+from ..cli.pictures import add_motion_options, video_encoder
 from ..cli.streams import print_line
 from ..errors import RosyError
 from ..external.simulation_files import SUFFIXES, Step, in_order, list_steps
@@ -82,8 +81,7 @@ def add_film_command(subparsers: Any) -> None:
         action="store_true",
         help="let the first step follow the last one, for films that are shown in a loop",
     )
-    add_rate_option(parser)
-    add_flow_option(parser)
+    add_motion_options(parser)
     add_view_options(parser, DEFAULT_VIDEO_SIZE)
     add_workers_option(parser)
     add_look_options(parser)
@@ -120,17 +118,9 @@ def run_film(options: argparse.Namespace) -> None:
         api.film(
             fields,
             options.output,
-            between=between,
-            loop=options.loop,
-            rate=options.rate,
-            view=options.view,
-            size=requested_size(options),
-            orthographic=options.ortho,
-            preset=preset,
-            workers=options.workers,
             encode=encode,
             on_picture=announce,
-            **settings,
+            **api_arguments(options, api.film),
         )
 
 

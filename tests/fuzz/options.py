@@ -21,7 +21,7 @@ FILE_OPTIONS = {
     *(
         "tone_image",
         "tone_picture",
-        "tone_attribute",
+        "tone_values",
         "color_values",
         "uv",
         "object",

@@ -8,6 +8,6 @@ Each command has its options and its function in one module. Modules in order of
     streams                                          safe output
     options, mesh_field                              options that several commands share
     scene                                            Blender files
-    pictures, strokes, field, compare, bake, presets the commands
+    pictures, strokes, field, bake, presets          the commands
     parser                                           the parser of all commands, and `main`
 """

@@ -1,4 +1,4 @@
-"""The commands `field` and `info`: write, convert and describe field files."""
+"""The commands `field`, `info` and `compare`: write, convert, describe and compare fields."""
 
 from __future__ import annotations
 
@@ -10,13 +10,39 @@ from typing import Any
 import numpy as np
 
 from .. import api
+from ..api.figures import LINES, check_figure_path, load_drawing
+from ..api.pictures import picture_look
+from ..api.surface import simulation_suffixes
 from ..errors import RosyError, counted
 from ..field.curvature import MAGNITUDES
-from ..field.field_io import WRITE_SUFFIXES
+from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
+from ..field.mesh_io import READERS
+from ..field.rosy_field import check_degree
+from ..field.singularity_matching import DEFAULT_REACH
 from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings, read_field
-from .options import add_subcommand, check_output, float_between
+from .options import (
+    add_direction_options,
+    add_look_options,
+    add_subcommand,
+    add_workers_option,
+    api_arguments,
+    check_output,
+    float_between,
+    int_between,
+    requested_preset,
+    requested_settings,
+)
 from .streams import print_line
+
+#: Generators that need nothing but the mesh and a degree.
+GENERATORS = {
+    "form": api.form,
+    "smoothest": api.smoothest,
+    "curvature": api.curvature,
+    "features": api.features,
+    "uv": api.along_uv,
+}
 
 
 def add_field_command(subparsers: Any) -> None:
@@ -172,3 +198,156 @@ def _format_comparison(against: dict[str, Any] | None) -> list[str]:
         f"off by {against['mean']:.4g} degrees on average, rms {against['rms']:.4g}, at most "
         f"{against['max']:.4g}, on {100 * against['compared']:.4g} % of the faces"
     ]
+
+
+def add_compare_command(subparsers: Any) -> None:
+    """Add the command `compare`."""
+    parser = add_subcommand(subparsers, "compare", run_compare)
+    suffixes = [*READERS, *simulation_suffixes()]
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
+    parser.add_argument(
+        "fields",
+        nargs="+",
+        metavar="[TITLE=]FIELD",
+        help=f"a field file ({', '.join(READ_SUFFIXES)}), or what to generate: "
+        f"{', '.join(GENERATORS)}. The first one is what the others are compared with",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="OUT.pdf|OUT.svg|OUT.png",
+        help="draw the fields, their differences and the table; a .pdf has two pages",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "latex"),
+        default="text",
+        help="of the table that is printed (%(default)s)",
+    )
+    parser.add_argument(
+        "--degree",
+        type=int,
+        metavar="N",
+        help="degree of generated fields, 1 to 12; by default that of the first field file, or 4",
+    )
+    parser.add_argument(
+        "--field-mesh",
+        type=Path,
+        metavar="MESH",
+        help="mesh file that the field files belong to, if it is not MESH; the fields are transferred by "
+        "position",
+    )
+    parser.add_argument(
+        "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
+    )
+    parser.add_argument(
+        "--match-reach",
+        dest="reach",
+        type=float_between(0.0, 10.0),
+        default=DEFAULT_REACH,
+        metavar="SHARE",
+        help="largest distance of singularities that match, as a fraction of the size of the mesh "
+        "(%(default)g)",
+    )
+    parser.add_argument(
+        "--lines",
+        choices=LINES,
+        default=LINES[0],
+        help="lines that are drawn over differences (%(default)s)",
+    )
+    parser.add_argument(
+        "--columns",
+        type=int_between(1, 100),
+        metavar="N",
+        help="panels side by side; by default at most 3",
+    )
+    parser.add_argument(
+        "--width",
+        type=float_between(0.5, 100.0),
+        default=7.0,
+        metavar="INCHES",
+        help="width of the figure (%(default)g)",
+    )
+    parser.add_argument(
+        "--dpi",
+        type=int_between(10, 2400),
+        default=300,
+        metavar="N",
+        help="resolution of the pictures (%(default)d)",
+    )
+    parser.add_argument("--caption", default="", metavar="TEXT", help="text below the fields")
+    parser.add_argument(
+        "--scale-bar", metavar="UNIT", help="draw a scale bar, in this unit of the coordinates"
+    )
+    parser.add_argument(
+        "--color-label",
+        metavar="TEXT",
+        help="title of the color bar; by default the name of what is shown",
+    )
+    add_direction_options(parser)
+    parser.add_argument(
+        "--perspective",
+        dest="orthographic",
+        action="store_false",
+        help="perspective projection instead of orthographic",
+    )
+    add_workers_option(parser)
+    add_look_options(parser)
+
+
+def run_compare(options: argparse.Namespace) -> None:
+    """Compare fields on a mesh: angles, energies and singularities."""
+    preset, settings = requested_preset(options), requested_settings(options)
+    if options.output is not None:
+        check_figure_path(options.output)
+        check_output(options)
+        picture_look(str(options.mesh), preset, settings, {})
+        load_drawing()
+    comparison = api.compare(_load_fields(options), reach=options.reach)
+    if options.output is not None:
+        _draw(options, comparison)
+    write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
+    print_line(write[options.format]())
+
+
+def _draw(options: argparse.Namespace, comparison: api.Comparison) -> None:
+    """Write the figures."""
+    arguments = api_arguments(options, api.figure)
+    rest = ("differences", "table") if comparison.differences else ("table",)
+    if options.output.suffix.lower() == ".pdf":
+        second_page = arguments | {"parts": rest, "caption": ""}
+        pages = [api.figure(comparison, **arguments), api.figure(comparison, **second_page)]
+    else:
+        pages = [api.figure(comparison, parts=("fields", *rest), **arguments)]
+    api.save_figures(options.output, pages)
+
+
+def _load_fields(options: argparse.Namespace) -> dict[str, api.Field]:
+    """Read or generate the fields, by their titles."""
+    if options.degree is not None:
+        check_degree(options.degree)
+    sources = dict(_titled_source(text) for text in options.fields)
+    if len(sources) < len(options.fields):
+        raise RosyError(f"{options.mesh}: two fields have the same title: give TITLE=FIELD")
+    fields: dict[str, api.Field | None] = dict.fromkeys(sources)
+    with printed_warnings():
+        surface = api.Surface(options.mesh, up=options.up)
+        degree = options.degree
+        for title, source in sources.items():
+            if source not in GENERATORS:
+                field = fields[title] = read_field(options, Path(source), surface, None)
+                degree = field.degree if degree is None else degree
+        for title, source in sources.items():
+            if source in GENERATORS:
+                make = GENERATORS[source]
+                fields[title] = make(surface, DEFAULT_DEGREE if degree is None else degree)
+    return fields
+
+
+def _titled_source(text: str) -> tuple[str, str]:
+    """Return the title and the source of [TITLE=]FIELD."""
+    title, separator, source = text.partition("=")
+    if separator and source and not Path(text).exists():
+        return title, source
+    return (text.capitalize() if text in GENERATORS else Path(text).stem), text

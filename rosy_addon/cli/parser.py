@@ -13,8 +13,7 @@ from typing import Any, TextIO
 from ..errors import REPORTED_ERRORS, error_text
 from ..turntable_video import Encoder
 from .bake import add_bake_command
-from .compare import add_compare_command
-from .field import add_field_command, add_info_command
+from .field import add_compare_command, add_field_command, add_info_command
 from .pictures import add_render_command, add_texture_command, add_turntable_command
 from .presets import add_presets_command
 from .streams import discard_output, output_stream, print_error, print_line

@@ -123,6 +123,11 @@ class Row:
     color_bar: ColorBar | None = None
     legend: str = ""
 
+    @property
+    def drawn(self) -> list[Panel]:
+        """The panels without the empty places."""
+        return [panel for panel in self.panels if panel is not None]
+
 
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     """Return the contents of a file with figures: pages of a .pdf, or a single .svg or .png.
@@ -223,7 +228,7 @@ class Page:
 
     @cached_property
     def _panels(self) -> list[Panel]:
-        return [panel for row in self.rows for panel in row.panels if panel is not None]
+        return [panel for row in self.rows for panel in row.drawn]
 
     @cached_property
     def _panel_size(self) -> tuple[float, float]:
@@ -254,13 +259,11 @@ class Page:
         return lines * self._line_height(row) + (lines - 1) * ROW_GAP
 
     def _line_height(self, row: Row) -> float:
-        has_notes = any(panel is not None and panel.note for panel in row.panels)
-        note = _text_height(TEXT_SIZE) if has_notes else 0.0
+        note = _text_height(TEXT_SIZE) if any(panel.note for panel in row.drawn) else 0.0
         return self._title_height(row) + self._panel_size[1] + note
 
     def _title_height(self, row: Row) -> float:
-        has_titles = any(panel is not None and panel.title for panel in row.panels)
-        return TITLE_HEIGHT if has_titles else 0.0
+        return TITLE_HEIGHT if any(panel.title for panel in row.drawn) else 0.0
 
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
         """Add axes with their upper left corner and size in inches, on whole pixels."""
@@ -321,14 +324,8 @@ class Page:
         """Draw the color bar and the legend of the singularities of a row, in the column of keys."""
         left = self.columns * (self._panel_size[0] + GAP) + GAP
         top += self._title_height(row)
-        marks = [
-            marks
-            for panel in row.panels
-            if panel is not None
-            for marks in (panel.dots, panel.rings)
-            if marks is not None
-        ]
-        entries = _legend_entries(marks)
+        marks = [marks for panel in row.drawn for marks in (panel.dots, panel.rings)]
+        entries = _legend_entries([each for each in marks if each is not None])
         legend_height = len(entries) * _text_height(TEXT_SIZE) * 1.2
         if row.color_bar is not None:
             height = self._panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)

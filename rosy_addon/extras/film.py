@@ -12,8 +12,8 @@ import numpy as np
 
 from .. import api
 from ..api.films import MAX_BETWEEN
-from ..api.mesh_objects import MeshArrays
 from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
+from ..api.surface import MeshArrays
 from ..cli.mesh_field import printed_warnings
 from ..cli.options import (
     add_look_options,

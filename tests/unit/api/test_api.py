@@ -13,8 +13,8 @@ from shapes import icosphere, torus
 
 import rosy_addon as rf
 from rosy_addon import api
-from rosy_addon.api.mesh_objects import MeshArrays
 from rosy_addon.api.pictures import corner_numbers
+from rosy_addon.api.surface import MeshArrays
 from rosy_addon.cli.parser import main
 from rosy_addon.field.formats.polygons import offsets_from_sizes
 

@@ -19,8 +19,7 @@ from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from ..field.singularity_matching import DEFAULT_REACH
-from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings, read_field
+from .mesh_field import add_mesh_options, load_mesh_and_field, read_field
 from .options import (
     add_direction_options,
     add_look_options,
@@ -138,8 +137,7 @@ def run_info(options: argparse.Namespace) -> None:
 def _compare(options: argparse.Namespace, field: api.Field) -> dict[str, Any]:
     """Return the angles to the field in a file, or the differences from a file of singularities."""
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
-        with printed_warnings():
-            other = read_field(options, options.against, field.surface, field.degree)
+        other = read_field(options, options.against, field.surface, field.degree)
         difference = field.difference(other)
         return {
             "mean": np.degrees(difference.mean),
@@ -202,7 +200,7 @@ def _format_comparison(against: dict[str, Any] | None) -> list[str]:
 
 def add_compare_command(subparsers: Any) -> None:
     """Add the command `compare`."""
-    parser = add_subcommand(subparsers, "compare", run_compare)
+    parser = add_subcommand(subparsers, "compare", run_compare, api.figure)
     suffixes = [*READERS, *simulation_suffixes()]
     parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
     parser.add_argument(
@@ -245,7 +243,6 @@ def add_compare_command(subparsers: Any) -> None:
         "--match-reach",
         dest="reach",
         type=float_between(0.0, 10.0),
-        default=DEFAULT_REACH,
         metavar="SHARE",
         help="largest distance of singularities that match, as a fraction of the size of the mesh "
         "(%(default)g)",
@@ -253,7 +250,6 @@ def add_compare_command(subparsers: Any) -> None:
     parser.add_argument(
         "--lines",
         choices=LINES,
-        default=LINES[0],
         help="lines that are drawn over differences (%(default)s)",
     )
     parser.add_argument(
@@ -265,18 +261,16 @@ def add_compare_command(subparsers: Any) -> None:
     parser.add_argument(
         "--width",
         type=float_between(0.5, 100.0),
-        default=7.0,
         metavar="INCHES",
         help="width of the figure (%(default)g)",
     )
     parser.add_argument(
         "--dpi",
         type=int_between(10, 2400),
-        default=300,
         metavar="N",
         help="resolution of the pictures (%(default)d)",
     )
-    parser.add_argument("--caption", default="", metavar="TEXT", help="text below the fields")
+    parser.add_argument("--caption", metavar="TEXT", help="text below the fields")
     parser.add_argument(
         "--scale-bar", metavar="UNIT", help="draw a scale bar, in this unit of the coordinates"
     )
@@ -313,14 +307,15 @@ def run_compare(options: argparse.Namespace) -> None:
 
 def _draw(options: argparse.Namespace, comparison: api.Comparison) -> None:
     """Write the figures."""
-    arguments = api_arguments(options, api.figure)
     rest = ("differences", "table") if comparison.differences else ("table",)
     if options.output.suffix.lower() == ".pdf":
-        second_page = arguments | {"parts": rest, "caption": ""}
-        pages = [api.figure(comparison, **arguments), api.figure(comparison, **second_page)]
+        pages: list[dict[str, Any]] = [{}, {"parts": rest, "caption": ""}]
     else:
-        pages = [api.figure(comparison, parts=("fields", *rest), **arguments)]
-    api.save_figures(options.output, pages)
+        pages = [{"parts": ("fields", *rest)}]
+    figures = [
+        api.figure(comparison, **api_arguments(options, api.figure, **page)) for page in pages
+    ]
+    api.save_figures(options.output, figures)
 
 
 def _load_fields(options: argparse.Namespace) -> dict[str, api.Field]:
@@ -331,17 +326,16 @@ def _load_fields(options: argparse.Namespace) -> dict[str, api.Field]:
     if len(sources) < len(options.fields):
         raise RosyError(f"{options.mesh}: two fields have the same title: give TITLE=FIELD")
     fields: dict[str, api.Field | None] = dict.fromkeys(sources)
-    with printed_warnings():
-        surface = api.Surface(options.mesh, up=options.up)
-        degree = options.degree
-        for title, source in sources.items():
-            if source not in GENERATORS:
-                field = fields[title] = read_field(options, Path(source), surface, None)
-                degree = field.degree if degree is None else degree
-        for title, source in sources.items():
-            if source in GENERATORS:
-                make = GENERATORS[source]
-                fields[title] = make(surface, DEFAULT_DEGREE if degree is None else degree)
+    surface = api.Surface(options.mesh, up=options.up)
+    degree = options.degree
+    for title, source in sources.items():
+        if source not in GENERATORS:
+            field = fields[title] = read_field(options, Path(source), surface, None)
+            degree = field.degree if degree is None else degree
+    for title, source in sources.items():
+        if source in GENERATORS:
+            make = GENERATORS[source]
+            fields[title] = make(surface, DEFAULT_DEGREE if degree is None else degree)
     return fields
 
 

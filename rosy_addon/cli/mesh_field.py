@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,14 +11,13 @@ import numpy as np
 from .. import api
 from ..api.generators import generated, uv_map
 from ..api.surface import simulation_suffixes
-from ..errors import RosyError, RosyWarning
+from ..errors import RosyError
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
 from .options import float_between, float_tuple, int_between
-from .scene import print_warnings
 
 
 def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = False) -> None:
@@ -168,16 +164,15 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
             )
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
-    with printed_warnings():
-        surface = api.Surface(options.mesh, up=getattr(options, "up", None), step=options.step)
-        if options.field is not None:
-            field = read_field(options, options.field, surface, options.degree)
-        elif is_simulation and not has_source:
-            nonfinite = "zero" if options.undefined else "error"
-            field = api.from_array(surface, options.array, options.degree, nonfinite=nonfinite)
-        else:
-            field = _generate_field(options, surface)
-        return surface, field
+    surface = api.Surface(options.mesh, up=getattr(options, "up", None), step=options.step)
+    if options.field is not None:
+        field = read_field(options, options.field, surface, options.degree)
+    elif is_simulation and not has_source:
+        nonfinite = "zero" if options.undefined else "error"
+        field = api.from_array(surface, options.array, options.degree, nonfinite=nonfinite)
+    else:
+        field = _generate_field(options, surface)
+    return surface, field
 
 
 def read_field(
@@ -186,18 +181,6 @@ def read_field(
     """Read a field file, with the options for field files."""
     nonfinite = "zero" if options.undefined else "error"
     return api.read_field(path, surface, degree, nonfinite=nonfinite, mesh=options.field_mesh)
-
-
-@contextmanager
-def printed_warnings() -> Iterator[None]:
-    """Print the warnings that are issued in a ``with`` block as notes, each text once."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RosyWarning)
-        try:
-            yield
-        finally:
-            notes = (each for each in caught if issubclass(each.category, RosyWarning))
-            print_warnings(str(note.message) for note in notes)
 
 
 def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Field:

@@ -117,21 +117,35 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_subcommand(
-    subparsers: Any, name: str, function: Callable[[argparse.Namespace], None]
+    subparsers: Any,
+    name: str,
+    run: Callable[[argparse.Namespace], None],
+    function: Callable[..., Any] | None = None,
 ) -> argparse.ArgumentParser:
-    """Add a command. The first line of the function's docstring becomes its help."""
-    text = function.__doc__.splitlines()[0]
+    """Add a command.
+
+    Parameters
+    ----------
+    subparsers : argparse action
+    name : str
+    run : function
+        Runs it. The first line of its docstring becomes the help.
+    function : function, optional
+        A function of `api` with whose keyword parameters the options have names and defaults in common;
+        see `api_arguments`.
+    """
+    text = run.__doc__.splitlines()[0]
     parser = subparsers.add_parser(name, help=text, description=text)
-    parser.set_defaults(run=function)
+    if function is not None:
+        parser.set_defaults(**inspect.getfullargspec(function).kwonlydefaults)
+    parser.set_defaults(run=run)
     return parser
 
 
-def add_view_options(parser: argparse.ArgumentParser, size: tuple[int, int] | None) -> None:
-    """Add the options of the view. `size` is the default of --size."""
+def add_view_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the view."""
     add_direction_options(parser)
-    parser.add_argument(
-        "--size", type=parse_size, default=size, metavar="WxH", help="size in pixels"
-    )
+    parser.add_argument("--size", type=parse_size, metavar="WxH", help="size in pixels")
     parser.add_argument(
         "--ortho",
         dest="orthographic",
@@ -187,9 +201,9 @@ def add_flow_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_picture_options(parser: argparse.ArgumentParser, size: tuple[int, int]) -> None:
+def add_picture_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
-    add_view_options(parser, size)
+    add_view_options(parser)
     add_workers_option(parser)
     add_look_options(parser)
     parser.add_argument(
@@ -230,11 +244,22 @@ def requested_look(options: argparse.Namespace, default: Look) -> Look:
     return look.with_settings(requested_settings(options))
 
 
-def api_arguments(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
-    """Return the options that are named like keyword parameters of a function, and the settings of the look."""
+def api_arguments(
+    options: argparse.Namespace, function: Callable[..., Any], **others: Any
+) -> dict[str, Any]:
+    """Return the keyword arguments of a function: the options with these names, and the settings of the look.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    function : function
+        Of `api`.
+    **others
+        Arguments that replace those of the options.
+    """
     names = inspect.getfullargspec(function).kwonlyargs
     arguments = {name: value for name, value in vars(options).items() if name in names}
-    return arguments | {"preset": requested_preset(options)} | requested_settings(options)
+    return arguments | {"preset": requested_preset(options)} | others | requested_settings(options)
 
 
 def picture_arguments(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from .bake import add_bake_command
 from .field import add_compare_command, add_field_command, add_info_command
 from .pictures import add_render_command, add_texture_command, add_turntable_command
 from .presets import add_presets_command
-from .streams import discard_output, output_stream, print_error, print_line
+from .streams import discard_output, output_stream, print_error, print_line, printed_warnings
 from .strokes import add_strokes_command
 
 #: Options whose values may begin with a minus sign.
@@ -88,7 +88,8 @@ def main(
     arguments = sys.argv[1:] if argv is None else argv
     try:
         options = _build_parser(prog, extras).parse_args(_join_negative_values(arguments))
-        options.run(options)
+        with printed_warnings():
+            options.run(options)
         output_stream().flush()
     except REPORTED_ERRORS as error:
         print_error(error_text(error))

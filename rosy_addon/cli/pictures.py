@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from .. import api
-from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIDEO_SIZE, find_ffmpeg
+from ..api.pictures import find_ffmpeg
 from ..api.textures import UDIM_TOKEN, texture_look
 from ..errors import RosyError
-from ..surface_texture.draw import CONTENTS, DEFAULT_MARGIN, MAX_MARGIN, MAX_SIZE, MIN_SIZE
-from ..surface_texture.draw import DEFAULT_SIZE as DEFAULT_TEXTURE_SIZE
+from ..surface_texture.draw import CONTENTS, MAX_MARGIN, MAX_SIZE, MIN_SIZE
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
-from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings
+from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import (
     add_flow_option,
     add_look_options,
@@ -34,10 +33,10 @@ from .streams import print_line
 
 def add_render_command(subparsers: Any) -> None:
     """Add the command `render`."""
-    parser = add_subcommand(subparsers, "render", run_render)
+    parser = add_subcommand(subparsers, "render", run_render, api.render)
     add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
-    add_picture_options(parser, DEFAULT_SIZE)
+    add_picture_options(parser)
     parser.add_argument(
         "--tone-picture",
         type=Path,
@@ -56,13 +55,12 @@ def run_render(options: argparse.Namespace) -> None:
 
 def add_turntable_command(subparsers: Any) -> None:
     """Add the command `turntable`."""
-    parser = add_subcommand(subparsers, "turntable", run_turntable)
+    parser = add_subcommand(subparsers, "turntable", run_turntable, api.turntable)
     add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
     parser.add_argument(
         "--pictures",
         type=int_between(1, 10_000),
-        default=72,
         metavar="N",
         help="pictures in a full turn (%(default)d)",
     )
@@ -72,7 +70,7 @@ def add_turntable_command(subparsers: Any) -> None:
         action="store_true",
         help="leave the camera where it is: only streaks drift, as --flow says",
     )
-    add_picture_options(parser, DEFAULT_VIDEO_SIZE)
+    add_picture_options(parser)
 
 
 def add_motion_options(parser: argparse.ArgumentParser) -> None:
@@ -80,7 +78,6 @@ def add_motion_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate",
         type=float_between(0.1, 1000.0),
-        default=24.0,
         metavar="N",
         help="pictures per second (%(default)g)",
     )
@@ -95,15 +92,13 @@ def run_turntable(options: argparse.Namespace) -> None:
         raise RosyError("a turntable needs 2 or more --pictures")
     arguments = picture_arguments(options, api.turntable)
     encode = video_encoder(options)
+
+    def announce(number: int) -> None:
+        print_line(f"picture {number} of {options.pictures}")
+
     surface, field = load_mesh_and_field(options)
-    api.turntable(
-        surface,
-        field,
-        path=options.output,
-        encode=encode,
-        on_picture=lambda number: print_line(f"picture {number} of {options.pictures}"),
-        **arguments,
-    )
+    arguments |= {"path": options.output, "encode": encode, "on_picture": announce}
+    api.turntable(surface, field, **arguments)
 
 
 def video_encoder(options: argparse.Namespace) -> Encoder | None:
@@ -133,7 +128,7 @@ def video_encoder(options: argparse.Namespace) -> Encoder | None:
 
 def add_texture_command(subparsers: Any) -> None:
     """Add the command `texture`."""
-    parser = add_subcommand(subparsers, "texture", run_texture)
+    parser = add_subcommand(subparsers, "texture", run_texture, api.texture)
     add_mesh_options(parser)
     parser.add_argument(
         "-o",
@@ -146,14 +141,12 @@ def add_texture_command(subparsers: Any) -> None:
     parser.add_argument(
         "--size",
         type=int_between(MIN_SIZE, MAX_SIZE),
-        default=DEFAULT_TEXTURE_SIZE,
         metavar="N",
         help="width and height in texels (%(default)d)",
     )
     parser.add_argument(
         "--margin",
         type=int_between(0, MAX_MARGIN),
-        default=DEFAULT_MARGIN,
         metavar="N",
         help="width of the margin around charts, in texels (%(default)d)",
     )
@@ -167,7 +160,6 @@ def add_texture_command(subparsers: Any) -> None:
     parser.add_argument(
         "--content",
         choices=list(CONTENTS),
-        default="look",
         help="; ".join(f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()),
     )
     add_look_options(parser)
@@ -179,7 +171,5 @@ def run_texture(options: argparse.Namespace) -> None:
     # Mistakes are reported before the mesh is read.
     texture_look(requested_preset(options), requested_settings(options))
     surface, field = load_mesh_and_field(options)
-    udim = UDIM_TOKEN in options.output.name
-    with printed_warnings():
-        texture = api.texture(surface, field, udim=udim, **api_arguments(options, api.texture))
-    texture.save(options.output)
+    arguments = api_arguments(options, api.texture, udim=UDIM_TOKEN in options.output.name)
+    api.texture(surface, field, **arguments).save(options.output)

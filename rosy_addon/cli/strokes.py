@@ -65,7 +65,7 @@ def add_strokes_command(subparsers: Any) -> None:
         metavar="OUT",
         help="file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv",
     )
-    add_view_options(parser, None)
+    add_view_options(parser)
     add_object_option(parser, "objects of a .blend file; by default all with a field")
     parser.add_argument(
         "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"

@@ -12,9 +12,8 @@ import numpy as np
 
 from .. import api
 from ..api.films import MAX_BETWEEN
-from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
+from ..api.pictures import picture_look
 from ..api.surface import MeshArrays
-from ..cli.mesh_field import printed_warnings
 from ..cli.options import (
     add_look_options,
     add_subcommand,
@@ -41,7 +40,7 @@ from ..turntable_video import check_video_path
 
 def add_film_command(subparsers: Any) -> None:
     """Add the command `film`."""
-    parser = add_subcommand(subparsers, "film", run_film)
+    parser = add_subcommand(subparsers, "film", run_film, api.film)
     parser.description += (
         " Files whose names differ only in numbers are shown in the order of the numbers."
     )
@@ -71,7 +70,6 @@ def add_film_command(subparsers: Any) -> None:
     parser.add_argument(
         "--between",
         type=_count_or_auto,
-        default=0,
         metavar="N|auto",
         help="pictures between two steps, for which fields and vertices are interpolated (%(default)d); auto: as "
         "many as keep streaks steady",
@@ -82,7 +80,7 @@ def add_film_command(subparsers: Any) -> None:
         help="let the first step follow the last one, for films that are shown in a loop",
     )
     add_motion_options(parser)
-    add_view_options(parser, DEFAULT_VIDEO_SIZE)
+    add_view_options(parser)
     add_workers_option(parser)
     add_look_options(parser)
 
@@ -114,14 +112,8 @@ def run_film(options: argparse.Namespace) -> None:
         else:
             print_line(f"picture {number}{total}")
 
-    with printed_warnings():
-        api.film(
-            fields,
-            options.output,
-            encode=encode,
-            on_picture=announce,
-            **api_arguments(options, api.film),
-        )
+    arguments = api_arguments(options, api.film, encode=encode, on_picture=announce)
+    api.film(fields, options.output, **arguments)
 
 
 def requested_fields(options: argparse.Namespace) -> SimulationFields | FieldFiles:

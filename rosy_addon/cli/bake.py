@@ -174,15 +174,13 @@ def uses_workers(options: argparse.Namespace) -> bool:
 
 def run_workers(options: argparse.Namespace) -> None:
     """Draw the frames in other processes, on this machine or on a cluster."""
-    blender_path = sys.modules["bpy"].app.binary_path if "bpy" in sys.modules else ""
-    scene = options.scene
+    bpy, scene = sys.modules.get("bpy"), options.scene
     if scene is None:
-        blend_data = sys.modules["bpy"].data if "bpy" in sys.modules else None
-        if blend_data is None or not blend_data.filepath or blend_data.is_dirty:
+        if bpy is None or not bpy.data.filepath or bpy.data.is_dirty:
             raise RosyError(
                 "--jobs and --scheduler need a saved file: save it, or give SCENE.blend"
             )
-        scene = Path(blend_data.filepath)
+        scene = Path(bpy.data.filepath)
     check_readable(scene)
     real_path, arguments = os.path.realpath(scene), _forwarded_args(options)
     frames = parse_frames(options.frames)
@@ -190,8 +188,8 @@ def run_workers(options: argparse.Namespace) -> None:
         arguments = ["bake", real_path, *arguments]
         output_lines = options.extras.run_on_cluster(arguments, frames, options.scheduler)
     else:
-        if blender_path:
-            command = [blender_path, "-b", real_path, "--command", "rosy", "bake"]
+        if bpy is not None and bpy.app.binary_path:
+            command = [bpy.app.binary_path, "-b", real_path, "--command", "rosy", "bake"]
         elif options.extras.program:
             command = [*options.extras.program, "bake", real_path]
         else:
@@ -207,24 +205,27 @@ def _forwarded_args(options: argparse.Namespace) -> list[str]:
 
     Each is one word, because names may begin with a dash.
     """
-    arguments = [f"--out={os.path.realpath(options.out)}"]
-    arguments += [f"--object={name}" for name in options.object or ()]
-    if options.camera is not None:
-        arguments.append(f"--camera={options.camera}")
-    if options.all_cameras:
-        arguments.append("--all-cameras")
-    if options.size is not None:
-        arguments.append(f"--size={options.size[0]}x{options.size[1]}")
-    if options.preset is not None:
-        arguments.append(f"--preset={_forwarded_preset(options.preset)}")
-    if options.device is not None:
-        arguments.append(f"--device={options.device}")
-    arguments += [f"--set={setting}" for setting in options.set]
-    if options.extras.run_in_blender is not None and options.blender is not None:
-        arguments.append(f"--blender={_forwarded_program(options.blender)}")
-    # The processes for frames use all cores already.
-    arguments.append(f"--workers={options.workers or 1}")
-    return arguments
+    width_and_height, preset = options.size, options.preset
+    blender = getattr(options, "blender", None)
+    values = {
+        "out": [os.path.realpath(options.out)],
+        "object": options.object or [],
+        "camera": [options.camera],
+        "size": [width_and_height and "{}x{}".format(*width_and_height)],
+        "preset": [preset and _forwarded_preset(preset)],
+        "device": [options.device],
+        "set": options.set,
+        "blender": [blender and _forwarded_program(blender)],
+        # The processes for frames use all cores already.
+        "workers": [options.workers or 1],
+    }
+    arguments = [
+        f"--{name}={value}"
+        for name, given in values.items()
+        for value in given
+        if value is not None
+    ]
+    return [*arguments, "--all-cameras"] if options.all_cameras else arguments
 
 
 def _forwarded_preset(preset: str) -> str:

@@ -39,15 +39,15 @@ MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("uv", "undefined", "orthographic"), False),
     "view": DEFAULT_VIEW,
 }
-#: The options that are only for pictures, with the names of their values.
-PAGE_OPTIONS = {
-    "--plotter": "plotter",
-    "--mm": "millimetres",
-    "--colors": "colours",
-    "--paper": "paper",
-}
+#: The same of the options that are only for pictures.
+PAGE_ONLY_DEFAULTS = dict.fromkeys(("plotter", "millimetres", "colours", "paper"))
 #: What users give for a value, if it has another name.
-OPTION_NAMES = {"field": "FIELD", "orthographic": "--ortho"}
+OPTION_NAMES = {
+    "field": "FIELD",
+    "orthographic": "--ortho",
+    "millimetres": "--mm",
+    "colours": "--colors",
+}
 
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 
@@ -83,14 +83,15 @@ def run_strokes(options: argparse.Namespace) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file or as polylines."""
     check_output(options)
     if check_drawing_suffix(options.output) != ".svg":
-        _reject_page_options(options)
+        _reject_options(options, PAGE_ONLY_DEFAULTS, options.output, ".svg files")
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
-        _reject_options(options, MESH_ONLY_DEFAULTS, "mesh files")
+        name = options.mesh or "the open file"
+        _reject_options(options, MESH_ONLY_DEFAULTS, name, "mesh files")
         _draw_scene_strokes(options)
         return
-    _reject_options(options, SCENE_ONLY_DEFAULTS, ".blend files")
+    _reject_options(options, SCENE_ONLY_DEFAULTS, options.mesh, ".blend files")
     # Mistakes are reported before the mesh is read.
     style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
@@ -155,14 +156,9 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
     print_line(f"{result.camera}: {result.path}")
 
 
-def _reject_page_options(options: argparse.Namespace) -> None:
-    """Raise an error if an option is set that is for pictures."""
-    for option, name in PAGE_OPTIONS.items():
-        if name in options:
-            raise RosyError(f"{options.output}: {option} applies only to .svg files")
-
-
-def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_kind: str) -> None:
+def _reject_options(
+    options: argparse.Namespace, defaults: dict[str, Any], file: Path | str, file_kind: str
+) -> None:
     """Raise an error if an option is set that is for another kind of file.
 
     Parameters
@@ -170,15 +166,15 @@ def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_
     options : argparse.Namespace
     defaults : dict
         Default values of the options that are not allowed.
+    file : Path or str
+        The file that they do not apply to.
     file_kind : str
         The files that they are for.
     """
     for name, default in defaults.items():
-        if getattr(options, name) != default:
+        if getattr(options, name, default) != default:
             option = OPTION_NAMES.get(name, "--" + name.replace("_", "-"))
-            raise RosyError(
-                f"{options.mesh or 'the open file'}: {option} applies only to {file_kind}"
-            )
+            raise RosyError(f"{file}: {option} applies only to {file_kind}")
 
 
 #: Placeholders of numbers in the help, by their units.

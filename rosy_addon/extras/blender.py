@@ -51,7 +51,7 @@ BLENDER_OPTIONS = ("-b", "--factory-startup", "--disable-autoexec", "--python-ex
 #: Names of Blender on the PATH. The second one is that of Flatpak.
 PROGRAM_NAMES = ("blender", "org.blender.Blender")
 
-#: Where installers and users put Blender, by `sys.platform`. ``{...}`` is an environment variable.
+#: Where installers and users put Blender, by `sys.platform`. ``%...%`` is an environment variable.
 USUAL_PLACES = {
     "darwin": (
         "/Applications/Blender*.app",
@@ -60,9 +60,9 @@ USUAL_PLACES = {
         "~/Library/Application Support/Steam/steamapps/common/Blender/Blender.app",
     ),
     "win32": (
-        "{ProgramFiles}/Blender Foundation/Blender*/blender.exe",
-        "{LOCALAPPDATA}/Programs/Blender*/blender.exe",
-        "{ProgramFiles(x86)}/Steam/steamapps/common/Blender/blender.exe",
+        "%ProgramFiles%/Blender Foundation/Blender*/blender.exe",
+        "%LOCALAPPDATA%/Programs/Blender*/blender.exe",
+        "%ProgramFiles(x86)%/Steam/steamapps/common/Blender/blender.exe",
     ),
     "linux": (
         "/opt/blender*/blender",
@@ -150,14 +150,8 @@ def installed_blenders() -> list[str]:
 
 def _usual_places() -> list[str]:
     """Return the patterns of paths where Blender may be on this system."""
-    places = USUAL_PLACES.get(sys.platform, USUAL_PLACES["linux"])
-    variables = dict.fromkeys(re.findall(r"{(.*?)}", " ".join(places)))
-    values = {name: os.environ.get(name) for name in variables}
-    return [
-        re.sub(r"{(.*?)}", lambda match: values[match[1]], place)
-        for place in places
-        if all(values[name] for name in re.findall(r"{(.*?)}", place))
-    ]
+    places = map(os.path.expandvars, USUAL_PLACES.get(sys.platform, USUAL_PLACES["linux"]))
+    return [place for place in places if not place.startswith("%")]
 
 
 def _numbers(path: str) -> list[int]:

@@ -27,9 +27,9 @@ from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
-from ..turntable_video import Encoder, check_video_path, turntable
+from ..turntable_video import Encoder, turntable
 from .field import Field, warn
-from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, find_ffmpeg, picture_look
+from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, default_encoder, picture_look
 
 #: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
 #: divided by the width of lines. The correlation of the two pictures is then above 0.9.
@@ -107,11 +107,9 @@ def film(
     'film.gif'
     """
     path = Path(path)
-    check_video_path(path)
+    encode = default_encoder(path, encode)
     if not rate > 0:
         raise RosyError(f"{path}: a film needs a rate above 0")
-    if path.suffix.lower() == ".mp4" and encode is None:
-        encode = find_ffmpeg()
     look = picture_look(str(path), preset, settings, {})
     series = Film(
         fields,

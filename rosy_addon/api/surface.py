@@ -105,7 +105,9 @@ class Surface:
         sharp_edges: ArrayLike | None = None,
         step: int | None = None,
     ) -> None:
-        self._path = _path_of(vertices) if faces is None else None
+        self._path: Path | None = None
+        if faces is None and isinstance(vertices, (str, os.PathLike)):
+            self._path = Path(vertices)
         suffix = "" if self._path is None else self._path.suffix.lower()
         self.name = name or ("surface" if self._path is None else str(self._path))
         self.up = up or UP_AXIS_BY_SUFFIX.get(suffix, "z")
@@ -209,11 +211,6 @@ class Surface:
         if not np.isfinite(array).all():
             raise RosyError(f"{self.name}: {what} has values that are not finite")
         return array[self.mesh.corner_vertex] if len(array) == counts[0] else array
-
-
-def _path_of(mesh: Any) -> Path | None:
-    """Return the path of a file; None if this is not one."""
-    return Path(mesh) if isinstance(mesh, (str, os.PathLike)) else None
 
 
 def _read_arrays(path: Path, step: int | None) -> MeshArrays:

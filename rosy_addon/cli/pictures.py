@@ -114,8 +114,7 @@ def video_encoder(options: argparse.Namespace) -> Encoder | None:
     find_blender_encoder, encode = options.extras.find_blender_encoder, None
     if find_blender_encoder is not None and options.blender is not None:
         encode = find_blender_encoder(options.blender)
-    if encode is None:
-        encode = find_ffmpeg()
+    encode = encode or find_ffmpeg()
     if encode is None:
         with suppress(ImportError):
             from ..scene.video import encode_video as encode

@@ -168,11 +168,7 @@ def figure(
             )
     shown = {"singularity_dots": "visible", **settings}
     look = picture_look(name, preset, shown, {}, color_values is not None)
-    numbers = _numbers_of_fields(name, comparison.fields, color_values)
-    instances = {
-        title: upright_instance(field.surface, field, None, values)
-        for (title, field), values in zip(comparison.fields.items(), numbers, strict=True)
-    }
+    instances = _instances(name, comparison.fields, color_values)
     look = _figure_look(look, comparison.fields, instances.values(), dpi / LENGTH_DPI)
     if color_label is None:
         color_label = color_values if isinstance(color_values, str) else ""
@@ -293,12 +289,12 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
         )
 
 
-def _numbers_of_fields(
+def _instances(
     name: str,
     fields: Mapping[str, Field],
     color_values: str | Sequence[str | ArrayLike] | None,
-) -> list[NDArray[np.float32] | None]:
-    """Return the numbers at the corners of the surface of each field, as for `figure`.
+) -> dict[str, MeshInstance]:
+    """Return the fields in world space with the numbers that are shown as colors, as for `figure`.
 
     Raises
     ------
@@ -313,10 +309,10 @@ def _numbers_of_fields(
         raise RosyError(
             f"{name}: color_values has {counted(len(values), 'array')} for {counted(len(fields), 'field')}"
         )
-    return [
-        corner_numbers(field.surface, array)
-        for field, array in zip(fields.values(), values, strict=True)
-    ]
+    return {
+        title: upright_instance(field.surface, field, None, corner_numbers(field.surface, array))
+        for (title, field), array in zip(fields.items(), values, strict=True)
+    }
 
 
 def _figure_look(

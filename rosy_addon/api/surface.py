@@ -401,11 +401,12 @@ def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
     if not is_face.any():
         raise RosyError(f"{name}: has no faces")
     sizes = np.diff(cells.cell_offsets if hasattr(cells, "cell_offsets") else cells.offset)
+    uv = getattr(surface, "active_texture_coordinates", None)
     return MeshArrays(
         np.asarray(surface.points),
         np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)],
         offsets_from_sizes(sizes[is_face]),
-        _pyvista_uv(surface),
+        None if uv is None or uv.shape[1] != 2 else np.asarray(uv),
         {key: np.asarray(values) for key, values in surface.point_data.items()},
         {key: np.asarray(values)[is_face] for key, values in surface.cell_data.items()},
     )
@@ -417,9 +418,3 @@ def _extracted_surface(mesh: Any) -> Any:
         return mesh.extract_surface(algorithm="dataset_surface")
     except TypeError:  # before PyVista 0.47, there was no other algorithm
         return mesh.extract_surface()
-
-
-def _pyvista_uv(surface: Any) -> NDArray[Any] | None:
-    """Return the (V, 2) active texture coordinates of a mesh of PyVista, or None."""
-    uv = getattr(surface, "active_texture_coordinates", None)
-    return None if uv is None or uv.shape[1] != 2 else np.asarray(uv)

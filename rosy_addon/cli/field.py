@@ -14,6 +14,7 @@ from ..api.figures import LINES, check_figure_path, load_drawing
 from ..api.pictures import picture_look
 from ..api.surface import simulation_suffixes
 from ..errors import RosyError, counted
+from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
@@ -87,18 +88,15 @@ def add_field_command(subparsers: Any) -> None:
 def run_field(options: argparse.Namespace) -> None:
     """Write a field file: generate a field, or convert the format, degree or vectors of one."""
     check_output(options)
-    _, field = load_mesh_and_field(options)
-    if options.to_degree is not None:
-        field = field.to_degree(options.to_degree)
-    if options.turn:
-        field = field.rotated(np.radians(options.turn))
-    if options.smooth:
-        field = field.smoothed(options.smooth)
-    if options.cancel_pairs:
-        field = field.without_pairs(options.cancel_pairs)
-    if options.magnitude is not None:
-        field = field.with_magnitude(options.magnitude)
-    field.save(options.output)
+    surface, field = load_mesh_and_field(options)
+    conversion = Conversion(
+        degree=options.to_degree,
+        rotation=np.radians(options.turn),
+        smoothing_length=options.smooth,
+        pair_distance=options.cancel_pairs,
+        magnitude=options.magnitude,
+    )
+    api.Field(surface, convert(surface.mesh, field.rosy, conversion)).save(options.output)
 
 
 def add_info_command(subparsers: Any) -> None:
@@ -139,12 +137,8 @@ def _compare(options: argparse.Namespace, field: api.Field) -> dict[str, Any]:
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
         other = read_field(options, options.against, field.surface, field.degree)
         difference = field.difference(other)
-        return {
-            "mean": np.degrees(difference.mean),
-            "rms": np.degrees(difference.rms),
-            "max": np.degrees(difference.max),
-            "compared": difference.compared,
-        }
+        angles = {name: np.degrees(getattr(difference, name)) for name in ("mean", "rms", "max")}
+        return {**angles, "compared": difference.compared}
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:
         raise RosyError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 from dataclasses import replace
@@ -15,16 +14,7 @@ from ..frame_workers import parse_frames, run_local
 from ..gpu.select import RENDER_DEVICES
 from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
 from ..progress import listening
-from .options import (
-    add_flow_option,
-    add_look_options,
-    add_object_option,
-    add_subcommand,
-    add_workers_option,
-    parse_size,
-    requested_look,
-    user_presets_folder,
-)
+from .options import Options, add_subcommand, parse_size, user_presets_folder
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
@@ -39,14 +29,14 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
         metavar="SCENE.blend",
         help="Blender file; by default the open one",
     )
-    add_object_option(parser, "objects to draw; by default all with a field")
+    parser.add_object_option("objects to draw; by default all with a field")
     cameras = parser.add_mutually_exclusive_group()
     cameras.add_argument(
         "--camera", metavar="NAME", help="camera to draw from; by default the scene's active one"
     )
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
-    add_look_options(parser)
-    add_flow_option(parser)
+    parser.add_look_options()
+    parser.add_flow_option()
     parser.add_argument(
         "--size", type=parse_size, metavar="WxH", help="size in pixels; by default the scene's"
     )
@@ -59,7 +49,7 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
         help="draw with the processor (cpu), the graphics card (gpu), or the graphics card if there is "
         "one (auto); by default as set in the scene",
     )
-    add_workers_option(parser)
+    parser.add_workers_option()
     parser.add_argument("--save", action="store_true", help="save the Blender file")
     parser.add_argument(
         "--frames",
@@ -80,7 +70,7 @@ def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
         )
 
 
-def run_bake(options: argparse.Namespace) -> None:
+def run_bake(options: Options) -> None:
     """Draw the fields of a Blender file from its cameras, at one frame or several."""
     _check_bake_options(options)
     if options.out is None and not options.save:
@@ -118,7 +108,7 @@ def run_bake(options: argparse.Namespace) -> None:
         print_line(save_blend())
 
 
-def _check_bake_options(options: argparse.Namespace) -> None:
+def _check_bake_options(options: Options) -> None:
     """Raise an error if options contradict each other, or --out cannot be written."""
     if options.frames is None and uses_workers(options):
         raise RosyError("--jobs and --scheduler distribute frames: give --frames A-B")
@@ -130,7 +120,7 @@ def _check_bake_options(options: argparse.Namespace) -> None:
         check_folder(options.out)
 
 
-def _bake(options: argparse.Namespace, scene: Any, settings: Any) -> list[Any]:
+def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
     """Draw the current frame or several in this process, and return what was made for each camera."""
     from ..animation import bake_animation
     from ..bake import bake
@@ -140,7 +130,7 @@ def _bake(options: argparse.Namespace, scene: Any, settings: Any) -> list[Any]:
     arguments = {
         "objects": requested_objects(options),
         "cameras": requested_cameras(scene, options),
-        "look": requested_look(options, read_look(scene.rosy)) if has_look_options else None,
+        "look": options.requested_look(read_look(scene.rosy)) if has_look_options else None,
         "size": options.size,
         "settings": settings,
         "workers": options.workers,
@@ -167,12 +157,12 @@ class _FrameLog:
             print_line(f"{label} ({100 * fraction:.0f} %)")
 
 
-def uses_workers(options: argparse.Namespace) -> bool:
+def uses_workers(options: Options) -> bool:
     """Return whether other processes draw the frames."""
     return options.jobs > 1 or options.scheduler is not None
 
 
-def run_workers(options: argparse.Namespace) -> None:
+def run_workers(options: Options) -> None:
     """Draw the frames in other processes, on this machine or on a cluster."""
     bpy, scene = sys.modules.get("bpy"), options.scene
     if scene is None:
@@ -200,7 +190,7 @@ def run_workers(options: argparse.Namespace) -> None:
             print_line(line)
 
 
-def _forwarded_args(options: argparse.Namespace) -> list[str]:
+def _forwarded_args(options: Options) -> list[str]:
     """Return the options that are passed on to the other processes.
 
     Each is one word, because names may begin with a dash.

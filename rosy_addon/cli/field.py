@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
@@ -21,18 +20,7 @@ from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
 from .mesh_field import add_mesh_options, load_mesh_and_field, read_field
-from .options import (
-    add_direction_options,
-    add_look_options,
-    add_subcommand,
-    add_workers_option,
-    api_arguments,
-    check_output,
-    float_between,
-    int_between,
-    requested_preset,
-    requested_settings,
-)
+from .options import Options, add_subcommand, float_between, int_between
 from .streams import print_line
 
 #: Generators that need nothing but the mesh and a degree.
@@ -85,9 +73,9 @@ def add_field_command(subparsers: Any) -> None:
     )
 
 
-def run_field(options: argparse.Namespace) -> None:
+def run_field(options: Options) -> None:
     """Write a field file: generate a field, or convert the format, degree or vectors of one."""
-    check_output(options)
+    options.check_output()
     surface, field = load_mesh_and_field(options)
     conversion = Conversion(
         degree=options.to_degree,
@@ -112,7 +100,7 @@ def add_info_command(subparsers: Any) -> None:
     )
 
 
-def run_info(options: argparse.Namespace) -> None:
+def run_info(options: Options) -> None:
     """Describe a mesh and its field, and compare the field with another one."""
     surface, field = load_mesh_and_field(options)
     magnitude = field.magnitude
@@ -132,7 +120,7 @@ def run_info(options: argparse.Namespace) -> None:
     print_line(json.dumps(facts) if options.json else _format_info(facts))
 
 
-def _compare(options: argparse.Namespace, field: api.Field) -> dict[str, Any]:
+def _compare(options: Options, field: api.Field) -> dict[str, Any]:
     """Return the angles to the field in a file, or the differences from a file of singularities."""
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
         other = read_field(options, options.against, field.surface, field.degree)
@@ -273,23 +261,23 @@ def add_compare_command(subparsers: Any) -> None:
         metavar="TEXT",
         help="title of the color bar; by default the name of what is shown",
     )
-    add_direction_options(parser)
+    parser.add_direction_options()
     parser.add_argument(
         "--perspective",
         dest="orthographic",
         action="store_false",
         help="perspective projection instead of orthographic",
     )
-    add_workers_option(parser)
-    add_look_options(parser)
+    parser.add_workers_option()
+    parser.add_look_options()
 
 
-def run_compare(options: argparse.Namespace) -> None:
+def run_compare(options: Options) -> None:
     """Compare fields on a mesh: angles, energies and singularities."""
-    preset, settings = requested_preset(options), requested_settings(options)
+    preset, settings = options.requested_preset(), options.requested_settings()
     if options.output is not None:
         check_figure_path(options.output)
-        check_output(options)
+        options.check_output()
         picture_look(str(options.mesh), preset, settings, {})
         load_drawing()
     comparison = api.compare(_load_fields(options), reach=options.reach)
@@ -299,7 +287,7 @@ def run_compare(options: argparse.Namespace) -> None:
     print_line(write[options.format]())
 
 
-def _draw(options: argparse.Namespace, comparison: api.Comparison) -> None:
+def _draw(options: Options, comparison: api.Comparison) -> None:
     """Write the figures."""
     rest = ("differences", "table") if comparison.differences else ("table",)
     if options.output.suffix.lower() == ".pdf":
@@ -307,12 +295,12 @@ def _draw(options: argparse.Namespace, comparison: api.Comparison) -> None:
     else:
         pages = [{"parts": ("fields", *rest)}]
     figures = [
-        api.figure(comparison, **api_arguments(options, api.figure, **page)) for page in pages
+        api.figure(comparison, **options.api_arguments(api.figure, **page)) for page in pages
     ]
     api.save_figures(options.output, figures)
 
 
-def _load_fields(options: argparse.Namespace) -> dict[str, api.Field]:
+def _load_fields(options: Options) -> dict[str, api.Field]:
     """Read or generate the fields, by their titles."""
     if options.degree is not None:
         check_degree(options.degree)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,15 +16,15 @@ from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .options import float_between, float_tuple, int_between
+from .options import CommandParser, Options, float_between, float_tuple, int_between
 
 
-def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = False) -> None:
+def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> None:
     """Add MESH, FIELD and the options that generate a field.
 
     Parameters
     ----------
-    parser : argparse.ArgumentParser
+    parser : CommandParser
     allow_scene : bool
         Whether MESH may be a .blend file, or absent.
     """
@@ -124,7 +123,7 @@ def add_mesh_options(parser: argparse.ArgumentParser, *, allow_scene: bool = Fal
     _add_simulation_options(parser)
 
 
-def _add_simulation_options(parser: argparse.ArgumentParser) -> None:
+def _add_simulation_options(parser: CommandParser) -> None:
     """Add the options for files of simulations, if these can be read."""
     parser.set_defaults(array=None, step=None)
     if not simulation_suffixes():
@@ -145,7 +144,7 @@ def _add_simulation_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
+def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     """Read the mesh; read the field, or generate one.
 
     In the file of a simulation, the field is one of its arrays, unless the options name another.
@@ -175,15 +174,13 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
     return surface, field
 
 
-def read_field(
-    options: argparse.Namespace, path: Path, surface: api.Surface, degree: int | None
-) -> api.Field:
+def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
     """Read a field file, with the options for field files."""
     nonfinite = "zero" if options.undefined else "error"
     return api.read_field(path, surface, degree, nonfinite=nonfinite, mesh=options.field_mesh)
 
 
-def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Field:
+def _generate_field(options: Options, surface: api.Surface) -> api.Field:
     """Generate a field of the kind that the options name."""
     degree = DEFAULT_DEGREE if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
@@ -217,9 +214,7 @@ def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Fi
     return generated(surface, settings, degree)
 
 
-def _guides(
-    options: argparse.Namespace, surface: api.Surface, degree: int | None
-) -> api.Field | None:
+def _guides(options: Options, surface: api.Surface, degree: int | None) -> api.Field | None:
     """Read the field of the option --guides, if it is given."""
     if options.guides is None:
         return None

@@ -1,4 +1,4 @@
-"""Options that several commands share: of the output, the view and the look."""
+"""The parser of a command, its options, and those that several commands share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -21,33 +21,214 @@ from ..preset_files.store import default_user_folder, find_preset_file, preset_k
 from ..projection.camera import check_size
 from ..projection.up_axis import UP_AXIS_MATRIX
 from ..settings import settings_of, stored_key
+from .streams import print_line
 
 
-def check_output(options: argparse.Namespace, suffix: str = "") -> None:
-    """Check the option -o, before long work computes its contents.
+class CommandParser(argparse.ArgumentParser):
+    """The parser of a command, which can add the options that several commands share.
+
+    Its messages are safe on any terminal.
+    """
+
+    def _print_message(self, message: str, file: TextIO | None = None) -> None:
+        print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
+
+    def add_object_option(self, help_text: str) -> None:
+        """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
+        self.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
+
+    def add_workers_option(self) -> None:
+        """Add --workers."""
+        self.add_argument(
+            "--workers",
+            type=int_between(0, 256),
+            default=0,
+            metavar="N",
+            help="number of processes that draw a large picture together; 0 is one for each core "
+            "(%(default)d). The picture is the same for any number",
+        )
+
+    def add_view_options(self) -> None:
+        """Add the options of the view."""
+        self.add_direction_options()
+        self.add_argument("--size", type=parse_size, metavar="WxH", help="size in pixels")
+        self.add_argument(
+            "--ortho",
+            dest="orthographic",
+            action="store_true",
+            help="orthographic projection instead of perspective",
+        )
+
+    def add_direction_options(self) -> None:
+        """Add --view and --up."""
+        self.add_argument(
+            "--view",
+            type=float_tuple(2, "AZ,EL"),
+            default=DEFAULT_VIEW,
+            metavar="AZ,EL",
+            help="azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from "
+            "above",
+        )
+        self.add_argument(
+            "--up",
+            choices=list(UP_AXIS_MATRIX),
+            help="upward axis of the file; by default y for .obj and .off, otherwise z",
+        )
+
+    def add_look_options(self) -> None:
+        """Add --preset and --set."""
+        self.add_argument(
+            "--preset",
+            metavar="NAME",
+            help=f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
+            "`presets` lists them",
+        )
+        self.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="NAME=VALUE",
+            help=f"one setting of the look, after the preset: {', '.join(settings_of(Look))}",
+        )
+
+    def add_flow_option(self) -> None:
+        """Add --flow, which is short for a setting of the look."""
+        self.add_argument(
+            "--flow",
+            dest="set",
+            action="append",
+            default=[],
+            type="flow={}".format,
+            metavar="PIXELS",
+            help="let streaks drift along the field by this many pixels per picture, as --set flow=PIXELS does",
+        )
+
+    def add_picture_options(self) -> None:
+        """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
+        self.add_view_options()
+        self.add_workers_option()
+        self.add_look_options()
+        self.add_argument(
+            "--color-values",
+            metavar="NAME",
+            help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
+            "property of a .ply file",
+        )
+        self.add_argument(
+            "--tone-attribute",
+            dest="tone_values",
+            metavar="NAME",
+            help="take the tone from a vertex property of a .ply file, or from the vertex colors: "
+            f"'{VERTEX_COLOR}'",
+        )
+        self.add_argument(
+            "--tone-image",
+            type=Path,
+            metavar="IMAGE.png",
+            help="take the tone from an image on the UV map of an .obj file",
+        )
+
+
+class Options(argparse.Namespace):
+    """The options of a command."""
+
+    def check_output(self, suffix: str = "") -> None:
+        """Check the option -o, before long work computes its contents.
+
+        Parameters
+        ----------
+        suffix : str
+            The extension that the name of the file must have; by default any.
+
+        Raises
+        ------
+        RosyError
+            If the name has another extension, the file cannot be written, or another option names it as
+            an input.
+        """
+        check_writable(self.output)
+        if suffix and self.output.suffix.lower() != suffix:
+            raise RosyError(f"{self.output}: the name of the file must end in {suffix}")
+        if not os.path.exists(self.output):
+            return
+        for name, value in vars(self).items():
+            for path in value if isinstance(value, list) else [value]:
+                is_path = name != "output" and isinstance(path, (str, os.PathLike))
+                if is_path and os.path.exists(path) and os.path.samefile(path, self.output):
+                    raise RosyError(f"{self.output}: is also an input: choose another output file")
+
+    def requested_preset(self) -> Path | None:
+        """Return the file of --preset, or None."""
+        return find_preset_file(self.preset, user_presets_folder()) if self.preset else None
+
+    def requested_settings(self) -> dict[str, Any]:
+        """Return the settings of --set."""
+        return dict(_parse_setting(text) for text in self.set)
+
+    def requested_look(self, default: Look) -> Look:
+        """Return the look of --preset, by default `default`, with the settings of --set."""
+        preset = self.requested_preset()
+        look = default if preset is None else read_preset(preset).look
+        return look.with_settings(self.requested_settings())
+
+    def api_arguments(self, function: Callable[..., Any], **others: Any) -> dict[str, Any]:
+        """Return the keyword arguments of a function: the options with these names, and the settings of the look.
+
+        Parameters
+        ----------
+        function : function
+            Of `api`.
+        **others
+            Arguments that replace those of the options.
+        """
+        names = inspect.getfullargspec(function).kwonlyargs
+        arguments = {name: value for name, value in vars(self).items() if name in names}
+        return arguments | {"preset": self.requested_preset()} | others | self.requested_settings()
+
+    def picture_arguments(self, function: Callable[..., Any]) -> dict[str, Any]:
+        """Return what the options say about a picture of a mesh, as arguments of a function of `api`.
+
+        Raises
+        ------
+        RosyError
+            If they are not possible.
+        """
+        sources = {"attribute": self.tone_values, "image": self.tone_image}
+        sources["picture"] = getattr(self, "tone_picture", None)
+        given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
+        if len(given) > 1:
+            raise RosyError(f"give either {given[0]} or {given[1]}, not both")
+        preset, settings = self.requested_preset(), self.requested_settings()
+        # Mistakes are reported before the mesh is read.
+        picture_look(str(self.mesh), preset, settings, sources, self.color_values is not None)
+        check_size(*self.size)
+        return self.api_arguments(function)
+
+
+def add_subcommand(
+    subparsers: Any,
+    name: str,
+    run: Callable[[Options], None],
+    function: Callable[..., Any] | None = None,
+) -> CommandParser:
+    """Add a command.
 
     Parameters
     ----------
-    options : argparse.Namespace
-    suffix : str
-        The extension that the name of the file must have; by default any.
-
-    Raises
-    ------
-    RosyError
-        If the name has another extension, the file cannot be written, or another option names it as
-        an input.
+    subparsers : argparse action
+    name : str
+    run : function
+        Runs it. The first line of its docstring becomes the help.
+    function : function, optional
+        A function of `api` with whose keyword parameters the options have names and defaults in common;
+        see `api_arguments`.
     """
-    check_writable(options.output)
-    if suffix and options.output.suffix.lower() != suffix:
-        raise RosyError(f"{options.output}: the name of the file must end in {suffix}")
-    if not os.path.exists(options.output):
-        return
-    for name, value in vars(options).items():
-        for path in value if isinstance(value, list) else [value]:
-            is_path = name != "output" and isinstance(path, (str, os.PathLike))
-            if is_path and os.path.exists(path) and os.path.samefile(path, options.output):
-                raise RosyError(f"{options.output}: is also an input: choose another output file")
+    text = run.__doc__.splitlines()[0]
+    parser = subparsers.add_parser(name, help=text, description=text)
+    if function is not None:
+        parser.set_defaults(**inspect.getfullargspec(function).kwonlydefaults)
+    parser.set_defaults(run=run)
+    return parser
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -97,189 +278,6 @@ def int_between(low: int, high: int) -> Callable[[str], int]:
         return int(text)
 
     return parse
-
-
-def add_object_option(parser: argparse.ArgumentParser, help_text: str) -> None:
-    """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
-    parser.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
-
-
-def add_workers_option(parser: argparse.ArgumentParser) -> None:
-    """Add --workers."""
-    parser.add_argument(
-        "--workers",
-        type=int_between(0, 256),
-        default=0,
-        metavar="N",
-        help="number of processes that draw a large picture together; 0 is one for each core "
-        "(%(default)d). The picture is the same for any number",
-    )
-
-
-def add_subcommand(
-    subparsers: Any,
-    name: str,
-    run: Callable[[argparse.Namespace], None],
-    function: Callable[..., Any] | None = None,
-) -> argparse.ArgumentParser:
-    """Add a command.
-
-    Parameters
-    ----------
-    subparsers : argparse action
-    name : str
-    run : function
-        Runs it. The first line of its docstring becomes the help.
-    function : function, optional
-        A function of `api` with whose keyword parameters the options have names and defaults in common;
-        see `api_arguments`.
-    """
-    text = run.__doc__.splitlines()[0]
-    parser = subparsers.add_parser(name, help=text, description=text)
-    if function is not None:
-        parser.set_defaults(**inspect.getfullargspec(function).kwonlydefaults)
-    parser.set_defaults(run=run)
-    return parser
-
-
-def add_view_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the view."""
-    add_direction_options(parser)
-    parser.add_argument("--size", type=parse_size, metavar="WxH", help="size in pixels")
-    parser.add_argument(
-        "--ortho",
-        dest="orthographic",
-        action="store_true",
-        help="orthographic projection instead of perspective",
-    )
-
-
-def add_direction_options(parser: argparse.ArgumentParser) -> None:
-    """Add --view and --up."""
-    parser.add_argument(
-        "--view",
-        type=float_tuple(2, "AZ,EL"),
-        default=DEFAULT_VIEW,
-        metavar="AZ,EL",
-        help="azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from "
-        "above",
-    )
-    parser.add_argument(
-        "--up",
-        choices=list(UP_AXIS_MATRIX),
-        help="upward axis of the file; by default y for .obj and .off, otherwise z",
-    )
-
-
-def add_look_options(parser: argparse.ArgumentParser) -> None:
-    """Add --preset and --set."""
-    parser.add_argument(
-        "--preset",
-        metavar="NAME",
-        help=f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
-        "`presets` lists them",
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help=f"one setting of the look, after the preset: {', '.join(settings_of(Look))}",
-    )
-
-
-def add_flow_option(parser: argparse.ArgumentParser) -> None:
-    """Add --flow, which is short for a setting of the look."""
-    parser.add_argument(
-        "--flow",
-        dest="set",
-        action="append",
-        default=[],
-        type="flow={}".format,
-        metavar="PIXELS",
-        help="let streaks drift along the field by this many pixels per picture, as --set flow=PIXELS does",
-    )
-
-
-def add_picture_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
-    add_view_options(parser)
-    add_workers_option(parser)
-    add_look_options(parser)
-    parser.add_argument(
-        "--color-values",
-        metavar="NAME",
-        help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
-        "property of a .ply file",
-    )
-    parser.add_argument(
-        "--tone-attribute",
-        dest="tone_values",
-        metavar="NAME",
-        help="take the tone from a vertex property of a .ply file, or from the vertex colors: "
-        f"'{VERTEX_COLOR}'",
-    )
-    parser.add_argument(
-        "--tone-image",
-        type=Path,
-        metavar="IMAGE.png",
-        help="take the tone from an image on the UV map of an .obj file",
-    )
-
-
-def requested_preset(options: argparse.Namespace) -> Path | None:
-    """Return the file of --preset, or None."""
-    return find_preset_file(options.preset, user_presets_folder()) if options.preset else None
-
-
-def requested_settings(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the settings of --set."""
-    return dict(_parse_setting(text) for text in options.set)
-
-
-def requested_look(options: argparse.Namespace, default: Look) -> Look:
-    """Return the look of --preset, by default `default`, with the settings of --set."""
-    preset = requested_preset(options)
-    look = default if preset is None else read_preset(preset).look
-    return look.with_settings(requested_settings(options))
-
-
-def api_arguments(
-    options: argparse.Namespace, function: Callable[..., Any], **others: Any
-) -> dict[str, Any]:
-    """Return the keyword arguments of a function: the options with these names, and the settings of the look.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-    function : function
-        Of `api`.
-    **others
-        Arguments that replace those of the options.
-    """
-    names = inspect.getfullargspec(function).kwonlyargs
-    arguments = {name: value for name, value in vars(options).items() if name in names}
-    return arguments | {"preset": requested_preset(options)} | others | requested_settings(options)
-
-
-def picture_arguments(options: argparse.Namespace, function: Callable[..., Any]) -> dict[str, Any]:
-    """Return what the options say about a picture of a mesh, as arguments of a function of `api`.
-
-    Raises
-    ------
-    RosyError
-        If they are not possible.
-    """
-    sources = {"attribute": options.tone_values, "image": options.tone_image}
-    sources["picture"] = getattr(options, "tone_picture", None)
-    given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
-    if len(given) > 1:
-        raise RosyError(f"give either {given[0]} or {given[1]}, not both")
-    preset, settings = requested_preset(options), requested_settings(options)
-    # Mistakes are reported before the mesh is read.
-    picture_look(str(options.mesh), preset, settings, sources, options.color_values is not None)
-    check_size(*options.size)
-    return api_arguments(options, function)
 
 
 def _parse_setting(text: str) -> tuple[str, Any]:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from ..errors import REPORTED_ERRORS, error_text
 from ..turntable_video import Encoder
 from .bake import add_bake_command
 from .field import add_compare_command, add_field_command, add_info_command
+from .options import CommandParser, Options
 from .pictures import add_render_command, add_texture_command, add_turntable_command
 from .presets import add_presets_command
-from .streams import discard_output, output_stream, print_error, print_line, printed_warnings
+from .streams import discard_output, output_stream, print_error, printed_warnings
 from .strokes import add_strokes_command
 
 #: Options whose values may begin with a minus sign.
@@ -57,7 +57,7 @@ class Extras:
     run_on_cluster: Callable[[Sequence[str], Sequence[int], str], Iterator[str]] | None = None
     add_commands: tuple[Callable[[Any], None], ...] = ()
     find_blender_encoder: Callable[[str | None], Encoder | None] | None = None
-    run_in_blender: Callable[[argparse.Namespace, str, Path | None], None] | None = None
+    run_in_blender: Callable[[Options, str, Path | None], None] | None = None
     is_in_blender: bool = False
 
 
@@ -87,7 +87,8 @@ def main(
     """
     arguments = sys.argv[1:] if argv is None else argv
     try:
-        options = _build_parser(prog, extras).parse_args(_join_negative_values(arguments))
+        parser = _build_parser(prog, extras)
+        options = parser.parse_args(_join_negative_values(arguments), Options())
         with printed_warnings():
             options.run(options)
         output_stream().flush()
@@ -110,16 +111,11 @@ def main(
     return EXIT_OK
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose messages are safe on any terminal."""
-
-    def _print_message(self, message: str, file: TextIO | None = None) -> None:
-        print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
-
-
-def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentParser:
+def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> CommandParser:
     """Return the parser of all commands."""
-    parser = _Parser(prog=prog, description="Draw N-way rotational symmetry fields on meshes.")
+    parser = CommandParser(
+        prog=prog, description="Draw N-way rotational symmetry fields on meshes."
+    )
     parser.set_defaults(extras=extras)
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
     add_bake_command(subparsers, extras.run_on_cluster is not None)

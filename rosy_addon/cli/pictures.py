@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,18 +14,12 @@ from ..surface_texture.draw import CONTENTS, MAX_MARGIN, MAX_SIZE, MIN_SIZE
 from ..turntable_video import NO_ENCODER, Encoder, check_video_path
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import (
-    add_flow_option,
-    add_look_options,
-    add_picture_options,
+    CommandParser,
+    Options,
     add_subcommand,
-    api_arguments,
-    check_output,
     float_between,
     float_tuple,
     int_between,
-    picture_arguments,
-    requested_preset,
-    requested_settings,
 )
 from .streams import print_line
 
@@ -36,7 +29,7 @@ def add_render_command(subparsers: Any) -> None:
     parser = add_subcommand(subparsers, "render", run_render, api.render)
     add_mesh_options(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
-    add_picture_options(parser)
+    parser.add_picture_options()
     parser.add_argument(
         "--tone-picture",
         type=Path,
@@ -45,10 +38,10 @@ def add_render_command(subparsers: Any) -> None:
     )
 
 
-def run_render(options: argparse.Namespace) -> None:
+def run_render(options: Options) -> None:
     """Draw the field of a mesh file as a picture."""
-    check_output(options, ".png")
-    arguments = picture_arguments(options, api.render)
+    options.check_output(".png")
+    arguments = options.picture_arguments(api.render)
     surface, field = load_mesh_and_field(options)
     api.render(surface, field, **arguments).save(options.output)
 
@@ -70,10 +63,10 @@ def add_turntable_command(subparsers: Any) -> None:
         action="store_true",
         help="leave the camera where it is: only streaks drift, as --flow says",
     )
-    add_picture_options(parser)
+    parser.add_picture_options()
 
 
-def add_motion_options(parser: argparse.ArgumentParser) -> None:
+def add_motion_options(parser: CommandParser) -> None:
     """Add --rate, of a video, and --flow."""
     parser.add_argument(
         "--rate",
@@ -81,16 +74,16 @@ def add_motion_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="pictures per second (%(default)g)",
     )
-    add_flow_option(parser)
+    parser.add_flow_option()
 
 
-def run_turntable(options: argparse.Namespace) -> None:
+def run_turntable(options: Options) -> None:
     """Draw the field of a mesh file from all sides, as a video."""
-    check_output(options)
+    options.check_output()
     check_video_path(options.output)
     if options.pictures < 2:
         raise RosyError("a turntable needs 2 or more --pictures")
-    arguments = picture_arguments(options, api.turntable)
+    arguments = options.picture_arguments(api.turntable)
     encode = video_encoder(options)
 
     def announce(number: int) -> None:
@@ -101,7 +94,7 @@ def run_turntable(options: argparse.Namespace) -> None:
     api.turntable(surface, field, **arguments)
 
 
-def video_encoder(options: argparse.Namespace) -> Encoder | None:
+def video_encoder(options: Options) -> Encoder | None:
     """Return ffmpeg's or Blender's encoder for an .mp4 as the output; None for a .gif.
 
     Raises
@@ -161,14 +154,14 @@ def add_texture_command(subparsers: Any) -> None:
         choices=list(CONTENTS),
         help="; ".join(f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()),
     )
-    add_look_options(parser)
+    parser.add_look_options()
 
 
-def run_texture(options: argparse.Namespace) -> None:
+def run_texture(options: Options) -> None:
     """Draw the field of a mesh file as a texture for its UV map."""
-    check_output(options, ".png")
+    options.check_output(".png")
     # Mistakes are reported before the mesh is read.
-    texture_look(requested_preset(options), requested_settings(options))
+    texture_look(options.requested_preset(), options.requested_settings())
     surface, field = load_mesh_and_field(options)
-    arguments = api_arguments(options, api.texture, udim=UDIM_TOKEN in options.output.name)
+    arguments = options.api_arguments(api.texture, udim=UDIM_TOKEN in options.output.name)
     api.texture(surface, field, **arguments).save(options.output)

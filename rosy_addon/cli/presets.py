@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from typing import Any
 
@@ -12,7 +11,7 @@ from ..preset_files.store import (
     read_preset,
     user_preset_files,
 )
-from .options import add_subcommand, user_presets_folder
+from .options import Options, add_subcommand, user_presets_folder
 from .streams import print_error, print_line
 
 
@@ -22,7 +21,7 @@ def add_presets_command(subparsers: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print a JSON list of objects")
 
 
-def run_presets(options: argparse.Namespace) -> None:
+def run_presets(options: Options) -> None:
     """List the presets of RoSy and your own, with their descriptions."""
     folder, records = user_presets_folder(), []
     for key, path in merge_preset_files(user_preset_files(folder)).items():

@@ -22,13 +22,7 @@ from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
 from ..settings import Choice, Number, Setting, Switch, settings_of
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import (
-    add_object_option,
-    add_subcommand,
-    add_view_options,
-    check_output,
-    float_between,
-)
+from .options import CommandParser, Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
 
@@ -65,8 +59,8 @@ def add_strokes_command(subparsers: Any) -> None:
         metavar="OUT",
         help="file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv",
     )
-    add_view_options(parser)
-    add_object_option(parser, "objects of a .blend file; by default all with a field")
+    parser.add_view_options()
+    parser.add_object_option("objects of a .blend file; by default all with a field")
     parser.add_argument(
         "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"
     )
@@ -79,9 +73,9 @@ def add_strokes_command(subparsers: Any) -> None:
     add_pen_options(parser)
 
 
-def run_strokes(options: argparse.Namespace) -> None:
+def run_strokes(options: Options) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file or as polylines."""
-    check_output(options)
+    options.check_output()
     if check_drawing_suffix(options.output) != ".svg":
         _reject_options(options, PAGE_ONLY_DEFAULTS, options.output, ".svg files")
     if options.mesh is None and "bpy" not in sys.modules:
@@ -101,7 +95,7 @@ def run_strokes(options: argparse.Namespace) -> None:
     drawing.save(options.output)
 
 
-def _draw_scene_strokes(options: argparse.Namespace) -> None:
+def _draw_scene_strokes(options: Options) -> None:
     """Draw the strokes of a Blender file, at one frame or several.
 
     The settings of the scene apply unless an option overrides them.
@@ -128,7 +122,7 @@ def _path_of_frame(path: Path, frame: int) -> Path:
     return path.with_name(re.sub("#+", lambda row: f"{frame:0{len(row[0])}d}", path.name))
 
 
-def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> None:
+def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     """Draw the strokes of the current frame, as the operator does."""
     import bpy
 
@@ -157,13 +151,13 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
 
 
 def _reject_options(
-    options: argparse.Namespace, defaults: dict[str, Any], file: Path | str, file_kind: str
+    options: Options, defaults: dict[str, Any], file: Path | str, file_kind: str
 ) -> None:
     """Raise an error if an option is set that is for another kind of file.
 
     Parameters
     ----------
-    options : argparse.Namespace
+    options : Options
     defaults : dict
         Default values of the options that are not allowed.
     file : Path or str
@@ -181,7 +175,7 @@ def _reject_options(
 METAVARS = {"pixels": "PX", "length": "UNITS", "spacings": "SPACINGS", "": "AMOUNT"}
 
 
-def add_style_options(parser: argparse.ArgumentParser) -> None:
+def add_style_options(parser: CommandParser) -> None:
     """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
 
     The unit follows from the option: `--spacing` is in pixels, `--distance` in units of the mesh.
@@ -191,7 +185,7 @@ def add_style_options(parser: argparse.ArgumentParser) -> None:
             _add_setting_option(parser, setting)
 
 
-def _add_setting_option(parser: argparse.ArgumentParser, setting: Setting) -> None:
+def _add_setting_option(parser: CommandParser, setting: Setting) -> None:
     """Add the option of a setting, with its range or choices, help text and default."""
     option = f"--{setting.name.replace('_', '-')}"
     add = partial(parser.add_argument, option, default=argparse.SUPPRESS)
@@ -208,7 +202,7 @@ def _add_setting_option(parser: argparse.ArgumentParser, setting: Setting) -> No
             raise TypeError(f"setting '{setting.name}' has no option")
 
 
-def stroke_style_of(options: argparse.Namespace, base: StrokeStyle) -> StrokeStyle:
+def stroke_style_of(options: Options, base: StrokeStyle) -> StrokeStyle:
     """Return the style with the fields that the options override."""
     values = vars(options)
     overrides = {name: values[name] for name in settings_of(StrokeStyle) if name in values}
@@ -217,7 +211,7 @@ def stroke_style_of(options: argparse.Namespace, base: StrokeStyle) -> StrokeSty
     return replace(base, **overrides)
 
 
-def add_pen_options(parser: argparse.ArgumentParser) -> None:
+def add_pen_options(parser: CommandParser) -> None:
     """Add options for the fields of `Pen`. Those not given are not set."""
     add = partial(parser.add_argument, default=argparse.SUPPRESS)
     add(
@@ -247,7 +241,7 @@ def add_pen_options(parser: argparse.ArgumentParser) -> None:
     add("--paper", action=argparse.BooleanOptionalAction, help="white paper behind the strokes")
 
 
-def pen_of(options: argparse.Namespace, base: Pen) -> Pen:
+def pen_of(options: Options, base: Pen) -> Pen:
     """Return the pen with the fields that the options override."""
     values = vars(options)
     overrides = {

@@ -11,7 +11,6 @@ status than 0. If there is no report, Blender failed, and its log says why.
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import json
 import os
@@ -26,7 +25,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
-from ..cli.options import user_presets_folder
+from ..cli.options import Options, user_presets_folder
 from ..errors import RosyError
 from ..turntable_video import Encoder
 from ..worker.program import run_program
@@ -195,7 +194,7 @@ def has_bpy() -> bool:
 
 
 def run_in_blender(
-    arguments: Sequence[str], options: argparse.Namespace, command: str, path: Path | None
+    arguments: Sequence[str], options: Options, command: str, path: Path | None
 ) -> None:
     """Run a command again in a Blender and exit with its status.
 
@@ -205,7 +204,7 @@ def run_in_blender(
     ----------
     arguments : sequence of str
         Of the command.
-    options : argparse.Namespace
+    options : Options
         The options of the command.
     command : str
         The verb.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,17 +13,7 @@ from .. import api
 from ..api.films import MAX_BETWEEN
 from ..api.pictures import picture_look
 from ..api.surface import MeshArrays
-from ..cli.options import (
-    add_look_options,
-    add_subcommand,
-    add_view_options,
-    add_workers_option,
-    api_arguments,
-    check_output,
-    int_between,
-    requested_preset,
-    requested_settings,
-)
+from ..cli.options import Options, add_subcommand, int_between
 from ..cli.pictures import add_motion_options, video_encoder
 from ..cli.streams import print_line
 from ..errors import RosyError
@@ -80,9 +69,9 @@ def add_film_command(subparsers: Any) -> None:
         help="let the first step follow the last one, for films that are shown in a loop",
     )
     add_motion_options(parser)
-    add_view_options(parser)
-    add_workers_option(parser)
-    add_look_options(parser)
+    parser.add_view_options()
+    parser.add_workers_option()
+    parser.add_look_options()
 
 
 def _count_or_auto(text: str) -> int | None:
@@ -90,13 +79,13 @@ def _count_or_auto(text: str) -> int | None:
     return None if text == "auto" else int_between(0, MAX_BETWEEN)(text)
 
 
-def run_film(options: argparse.Namespace) -> None:
+def run_film(options: Options) -> None:
     """Draw the steps of a simulation, or a series of fields, under one camera, as a video."""
-    check_output(options)
+    options.check_output()
     check_video_path(options.output)
     if options.degree is not None:
         check_degree(options.degree)
-    preset, settings = requested_preset(options), requested_settings(options)
+    preset, settings = options.requested_preset(), options.requested_settings()
     # Mistakes are reported before the files are read.
     picture_look(str(options.series[0]), preset, settings, {})
     encode = video_encoder(options)
@@ -112,11 +101,11 @@ def run_film(options: argparse.Namespace) -> None:
         else:
             print_line(f"picture {number}{total}")
 
-    arguments = api_arguments(options, api.film, encode=encode, on_picture=announce)
+    arguments = options.api_arguments(api.film, encode=encode, on_picture=announce)
     api.film(fields, options.output, **arguments)
 
 
-def requested_fields(options: argparse.Namespace) -> SimulationFields | FieldFiles:
+def requested_fields(options: Options) -> SimulationFields | FieldFiles:
     """Return the fields of the files of a series.
 
     Raises

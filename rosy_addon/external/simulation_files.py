@@ -292,9 +292,7 @@ def _time_reader(path: Path) -> Any:
     reader.UpdateInformation()
     if path.suffix.lower() in EXODUS_SUFFIXES:
         for kind in (reader.NODAL, reader.ELEM_BLOCK):
-            for array in range(reader.GetNumberOfObjectArrays(kind)):
-                name = reader.GetObjectArrayName(kind, array)
-                reader.SetObjectArrayStatus(kind, name, 1)
+            reader.SetAllArrayStatus(kind, 1)
     return reader
 
 

@@ -195,13 +195,13 @@ def _forwarded_args(options: Options) -> list[str]:
 
     Each is one word, because names may begin with a dash.
     """
-    width_and_height, preset = options.size, options.preset
+    size, preset = options.size, options.preset
     blender = getattr(options, "blender", None)
     values = {
         "out": [os.path.realpath(options.out)],
         "object": options.object or [],
         "camera": [options.camera],
-        "size": [width_and_height and "{}x{}".format(*width_and_height)],
+        "size": [size and "{}x{}".format(*size)],
         "preset": [preset and _forwarded_preset(preset)],
         "device": [options.device],
         "set": options.set,

@@ -310,14 +310,13 @@ def _load_fields(options: Options) -> dict[str, api.Field]:
     fields: dict[str, api.Field | None] = dict.fromkeys(sources)
     surface = api.Surface(options.mesh, up=options.up)
     degree = options.degree
-    for title, source in sources.items():
-        if source not in GENERATORS:
-            field = fields[title] = read_field(options, Path(source), surface, None)
-            degree = field.degree if degree is None else degree
-    for title, source in sources.items():
+    # Files come first, because the first of them sets the degree of the generated fields.
+    for title, source in sorted(sources.items(), key=lambda item: item[1] in GENERATORS):
         if source in GENERATORS:
-            make = GENERATORS[source]
-            fields[title] = make(surface, DEFAULT_DEGREE if degree is None else degree)
+            fields[title] = GENERATORS[source](surface, degree or DEFAULT_DEGREE)
+        else:
+            field = fields[title] = read_field(options, Path(source), surface, None)
+            degree = degree or field.degree
     return fields
 
 

@@ -130,7 +130,7 @@ class Surface:
             sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
         )
         uv = arrays.uv if uv is None else uv
-        self._uv = None if uv is None else self._corner_values(uv, "uv", 2)
+        self._uv = None if uv is None else self._corner_uv(uv)
         self._vertex_data, self._face_data = arrays.vertex_data, arrays.face_data
 
     def __repr__(self) -> str:
@@ -199,17 +199,17 @@ class Surface:
         """Arrays of F rows by their names, from the file of a simulation or the mesh of a library."""
         return self._face_data
 
-    def _corner_values(self, values: ArrayLike, what: str, columns: int) -> NDArray[np.float64]:
-        """Return values of the corners, given those of the vertices or of the corners."""
-        array = np.asarray(values, dtype=np.float64)
+    def _corner_uv(self, uv: ArrayLike) -> NDArray[np.float64]:
+        """Return texture coordinates of the corners, given those of the vertices or of the corners."""
+        array = np.asarray(uv, dtype=np.float64)
         counts = len(self.vertices), len(self.mesh.corner_vertex)
-        if array.ndim != 2 or array.shape[1] != columns or len(array) not in counts:
+        if array.ndim != 2 or array.shape[1] != 2 or len(array) not in counts:
             raise RosyError(
-                f"{self.name}: {what} needs a row of {columns} numbers for each of the {counts[0]:,} "
-                f"vertices or {counts[1]:,} corners, not an array of shape {array.shape}"
+                f"{self.name}: uv needs a row of 2 numbers for each of the {counts[0]:,} vertices or "
+                f"{counts[1]:,} corners, not an array of shape {array.shape}"
             )
         if not np.isfinite(array).all():
-            raise RosyError(f"{self.name}: {what} has values that are not finite")
+            raise RosyError(f"{self.name}: uv has values that are not finite")
         return array[self.mesh.corner_vertex] if len(array) == counts[0] else array
 
 
@@ -297,9 +297,9 @@ class MeshArrays:
         Arrays of V and of F rows.
     """
 
-    vertices: Any = ()
-    corner_vertex: NDArray[Any] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    face_start: NDArray[Any] = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    vertices: Any
+    corner_vertex: NDArray[Any]
+    face_start: NDArray[Any]
     uv: NDArray[Any] | None = None
     vertex_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     face_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)

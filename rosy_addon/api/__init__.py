@@ -11,73 +11,42 @@ Angles are in radians, except those of a view, which are in degrees.
     figures      fields side by side, with their keys
     drawings     strokes
     textures     textures
+
+The names that are imported here are public; `rosy_addon.__all__` lists them.
 """
 
-from ..errors import RosyError, RosyWarning
-from .comparison import Comparison, compare
-from .drawings import Drawing, strokes
-from .field import (
-    Difference,
-    Field,
-    Singularities,
-    from_angles,
-    from_array,
-    from_directions,
-    from_representation,
-    from_tensors,
-    from_vectors,
-    read_field,
-)
-from .figures import figure, save_figures
-from .films import film
-from .generators import (
-    along_axis,
-    along_uv,
-    curvature,
-    features,
-    form,
-    guided,
-    prescribed,
-    smoothest,
-)
-from .pictures import Picture, ambient_occlusion, list_presets, render, turntable
-from .surface import Surface
-from .textures import Texture, texture
-
-__all__ = [
-    "Comparison",
-    "Difference",
-    "Drawing",
-    "Field",
-    "Picture",
-    "RosyError",
-    "RosyWarning",
-    "Singularities",
-    "Surface",
-    "Texture",
-    "along_axis",
-    "along_uv",
-    "ambient_occlusion",
-    "compare",
-    "curvature",
-    "features",
-    "figure",
-    "film",
-    "form",
-    "from_angles",
-    "from_array",
-    "from_directions",
-    "from_representation",
-    "from_tensors",
-    "from_vectors",
-    "guided",
-    "list_presets",
-    "prescribed",
-    "read_field",
-    "render",
-    "save_figures",
-    "smoothest",
-    "strokes",
-    "texture",
-    "turntable",
-]
+from ..errors import RosyError as RosyError
+from ..errors import RosyWarning as RosyWarning
+from .comparison import Comparison as Comparison
+from .comparison import compare as compare
+from .drawings import Drawing as Drawing
+from .drawings import strokes as strokes
+from .field import Difference as Difference
+from .field import Field as Field
+from .field import Singularities as Singularities
+from .field import from_angles as from_angles
+from .field import from_array as from_array
+from .field import from_directions as from_directions
+from .field import from_representation as from_representation
+from .field import from_tensors as from_tensors
+from .field import from_vectors as from_vectors
+from .field import read_field as read_field
+from .figures import figure as figure
+from .figures import save_figures as save_figures
+from .films import film as film
+from .generators import along_axis as along_axis
+from .generators import along_uv as along_uv
+from .generators import curvature as curvature
+from .generators import features as features
+from .generators import form as form
+from .generators import guided as guided
+from .generators import prescribed as prescribed
+from .generators import smoothest as smoothest
+from .pictures import Picture as Picture
+from .pictures import ambient_occlusion as ambient_occlusion
+from .pictures import list_presets as list_presets
+from .pictures import render as render
+from .pictures import turntable as turntable
+from .surface import Surface as Surface
+from .textures import Texture as Texture
+from .textures import texture as texture

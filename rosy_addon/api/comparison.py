@@ -207,7 +207,7 @@ def compare(
     differences: dict[str, Difference] = {}
     matchings: dict[str, SingularityMatching] = {}
     for title, field in list(titled.items())[1:]:
-        if not is_comparable(reference, field):
+        if field.degree != reference.degree or field.surface.mesh is not reference.surface.mesh:
             continue
         differences[title] = reference.difference(field)
         pair = reference.singularities, field.singularities
@@ -230,8 +230,3 @@ def titled_fields(fields: Iterable[Field] | Mapping[str, Field]) -> dict[str, Fi
     if not titled:
         raise RosyError("there is no field to compare: give one or more")
     return titled
-
-
-def is_comparable(field: Field, other: Field) -> bool:
-    """Whether the angle between two fields is defined: same degree, same surface."""
-    return field.degree == other.degree and field.surface.mesh is other.surface.mesh

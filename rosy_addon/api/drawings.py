@@ -20,11 +20,10 @@ from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
 from ..projection.camera import Camera, check_size, orbit_camera
 from ..projection.up_axis import UP_AXIS_MATRIX
-from ..rendering.mesh_view import check_light, mesh_instance
+from ..rendering.mesh_view import check_light
 from ..settings import settings_of
-from .field import Field, check_same_surface
-from .generators import form
-from .pictures import DEFAULT_SIZE, DEFAULT_VIEW
+from .field import Field
+from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, upright_instance
 from .surface import Surface
 
 
@@ -155,14 +154,24 @@ def strokes(
     stroke_style = _style_of(style)
     check_light(stroke_style.light, surface.name)
     pen = Pen(width, tuple(colors), None if plotter else paper, millimeters, plotter)
-    field = form(surface) if field is None else field
-    check_same_surface(surface, field)
-    instance = mesh_instance(surface.mesh, field.rosy, surface.up)
+    return draw_strokes(surface, field, stroke_style, pen, view, size, orthographic)
+
+
+def draw_strokes(
+    surface: Surface,
+    field: Field | None,
+    style: StrokeStyle,
+    pen: Pen,
+    view: tuple[float, float],
+    size: tuple[int, int],
+    orthographic: bool,
+) -> Drawing:
+    """Draw strokes with a style and a pen; see `strokes`."""
+    instance = upright_instance(surface, field, None)
     camera = orbit_camera(
         instance.face_points(), *view, *check_size(*size), perspective=not orthographic
     )
-    lights = lights_of(stroke_style, ())
-    drawing = draw_instances([instance], camera, stroke_style, lights=lights)
+    drawing = draw_instances([instance], camera, style, lights=lights_of(style, ()))
     return Drawing(drawing, camera, pen, surface.up)
 
 

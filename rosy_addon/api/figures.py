@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -145,7 +146,9 @@ def figure(
     >>> page = rf.figure(methods, parts=("fields", "differences", "table"), dpi=60)  # doctest: +SKIP
     >>> page.savefig("torus.pdf")  # doctest: +SKIP
     """
-    drawing = load_drawing()
+    load_drawing()
+    from ..external.matplotlib_figure import SCALE_BAR_SHARE, Page, panel_width
+
     is_single = isinstance(fields, Field)
     parts = (parts,) if isinstance(parts, str) else tuple(parts)
     comparison = _comparison_of(fields, parts, reach)
@@ -164,39 +167,28 @@ def figure(
             )
     shown = {"singularity_dots": "visible", **settings}
     look = picture_look(name, preset, shown, {}, color_values is not None)
-    numbers = _numbers_of_fields(name, comparison.fields, color_values)
-    instances = {
-        title: upright_instance(field.surface, field, None, values)
-        for (title, field), values in zip(comparison.fields.items(), numbers, strict=True)
-    }
+    instances = _instances(name, comparison.fields, color_values)
     look = _figure_look(look, comparison.fields, instances.values(), dpi / LENGTH_DPI)
     if color_label is None:
         color_label = color_values if isinstance(color_values, str) else ""
         color_label = "magnitude" if colors_magnitude(look) else color_label
+    color_bar = _color_bar(look, color_label)
     count = len(instances)
     columns = min(count, MAX_COLUMNS) if columns is None else max(columns, 1)
-    has_key = (
-        shows_singularities(look) or _color_bar(look, "") is not None or "differences" in parts
-    )
-    pixels = drawing.panel_width(width, columns, has_key, dpi)
+    has_key = shows_singularities(look) or color_bar is not None or "differences" in parts
+    pixels = panel_width(width, columns, has_key, dpi)
     points = np.concatenate([instance.face_points() for instance in instances.values()])
     size = pixels, max(round(pixels * _aspect(points, view)), 1)
     camera = orbit_camera(points, *view, *size, perspective=not orthographic, margin=MARGIN)
-    studio = _Studio(camera, look, Cache(), workers)
-    rows, marks = [], {}
-    if set(parts) - {"table"}:
-        marks = {title: studio.marks(instance) for title, instance in instances.items()}
+    studio = _Studio(comparison, instances, camera, look, workers)
+    rows = []
     if "fields" in parts:
-        panels = [
-            drawing.Panel("" if is_single else title, studio.picture(instance), marks[title])
-            for title, instance in instances.items()
-        ]
-        rows.append(drawing.Row(panels, _color_bar(look, color_label)))
+        rows.append(studio.field_row([""] if is_single else list(instances), color_bar))
     if "differences" in parts:
-        rows.append(studio.difference_row(comparison, instances, marks, lines, largest_angle))
+        rows.append(studio.difference_row(lines, largest_angle))
     table = comparison.cells() if "table" in parts else []
-    bar = None if scale_bar is None else _scale_bar(camera, scale_bar, drawing.SCALE_BAR_SHARE)
-    return drawing.draw_page(drawing.Page(rows, table, caption, bar), width, columns, dpi)
+    bar = None if scale_bar is None else _scale_bar(camera, scale_bar, SCALE_BAR_SHARE)
+    return Page(rows, table, caption, bar, width, columns, dpi).draw()
 
 
 def _comparison_of(
@@ -266,9 +258,12 @@ def load_drawing() -> ModuleType:
     """
     try:
         from ..external import matplotlib_figure
-    except ImportError:
+    except ModuleNotFoundError as error:
+        if error.name is not None and error.name.startswith("matplotlib"):
+            raise RosyError(
+                "figures are drawn by matplotlib: pip install rosyfields[figures]"
+            ) from None
         raise RosyError("figures need the Python package rosyfields, with matplotlib") from None
-    matplotlib_figure.check_matplotlib()
     return matplotlib_figure
 
 
@@ -293,12 +288,12 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
         )
 
 
-def _numbers_of_fields(
+def _instances(
     name: str,
     fields: Mapping[str, Field],
     color_values: str | Sequence[str | ArrayLike] | None,
-) -> list[NDArray[np.float32] | None]:
-    """Return the numbers at the corners of the surface of each field, as for `figure`.
+) -> dict[str, MeshInstance]:
+    """Return the fields in world space with the numbers that are shown as colors, as for `figure`.
 
     Raises
     ------
@@ -313,10 +308,10 @@ def _numbers_of_fields(
         raise RosyError(
             f"{name}: color_values has {counted(len(values), 'array')} for {counted(len(fields), 'field')}"
         )
-    return [
-        corner_numbers(field.surface, array)
-        for field, array in zip(fields.values(), values, strict=True)
-    ]
+    return {
+        title: upright_instance(field.surface, field, None, corner_numbers(field.surface, array))
+        for (title, field), array in zip(fields.items(), values, strict=True)
+    }
 
 
 def _figure_look(
@@ -342,27 +337,15 @@ def _aspect(points: NDArray[np.float64], view: tuple[float, float]) -> float:
 
 def _color_bar(look: Look, label: str) -> ColorBar | None:
     """Return the color bar of the fields; None if neither magnitudes nor numbers are shown as color."""
+    from ..external.matplotlib_figure import ColorBar
+
     if colors_magnitude(look):
         ends = 0.0, look.magnitude_range
     elif colors_values(look):
         ends = look.values_low, look.values_high
     else:
         return None
-    bar: ColorBar = load_drawing().ColorBar(label, *ends, color_stops(look.colour_map))
-    return bar
-
-
-def _numbers_at_ends(top: float) -> tuple[float, float]:
-    """Return the numbers at both ends of the color map of differences, for the largest angle."""
-    at_zero, at_top = DIFFERENCE_ENDS
-    slope = top / (at_top - at_zero)
-    return -slope * at_zero, slope * (1.0 - at_zero)
-
-
-def _difference_stops() -> NDArray[np.float64]:
-    """Return the (n, 3) display values of the color map of differences, from 0 to the largest angle."""
-    positions = np.linspace(*DIFFERENCE_ENDS, 33)
-    return map_colors(positions, DIFFERENCE_COLORS).astype(np.float64)
+    return ColorBar(label, *ends, color_stops(look.colour_map))
 
 
 def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
@@ -376,61 +359,69 @@ def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
 
 @dataclass(frozen=True, eq=False)
 class _Studio:
-    """What all panels of a figure share.
+    """Draws the panels of a figure: all fields under one camera.
 
     Attributes
     ----------
+    comparison : Comparison
+    instances : dict of str to MeshInstance
+        The fields in world space, by their titles.
     camera : Camera
     look : Look
-    cache : Cache
     workers : int
         As of `draw_picture`.
     """
 
+    comparison: Comparison
+    instances: dict[str, MeshInstance]
     camera: Camera
     look: Look
-    cache: Cache
     workers: int
+    _cache: Cache = field(default_factory=Cache)
 
-    def picture(self, instance: MeshInstance, **changes: Any) -> NDArray[np.uint8]:
-        """Return the picture of an instance, (H, W, 4) sRGB, the top row first, without singularities."""
-        return to_srgb_uint8(self._linear(instance, **changes)[::-1])
-
-    def _linear(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
+    def _rgba(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
+        """Return the picture of an instance as `Picture.rgba`, without singularities."""
         look = replace(self.look, singularity_dots="none", **changes)
         view = ViewInput((instance,), self.camera, look)
-        return draw_picture(view, self.cache, keep_gbuffers=False, workers=self.workers).rgba
+        return draw_picture(view, self._cache, keep_gbuffers=False, workers=self.workers).rgba
 
-    def marks(self, instance: MeshInstance) -> SingularityMarks | None:
-        """Return the singularities of an instance in the picture; None if the look shows none.
+    @cached_property
+    def _marks(self) -> dict[str, SingularityMarks | None]:
+        """The singularities of each field in its picture; None if the look shows none.
 
         The dots of very many are smaller, so that they do not hide the lines.
         """
         if not shows_singularities(self.look):
-            return None
-        marks = singularity_marks([instance], self.camera, self.look)
-        area = float((np.pi * marks.radius**2).sum())
+            return dict.fromkeys(self.instances)
         limit = MAX_DOT_SHARE * self.camera.width * self.camera.height
-        return marks if area <= limit else replace(marks, size=marks.size * np.sqrt(limit / area))
+        shown: dict[str, SingularityMarks | None] = {}
+        for title, instance in self.instances.items():
+            marks = singularity_marks([instance], self.camera, self.look)
+            area = max(float((np.pi * marks.radius**2).sum()), limit)
+            shown[title] = replace(marks, size=marks.size * np.sqrt(limit / area))
+        return shown
 
-    def difference_row(
-        self,
-        comparison: Comparison,
-        instances: Mapping[str, MeshInstance],
-        marks: Mapping[str, SingularityMarks | None],
-        lines: str,
-        largest_angle: float,
-    ) -> Row:
-        """Return the panels of the differences from the first field, below those of their fields."""
-        drawing = load_drawing()
-        reference = next(iter(instances))
-        degree = comparison.fields[reference].degree
-        top = largest_angle or 180.0 / degree
+    def field_row(self, titles: Sequence[str], color_bar: ColorBar | None) -> Row:
+        """Return the panels of the fields."""
+        from ..external.matplotlib_figure import Panel, Row
+
         panels = [
-            self._difference_panel(comparison, instances, marks, title, lines, top)
-            if title in comparison.differences
+            Panel(text, to_srgb_uint8(self._rgba(instance)[::-1]), self._marks[title])
+            for text, (title, instance) in zip(titles, self.instances.items(), strict=True)
+        ]
+        return Row(panels, color_bar)
+
+    def difference_row(self, lines: str, largest_angle: float) -> Row:
+        """Return the panels of the differences from the first field, below those of their fields."""
+        from ..external.matplotlib_figure import ColorBar, Row
+
+        reference, first = next(iter(self.comparison.fields.items()))
+        top = largest_angle or 180.0 / first.degree
+        panels = [
+            self._difference_panel(title, lines, top)
+            if title in self.comparison.differences
             else None
-            for title in instances
+            for title in self.instances
         ]
         legend = f"Angle to \u201c{reference}\u201d\n\u00d7  largest angle"
         if shows_singularities(self.look):
@@ -438,36 +429,38 @@ class _Studio:
                 f"\nOpen circles: singularities of\n\u201c{reference}\u201d; dots: of the other field."
                 "\nLines connect those that match."
             )
-        bar = drawing.ColorBar("angle (degrees)", 0.0, top, _difference_stops())
-        row: Row = drawing.Row(panels, bar, legend)
-        return row
+        stops = map_colors(np.linspace(*DIFFERENCE_ENDS, 33), DIFFERENCE_COLORS)
+        return Row(panels, ColorBar("angle (degrees)", 0.0, top, stops.astype(np.float64)), legend)
 
-    def _difference_panel(
-        self,
-        comparison: Comparison,
-        instances: Mapping[str, MeshInstance],
-        marks: Mapping[str, SingularityMarks | None],
-        title: str,
-        lines: str,
-        top: float,
-    ) -> Panel:
-        """Return the panel of the difference of a field from the first one."""
-        first, other = next(iter(instances.values())), instances[title]
-        difference = comparison.differences[title]
-        drawn = {"first": [first], "other": [other], "both": [first, other]}[lines]
+    def _difference_panel(self, title: str, lines: str, top: float) -> Panel:
+        """Return the panel of the difference of a field from the first one.
+
+        Parameters
+        ----------
+        title : str
+        lines : {"other", "first", "both"}
+            Whose lines are drawn.
+        top : float
+            The angle at the top of the color map, in degrees.
+        """
+        from ..external.matplotlib_figure import Panel
+
+        reference, first = next(iter(self.instances.items()))
+        other, difference = self.instances[title], self.comparison.differences[title]
         degrees = np.degrees(difference.angle)
         values = degrees.astype(np.float32)[first.surface.corner_face]
-        low, high = _numbers_at_ends(top)
+        at_zero, at_top = DIFFERENCE_ENDS
+        slope = top / (at_top - at_zero)
         pictures = [
-            self._linear(
+            self._rgba(
                 replace(instance, color_values=values),
                 hue="values",
                 magnitude="none",
-                values_low=low,
-                values_high=high,
+                values_low=-slope * at_zero,
+                values_high=slope * (1.0 - at_zero),
                 colour_map=DIFFERENCE_COLORS,
             )
-            for instance in drawn
+            for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]
         ]
         # The pictures cover the same pixels.
         rgba = np.mean(pictures, axis=0)
@@ -475,43 +468,38 @@ class _Studio:
             f"{format_degrees(np.degrees(angle))}\u00b0"
             for angle in (difference.mean, difference.p95, difference.max)
         )
-        note = f"mean {mean}, 95 % {p95}, largest {largest}"
-        shown = shows_singularities(self.look)
-        panel: Panel = load_drawing().Panel(
-            f"{title} vs. {next(iter(instances))}",
+        return Panel(
+            f"{title} vs. {reference}",
             to_srgb_uint8(rgba[::-1]),
-            marks[title],
-            next(iter(marks.values())),
-            self._links(comparison, title, first) if shown else None,
-            self._worst_place(first, difference.worst_face),
-            note,
+            self._marks[title],
+            self._marks[reference],
+            self._links(title) if shows_singularities(self.look) else None,
+            self._worst_place(difference.worst_face),
+            f"mean {mean}, 95 % {p95}, largest {largest}",
         )
-        return panel
 
-    def _links(
-        self, comparison: Comparison, title: str, instance: MeshInstance
-    ) -> NDArray[np.float64]:
+    def _links(self, title: str) -> NDArray[np.float64]:
         """Return the (n, 2, 2) ends of lines between singularities that match, if both are visible."""
-        first = next(iter(comparison.fields.values())).singularities
-        second, matching = comparison.fields[title].singularities, comparison.matchings[title]
-        ends = np.concatenate([first.vertex[matching.first], second.vertex[matching.second]])
-        place, is_visible = self._projected(instance, ends)
-        count = len(matching.distance)
-        both = is_visible[:count] & is_visible[count:]
-        return np.stack([place[:count], place[count:]], axis=1)[both]
+        first = next(iter(self.comparison.fields.values())).singularities
+        second = self.comparison.fields[title].singularities
+        matching = self.comparison.matchings[title]
+        ends = np.stack([first.vertex[matching.first], second.vertex[matching.second]], axis=1)
+        place, is_visible = self._projected(ends.ravel())
+        return place.reshape(-1, 2, 2)[is_visible.reshape(-1, 2).all(axis=1)]
 
-    def _worst_place(self, instance: MeshInstance, face: int) -> NDArray[np.float64] | None:
+    def _worst_place(self, face: int) -> NDArray[np.float64] | None:
         """Return the place of a face in the picture, (2,) pixels; None if none of its corners is visible."""
         if face < 0:
             return None
-        surface = instance.surface
+        surface = next(iter(self.instances.values())).surface
         corners = surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]]
-        place, is_visible = self._projected(instance, corners)
+        place, is_visible = self._projected(corners)
         return place[is_visible].mean(axis=0) if is_visible.any() else None
 
     def _projected(
-        self, instance: MeshInstance, vertices: NDArray[np.integer[Any]]
+        self, vertices: NDArray[np.integer[Any]]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the (n, 2) places of vertices in pixels, and which are visible."""
-        projected = project_vertices([instance], self.camera, [vertices])
+        """Return the (n, 2) places of vertices of the first surface in pixels, and which are visible."""
+        first = next(iter(self.instances.values()))
+        projected = project_vertices([first], self.camera, [vertices])
         return projected.position, projected.is_visible

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,9 +27,9 @@ from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.view_input import ViewInput
-from ..turntable_video import Encoder, check_video_path, turntable
+from ..turntable_video import Encoder, turntable
 from .field import Field, warn
-from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, find_ffmpeg, picture_look
+from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, default_encoder, picture_look
 
 #: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
 #: divided by the width of lines. The correlation of the two pictures is then above 0.9.
@@ -107,11 +107,9 @@ def film(
     'film.gif'
     """
     path = Path(path)
-    check_video_path(path)
+    encode = default_encoder(path, encode)
     if not rate > 0:
         raise RosyError(f"{path}: a film needs a rate above 0")
-    if path.suffix.lower() == ".mp4" and encode is None:
-        encode = find_ffmpeg()
     look = picture_look(str(path), preset, settings, {})
     series = Film(
         fields,
@@ -153,6 +151,7 @@ class _Survey(NamedTuple):
     rest_vertices: NDArray[np.float64] | None
 
 
+@dataclass(eq=False)
 class Film:
     """The views of the fields of a series, under one camera that frames all of them.
 
@@ -183,42 +182,44 @@ class Film:
         If there is one field only.
     """
 
-    def __init__(
-        self,
-        fields: Sequence[Field],
-        look: Look,
-        view_angles: tuple[float, float],
-        size: tuple[int, int],
-        *,
-        between: int | None = 0,
-        loop: bool = False,
-        perspective: bool = True,
-        keeps_anchor: bool = False,
-        name: str = "film",
-    ) -> None:
-        if len(fields) < 2:
-            raise RosyError(f"{name}: a film needs 2 fields or more")
-        if between is not None and not 0 <= between <= MAX_BETWEEN:
-            raise RosyError(f"{name}: between must be from 0 to {MAX_BETWEEN}, not {between}")
-        self._fields, self._look, self._asked, self._loop = fields, look, between, loop
-        self._framing = (*view_angles, *size)
-        self._perspective, self._keeps_anchor = perspective, keeps_anchor
-        #: What the user should know about the motion after the first view; may be empty.
-        self.advice = ""
+    fields: Sequence[Field]
+    look: Look
+    view_angles: tuple[float, float]
+    size: tuple[int, int]
+    _: KW_ONLY
+    between: int | None = 0
+    loop: bool = False
+    perspective: bool = True
+    keeps_anchor: bool = False
+    name: str = "film"
+    #: What the user should know about the motion after the first view; may be empty.
+    advice: str = ""
+
+    def __post_init__(self) -> None:
+        if len(self.fields) < 2:
+            raise RosyError(f"{self.name}: a film needs 2 fields or more")
+        if self.between is not None and not 0 <= self.between <= MAX_BETWEEN:
+            raise RosyError(
+                f"{self.name}: between must be from 0 to {MAX_BETWEEN}, not {self.between}"
+            )
+
+    @property
+    def _framing(self) -> tuple[float, float, int, int]:
+        return (*self.view_angles, *self.size)
 
     @property
     def picture_count(self) -> int:
         """The number of views. If it depends on how fast the fields turn, they are looked at first."""
-        intervals = len(self._fields) - (not self._loop)
-        return intervals * (self._between + 1) + (not self._loop)
+        intervals = len(self.fields) - (not self.loop)
+        return intervals * (self._between + 1) + (not self.loop)
 
     @property
     def _between(self) -> int:
         """The number of pictures between two fields."""
-        if self._asked is not None:
-            return self._asked
+        if self.between is not None:
+            return self.between
         survey = self._survey
-        return _steady_between(survey.turn, self._look) if survey.keeps_polygons else 0
+        return _steady_between(survey.turn, self.look) if survey.keeps_polygons else 0
 
     def views(self) -> Iterator[ViewInput]:
         """Yield the views.
@@ -228,16 +229,16 @@ class Film:
         RosyError
             As of `film`. What is wrong with a field is found before the first view.
         """
-        survey, look = self._survey, self._look
+        survey, look = self._survey, self.look
         if look.magnitude != "none" and not look.magnitude_range:
             look = replace(look, magnitude_range=survey.largest_magnitude)
         rest = survey.rest_vertices
-        if rest is not None and not self._keeps_anchor:
+        if rest is not None and not self.keeps_anchor:
             look = replace(look, anchor="surface")
         rest = rest if look.anchor == "surface" else None
         self.advice = _advice(survey.turn, self._between, look)
-        camera = orbit_camera(survey.points, *self._framing, perspective=self._perspective)
-        loop_frames = self.picture_count if self._loop else 0
+        camera = orbit_camera(survey.points, *self._framing, perspective=self.perspective)
+        loop_frames = self.picture_count if self.loop else 0
         for number, (surface, field, up) in enumerate(self._moments()):
             if rest is not None:
                 vectors = vectors_on_rest_shape(surface, rest, field.vectors)
@@ -248,10 +249,10 @@ class Film:
 
     def _moments(self) -> Iterator[tuple[PolygonMesh, RosyField, str]]:
         """Yield the meshes and fields of the pictures, with their upward axes."""
-        count, stop = len(self._fields), self._between + 1
-        previous = self._fields[0]
-        for number in range(1, count + self._loop):
-            field = self._fields[number % count]
+        count, stop = len(self.fields), self._between + 1
+        previous = self.fields[0]
+        for number in range(1, count + self.loop):
+            field = self.fields[number % count]
             start = previous.surface.mesh, previous.rosy
             yield *start, previous.surface.up
             for index in range(1, stop):
@@ -259,17 +260,17 @@ class Film:
                 mesh = _mesh_between(start[0], end[0], share)
                 yield mesh, interpolate_fields(start, end, share, mesh), previous.surface.up
             previous = field
-        if not self._loop:
+        if not self.loop:
             yield previous.surface.mesh, previous.rosy, previous.surface.up
 
     @cached_property
     def _survey(self) -> _Survey:
         """What all fields have in common. They are looked at once."""
         points, largest, turn = np.zeros((0, 3)), 0.0, 0.0
-        first = previous = self._fields[0]
+        first = previous = self.fields[0]
         keeps_polygons, moves = True, False
-        for number in range(len(self._fields)):
-            field = previous if number == 0 else self._fields[number]
+        for number in range(len(self.fields)):
+            field = previous if number == 0 else self.fields[number]
             has_same = self._check(number, field, previous)
             keeps_polygons &= has_same
             mesh = field.surface.mesh
@@ -281,9 +282,9 @@ class Film:
             if number == 0 or mesh is not previous.surface.mesh:
                 instance = mesh_instance(mesh, field.rosy, field.surface.up)
                 points = np.concatenate([points, instance.face_points()])
-                points = framing_points(points, *self._framing, perspective=self._perspective)
+                points = framing_points(points, *self._framing, perspective=self.perspective)
             previous = field
-        if self._loop and self._check(0, first, previous):
+        if self.loop and self._check(0, first, previous):
             turn = max(turn, _mean_turn(previous, first))
         rest = first.surface.mesh.vertices if keeps_polygons and moves else None
         return _Survey(points, largest, turn, keeps_polygons, rest)
@@ -296,14 +297,14 @@ class Film:
         RosyError
             If it has another degree, or must have the same polygons and does not.
         """
-        name = f"{field.surface.name}: field {number + 1} of {len(self._fields)}"
+        name = f"{field.surface.name}: field {number + 1} of {len(self.fields)}"
         if field.degree != previous.degree:
             raise RosyError(
                 f"{name} has degree {field.degree}, but the one before it {previous.degree}"
             )
         mesh, other = field.surface.mesh, previous.surface.mesh
         has_same = mesh is other or have_same_polygons(mesh, other)
-        if self._asked and not has_same:
+        if self.between and not has_same:
             raise RosyError(
                 f"{name} has other polygons than the one before it ({counted(mesh.face_count, 'face')} after "
                 f"{other.face_count:,}): there can be no pictures between them"

@@ -41,7 +41,7 @@ def form(surface: Surface, degree: int = 4) -> Field:
     >>> rf.form(torus)
     <Field: 4-RoSy field on <Surface 'torus.obj': 288 faces, 288 vertices>>
     """
-    return _generated(surface, GeneratorSettings("form"), degree)
+    return generated(surface, GeneratorSettings("form"), degree)
 
 
 def smoothest(surface: Surface, degree: int = 4) -> Field:
@@ -72,7 +72,7 @@ def smoothest(surface: Surface, degree: int = 4) -> Field:
     >>> int(field.singularities.index.sum()) == field.degree * cube.euler_characteristic
     True
     """
-    return _generated(surface, GeneratorSettings("smoothest"), degree)
+    return generated(surface, GeneratorSettings("smoothest"), degree)
 
 
 def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field:
@@ -102,7 +102,7 @@ def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field
     >>> field.degree
     2
     """
-    return _generated(surface, GeneratorSettings("curvature", smoothing_length=reach), degree)
+    return generated(surface, GeneratorSettings("curvature", smoothing_length=reach), degree)
 
 
 def features(
@@ -139,7 +139,7 @@ def features(
     settings = GeneratorSettings(
         "features", sharp_angle=sharp_angle, edges=None if edges is None else np.asarray(edges)
     )
-    return _generated(surface, settings, degree)
+    return generated(surface, settings, degree)
 
 
 def guided(
@@ -200,7 +200,7 @@ def guided(
         vectors=_guide_vectors(surface, vectors, degree),
         vectors_have_firmness=vectors_have_firmness,
     )
-    return _generated(surface, settings, degree)
+    return generated(surface, settings, degree)
 
 
 def _guide_vectors(
@@ -286,7 +286,7 @@ def prescribed(
         smoothing_length=reach,
         add_missing=add_missing,
     )
-    return _generated(surface, settings, degree)
+    return generated(surface, settings, degree)
 
 
 def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree: int = 4) -> Field:
@@ -316,7 +316,7 @@ def along_axis(surface: Surface, axis: Sequence[float] = (0.0, 0.0, 1.0), degree
     True
     """
     x, y, z = (float(component) for component in axis)
-    return _generated(surface, GeneratorSettings("axis", axis=(x, y, z)), degree)
+    return generated(surface, GeneratorSettings("axis", axis=(x, y, z)), degree)
 
 
 def along_uv(surface: Surface, degree: int = 4) -> Field:
@@ -334,7 +334,7 @@ def along_uv(surface: Surface, degree: int = 4) -> Field:
     >>> rf.along_uv(torus).degree
     4
     """
-    return _generated(surface, GeneratorSettings("uv", uv=uv_map(surface)), degree)
+    return generated(surface, GeneratorSettings("uv", uv=uv_map(surface)), degree)
 
 
 def uv_map(surface: Surface) -> np.ndarray:
@@ -352,7 +352,7 @@ def uv_map(surface: Surface) -> np.ndarray:
     return surface.uv
 
 
-def _generated(surface: Surface, settings: GeneratorSettings, degree: int) -> Field:
+def generated(surface: Surface, settings: GeneratorSettings, degree: int) -> Field:
     """Generate a field, and warn of faces without a direction."""
     warn(orientation_warning(surface.mesh), stacklevel=4)
     field = Field(surface, generate(surface.mesh, settings, degree))

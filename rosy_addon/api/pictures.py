@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .. import turntable_video
 from ..cache import Cache
 from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
@@ -26,16 +27,7 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
-from ..turntable_video import (
-    Encoder,
-    check_still,
-    check_video_path,
-    draw_next,
-    turntable_views,
-)
-from ..turntable_video import (
-    turntable as rosy_addon_turntable,
-)
+from ..turntable_video import Encoder
 from .field import Field, check_same_surface
 from .generators import form, uv_map
 from .surface import Surface
@@ -308,21 +300,19 @@ def turntable(
     'flow.gif'
     """
     path = Path(path)
-    check_video_path(path)
+    encode = default_encoder(path, encode)
     if pictures < 2 or not rate > 0:
         raise RosyError(f"{path}: a turntable needs 2 or more pictures, and a rate above 0")
-    if path.suffix.lower() == ".mp4" and encode is None:
-        encode = find_ffmpeg()
     sources = {"attribute": tone_values, "image": tone_image}
     look = picture_look(surface.name, preset, settings, sources, color_values is not None)
-    check_still(look, still, surface.name)
+    turntable_video.check_still(look, still, surface.name)
     tone = _surface_tone(surface, tone_values, tone_image)
     instance = upright_instance(surface, field, tone, corner_numbers(surface, color_values))
-    views = turntable_views(
+    views = turntable_video.turntable_views(
         instance, look, pictures, check_size(*size), view, perspective=not orthographic, still=still
     )
-    draw = partial(draw_next, cache=Cache(), keep_gbuffers=still, workers=workers)
-    return rosy_addon_turntable(draw, views, pictures, path, rate, encode, on_picture)
+    draw = partial(turntable_video.draw_next, cache=Cache(), keep_gbuffers=still, workers=workers)
+    return turntable_video.turntable(draw, views, pictures, path, rate, encode, on_picture)
 
 
 def picture_look(
@@ -363,6 +353,18 @@ def picture_look(
         raise RosyError(f"{name}: choose one source of the tone, {' or '.join(given)}")
     look = replace(look, hue="values") if has_color_values else look
     return replace(look, tone=given[0]) if given else look
+
+
+def default_encoder(path: Path, encode: Encoder | None) -> Encoder | None:
+    """Return the encoder of a video: ffmpeg for an .mp4, if none is given.
+
+    Raises
+    ------
+    RosyError
+        If the name of the file is not that of a video.
+    """
+    turntable_video.check_video_path(path)
+    return find_ffmpeg() if encode is None and path.suffix.lower() == ".mp4" else encode
 
 
 def find_ffmpeg() -> Encoder | None:
@@ -410,7 +412,11 @@ def corner_numbers(
         return None
     mesh = surface.mesh
     if isinstance(color_values, str):
-        color_values = _named_numbers(surface, color_values)
+        # Faces are listed first, and count if vertices have an array of the same name.
+        data = {**surface.face_data, **surface.vertex_data, **surface.face_data}
+        color_values = _named_array(
+            surface, color_values, data, "attribute", "attributes of faces or vertices"
+        )
     try:
         array = np.asarray(color_values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -431,19 +437,16 @@ def corner_numbers(
     return numbers
 
 
-def _named_numbers(surface: Surface, name: str) -> NDArray[Any]:
-    """Return an array of the faces or of the vertices."""
-    for data in (surface.face_data, surface.vertex_data):
-        if name in data:
-            return data[name]
-    known = dict.fromkeys([*surface.face_data, *surface.vertex_data])
-    if not known:
-        raise RosyError(
-            f"{surface.name}: has no attributes of faces or vertices; of mesh files, only .ply files have "
-            "any"
-        )
-    available = ", ".join(f"'{key}'" for key in known)
-    raise RosyError(f"{surface.name}: there is no attribute '{name}', only: {available}")
+def _named_array(
+    surface: Surface, name: str, data: Mapping[str, NDArray[Any]], kind: str, kinds: str
+) -> NDArray[Any]:
+    """Return an array of a surface; `kind` and `kinds` say what there is, for the errors."""
+    if name in data:
+        return data[name]
+    if not data:
+        raise RosyError(f"{surface.name}: has no {kinds}; of mesh files, only .ply files have any")
+    available = ", ".join(f"'{key}'" for key in data)
+    raise RosyError(f"{surface.name}: there is no {kind} '{name}', only: {available}")
 
 
 def _surface_tone(
@@ -475,21 +478,15 @@ def _surface_tone(
 def _named_tone(surface: Surface, name: str) -> NDArray[Any]:
     """Return (V,) tones: an array of the vertices, or the luminance of their colors."""
     data = surface.vertex_data
-    if not data:
-        raise RosyError(
-            f"{surface.name}: has no vertex attributes; of mesh files, only .ply files have any"
-        )
     rgb = [data.get(channel) for channel in ("red", "green", "blue")]
     if name == VERTEX_COLOR and all(channel is not None for channel in rgb):
         return to_linear(np.stack(rgb, axis=1)) @ LUMINANCE_WEIGHTS  # type: ignore[arg-type]
-    if name not in data:
-        available = ", ".join(f"'{key}'" for key in data)
-        raise RosyError(f"{surface.name}: there is no vertex attribute '{name}', only: {available}")
-    if not np.isfinite(data[name]).all():
+    values = _named_array(surface, name, data, "vertex attribute", "vertex attributes")
+    if not np.isfinite(values).all():
         raise RosyError(
             f"{surface.name}: the vertex attribute '{name}' has values that are not finite"
         )
-    return data[name]
+    return values
 
 
 def _image_luminance(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,16 @@ from ..field.singularities import euler_characteristic
 from ..field.surface import Surface as PolygonMesh
 from ..field.surface import build_surface
 from ..projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
-from .mesh_objects import MeshArrays, arrays_of
+
+#: Corners of the surface cells of meshio, by their type. Cells of second order have further points,
+#: which are left out.
+MESHIO_CORNERS = {
+    "triangle": 3, "triangle6": 3, "triangle7": 3,
+    "quad": 4, "quad8": 4, "quad9": 4,
+}  # fmt: skip
+
+#: VTK's types of faces: triangle, polygon, quad.
+VTK_FACES = (5, 7, 9)
 
 
 class Surface:
@@ -95,7 +105,9 @@ class Surface:
         sharp_edges: ArrayLike | None = None,
         step: int | None = None,
     ) -> None:
-        self._path = _path_of(vertices) if faces is None else None
+        self._path: Path | None = None
+        if faces is None and isinstance(vertices, (str, os.PathLike)):
+            self._path = Path(vertices)
         suffix = "" if self._path is None else self._path.suffix.lower()
         self.name = name or ("surface" if self._path is None else str(self._path))
         self.up = up or UP_AXIS_BY_SUFFIX.get(suffix, "z")
@@ -118,7 +130,7 @@ class Surface:
             sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
         )
         uv = arrays.uv if uv is None else uv
-        self._uv = None if uv is None else self._corner_values(uv, "uv", 2)
+        self._uv = None if uv is None else self._corner_uv(uv)
         self._vertex_data, self._face_data = arrays.vertex_data, arrays.face_data
 
     def __repr__(self) -> str:
@@ -187,23 +199,18 @@ class Surface:
         """Arrays of F rows by their names, from the file of a simulation or the mesh of a library."""
         return self._face_data
 
-    def _corner_values(self, values: ArrayLike, what: str, columns: int) -> NDArray[np.float64]:
-        """Return values of the corners, given those of the vertices or of the corners."""
-        array = np.asarray(values, dtype=np.float64)
+    def _corner_uv(self, uv: ArrayLike) -> NDArray[np.float64]:
+        """Return texture coordinates of the corners, given those of the vertices or of the corners."""
+        array = np.asarray(uv, dtype=np.float64)
         counts = len(self.vertices), len(self.mesh.corner_vertex)
-        if array.ndim != 2 or array.shape[1] != columns or len(array) not in counts:
+        if array.ndim != 2 or array.shape[1] != 2 or len(array) not in counts:
             raise RosyError(
-                f"{self.name}: {what} needs a row of {columns} numbers for each of the {counts[0]:,} "
-                f"vertices or {counts[1]:,} corners, not an array of shape {array.shape}"
+                f"{self.name}: uv needs a row of 2 numbers for each of the {counts[0]:,} vertices or "
+                f"{counts[1]:,} corners, not an array of shape {array.shape}"
             )
         if not np.isfinite(array).all():
-            raise RosyError(f"{self.name}: {what} has values that are not finite")
+            raise RosyError(f"{self.name}: uv has values that are not finite")
         return array[self.mesh.corner_vertex] if len(array) == counts[0] else array
-
-
-def _path_of(mesh: Any) -> Path | None:
-    """Return the path of a file; None if this is not one."""
-    return Path(mesh) if isinstance(mesh, (str, os.PathLike)) else None
 
 
 def _read_arrays(path: Path, step: int | None) -> MeshArrays:
@@ -213,9 +220,9 @@ def _read_arrays(path: Path, step: int | None) -> MeshArrays:
     """
     if path.suffix.lower() in READERS:
         return MeshArrays(*read_polygons(path))
-    simulation_suffixes = _simulation_suffixes()
-    if path.suffix.lower() not in simulation_suffixes:
-        *suffixes, last = (*READERS, *simulation_suffixes)
+    known = (*READERS, *simulation_suffixes())
+    if path.suffix.lower() not in known:
+        *suffixes, last = known
         raise RosyError(
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
@@ -227,7 +234,7 @@ def _read_arrays(path: Path, step: int | None) -> MeshArrays:
     return MeshArrays(*mesh.polygons, None, mesh.point_arrays, mesh.cell_arrays)
 
 
-def _simulation_suffixes() -> tuple[str, ...]:
+def simulation_suffixes() -> tuple[str, ...]:
     """Return the suffixes of the files of simulations: none in the extension for Blender."""
     try:
         from ..external.simulation_files import SUFFIXES
@@ -268,3 +275,146 @@ def _positions(vertices: ArrayLike, name: str) -> NDArray[np.float64]:
     if array.ndim != 2 or array.shape[1] not in (2, 3):
         raise RosyError(f"{name}: vertices must have the shape (V, 3), not {array.shape}")
     return array if array.shape[1] == 3 else np.pad(array, ((0, 0), (0, 1)))
+
+
+# The meshes of other libraries, none of which is imported
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """The arrays of a mesh.
+
+    Attributes
+    ----------
+    vertices : (V, 3) or (V, 2) array_like
+        As it was given, not checked.
+    corner_vertex : (C,) int ndarray
+        Vertices of the corners, face by face.
+    face_start : (F + 1,) int ndarray
+        First corner of each face, and C.
+    uv : (V, 2) or (C, 2) ndarray or None
+    vertex_data, face_data : mapping of str to ndarray
+        Arrays of V and of F rows.
+    """
+
+    vertices: Any
+    corner_vertex: NDArray[Any]
+    face_start: NDArray[Any]
+    uv: NDArray[Any] | None = None
+    vertex_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    face_data: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+
+def arrays_of(mesh: Any, name: str) -> MeshArrays:
+    """Return the arrays of a mesh of meshio, PyVista, trimesh or Open3D. `MeshArrays` stay as they are.
+
+    Raises
+    ------
+    RosyError
+        If the object is no such mesh, or it has no surface.
+    """
+    if isinstance(mesh, MeshArrays):
+        return mesh
+    if hasattr(mesh, "points") and isinstance(getattr(mesh, "cells", None), list):
+        return _from_meshio(mesh, name)
+    if hasattr(mesh, "extract_surface"):
+        return _from_pyvista(mesh, name)
+    # A scene of trimesh, and a mesh of Open3D's tensors.
+    for conversion in ("to_mesh", "to_legacy"):
+        if hasattr(mesh, conversion):
+            mesh = getattr(mesh, conversion)()
+    faces = getattr(mesh, "faces", getattr(mesh, "triangles", None))
+    if hasattr(mesh, "vertices") and faces is not None:
+        return _from_triangles(mesh, np.asarray(faces))
+    raise RosyError(
+        f"{name}: expected vertices and faces, the path of a file, or a mesh of meshio, PyVista, "
+        f"trimesh or Open3D, not {type(mesh).__name__}"
+    )
+
+
+def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
+    """Return the arrays of a mesh of trimesh or Open3D."""
+    vertices = np.asarray(mesh.vertices)
+    faces = faces.reshape(-1, 3)
+    visual = getattr(mesh, "visual", None)
+    uv = np.asarray(getattr(mesh, "triangle_uvs", getattr(visual, "uv", None)))
+    is_uv = uv.shape in ((len(vertices), 2), (faces.size, 2))
+    vertex_data = dict(getattr(mesh, "vertex_attributes", {}))
+    colors = _vertex_colors(mesh)
+    if colors.shape[0] == len(vertices):
+        vertex_data.update(zip(("red", "green", "blue"), colors.T, strict=False))
+    return MeshArrays(
+        vertices,
+        faces.ravel(),
+        np.arange(len(faces) + 1) * 3,
+        uv if is_uv and len(uv) else None,
+        vertex_data,
+        dict(getattr(mesh, "face_attributes", {})),
+    )
+
+
+def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
+    """Return the (V, 3) or (V, 4) colors of vertices, 0 to 1; an empty array if there are none."""
+    visual: Any = getattr(mesh, "visual", None)
+    if getattr(visual, "kind", None) == "vertex":
+        return np.asarray(visual.vertex_colors) / 255.0
+    return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)
+
+
+def _from_meshio(mesh: Any, name: str) -> MeshArrays:
+    """Return the surface cells of a mesh of meshio."""
+    corners, sizes, kept = [], [], []
+    for index, block in enumerate(mesh.cells):
+        count = MESHIO_CORNERS.get(block.type)
+        if block.type == "polygon":
+            count = np.shape(block.data)[1]
+        if count is None or not len(block.data):
+            continue
+        kept.append(index)
+        corners.append(np.asarray(block.data)[:, :count].ravel())
+        sizes.append(np.full(len(block.data), count))
+    if not kept:
+        found = ", ".join(sorted({block.type for block in mesh.cells})) or "none"
+        raise RosyError(f"{name}: has no triangles, quads or polygons, only these cells: {found}")
+    face_data = {
+        key: np.concatenate([np.asarray(blocks[index]) for index in kept])
+        for key, blocks in mesh.cell_data.items()
+    }
+    return MeshArrays(
+        mesh.points,
+        np.concatenate(corners),
+        offsets_from_sizes(np.concatenate(sizes)),
+        None,
+        {key: np.asarray(values) for key, values in mesh.point_data.items()},
+        face_data,
+    )
+
+
+def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
+    """Return the surface of a data set of PyVista: of a volume, its boundary."""
+    surface = mesh if hasattr(mesh, "faces") else _extracted_surface(mesh)
+    if surface.n_strips:
+        surface = surface.triangulate()
+    # The unstructured grid has the offsets of faces of different sizes, and says which cells are lines.
+    cells = surface.cast_to_unstructured_grid()
+    is_face = np.isin(cells.celltypes, VTK_FACES)
+    if not is_face.any():
+        raise RosyError(f"{name}: has no faces")
+    sizes = np.diff(cells.cell_offsets if hasattr(cells, "cell_offsets") else cells.offset)
+    uv = getattr(surface, "active_texture_coordinates", None)
+    return MeshArrays(
+        np.asarray(surface.points),
+        np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)],
+        offsets_from_sizes(sizes[is_face]),
+        None if uv is None or uv.shape[1] != 2 else np.asarray(uv),
+        {key: np.asarray(values) for key, values in surface.point_data.items()},
+        {key: np.asarray(values)[is_face] for key, values in surface.cell_data.items()},
+    )
+
+
+def _extracted_surface(mesh: Any) -> Any:
+    """Return the faces of a grid, and the boundary of its volumes."""
+    try:
+        return mesh.extract_surface(algorithm="dataset_surface")
+    except TypeError:  # before PyVista 0.47, there was no other algorithm
+        return mesh.extract_surface()

@@ -88,17 +88,13 @@ class Texture:
             If the name does not end in ``.png``, it has no place for the number of one of several
             tiles, or a file cannot be written.
         """
-        if len(self.tiles) > 1 and UDIM_TOKEN not in Path(path).name:
+        path = Path(path)
+        if len(self.tiles) > 1 and UDIM_TOKEN not in path.name:
             raise RosyError(
                 f"{path}: the name of the file has no {UDIM_TOKEN} for the number of the tile"
             )
         for number, picture in self.tiles.items():
-            picture.save(tile_path(path, number))
-
-
-def tile_path(path: str | os.PathLike[str], number: int) -> Path:
-    """Return the file of a tile."""
-    return Path(path).with_name(Path(path).name.replace(UDIM_TOKEN, str(number)))
+            picture.save(path.with_name(path.name.replace(UDIM_TOKEN, str(number))))
 
 
 def texture(

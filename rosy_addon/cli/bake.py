@@ -1,28 +1,26 @@
-"""The command `bake`: pictures of a Blender file, from its cameras."""
+"""The command `bake`: pictures of a Blender file, from its cameras, and processes that draw its frames."""
 
 from __future__ import annotations
 
-import argparse
 import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError, counted
-from ..file_io import check_folder
-from ..frame_workers import parse_frames
+from ..file_io import check_folder, check_readable
+from ..frame_workers import parse_frames, run_local
 from ..gpu.select import RENDER_DEVICES
+from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
 from ..progress import listening
-from .bake_workers import run_workers, uses_workers
-from .extras import Extras
-from .look import add_flow_option, add_look_options, requested_look
-from .options import add_object_option, add_subcommand, add_workers_option, parse_size
+from .options import Options, add_subcommand, parse_size, user_presets_folder
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
 
 
-def add_bake_command(subparsers: Any, extras: Extras) -> None:
-    """Add the command `bake`, with --scheduler if there is a cluster to run it on."""
+def add_bake_command(subparsers: Any, has_cluster: bool) -> None:
+    """Add the command `bake`, with --scheduler if it can run on a cluster."""
     parser = add_subcommand(subparsers, "bake", run_bake)
     parser.add_argument(
         "scene",
@@ -31,14 +29,14 @@ def add_bake_command(subparsers: Any, extras: Extras) -> None:
         metavar="SCENE.blend",
         help="Blender file; by default the open one",
     )
-    add_object_option(parser, "objects to draw; by default all with a field")
+    parser.add_object_option("objects to draw; by default all with a field")
     cameras = parser.add_mutually_exclusive_group()
     cameras.add_argument(
         "--camera", metavar="NAME", help="camera to draw from; by default the scene's active one"
     )
     cameras.add_argument("--all-cameras", action="store_true", help="draw from all cameras")
-    add_look_options(parser)
-    add_flow_option(parser)
+    parser.add_look_options()
+    parser.add_flow_option()
     parser.add_argument(
         "--size", type=parse_size, metavar="WxH", help="size in pixels; by default the scene's"
     )
@@ -51,7 +49,7 @@ def add_bake_command(subparsers: Any, extras: Extras) -> None:
         help="draw with the processor (cpu), the graphics card (gpu), or the graphics card if there is "
         "one (auto); by default as set in the scene",
     )
-    add_workers_option(parser)
+    parser.add_workers_option()
     parser.add_argument("--save", action="store_true", help="save the Blender file")
     parser.add_argument(
         "--frames",
@@ -64,7 +62,7 @@ def add_bake_command(subparsers: Any, extras: Extras) -> None:
         "--jobs", type=int, default=1, metavar="J", help="number of processes for the frames"
     )
     parser.set_defaults(scheduler=None)
-    if extras.run_on_cluster is not None:
+    if has_cluster:
         workers.add_argument(
             "--scheduler",
             metavar="ADDRESS",
@@ -72,21 +70,19 @@ def add_bake_command(subparsers: Any, extras: Extras) -> None:
         )
 
 
-def run_bake(options: argparse.Namespace) -> None:
+def run_bake(options: Options) -> None:
     """Draw the fields of a Blender file from its cameras, at one frame or several."""
     _check_bake_options(options)
     if options.out is None and not options.save:
         raise RosyError("the pictures would not be saved: give --out DIR, --save, or both")
-    if uses_workers(options) and not options.extras.frames_are_drawn:
+    if uses_workers(options) and not options.extras.is_in_blender:
         run_workers(options)
         if not options.save:
             return
     scene = open_scene(options, "bake", options.scene)
     import bpy
 
-    from ..bake import bake as bake_scene
     from ..scene.blend_files import save_blend
-    from ..scene.look_properties import read_look
     from ..scene.pictures import is_beside_blend, read_output_settings
 
     out = None if options.out is None else Path(os.path.realpath(options.out))
@@ -98,27 +94,21 @@ def run_bake(options: argparse.Namespace) -> None:
         )
     if options.device is not None:
         settings = replace(settings, device=options.device)
-    if options.frames is not None:
-        _bake_animation(options, scene, settings)
-        return
-    results = bake_scene(
-        scene,
-        objects=requested_objects(options),
-        cameras=requested_cameras(scene, options),
-        look=requested_look(options, read_look(scene.rosy)),
-        size=options.size,
-        settings=settings,
-        workers=options.workers,
-    )
+    results = _bake(options, scene, settings)
     print_warnings(warning for result in results for warning in result.warnings)
     for result in results:
-        location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
+        if options.frames is None:
+            location = bpy.path.abspath(result.image.filepath) if options.out else result.image.name
+        else:
+            location = result.sequence.path
+            if result.skipped:
+                print_line(f"{counted(len(result.skipped), 'frame')} of {result.camera} up to date")
         print_line(f"{result.camera}: {location}")
     if options.save:
         print_line(save_blend())
 
 
-def _check_bake_options(options: argparse.Namespace) -> None:
+def _check_bake_options(options: Options) -> None:
     """Raise an error if options contradict each other, or --out cannot be written."""
     if options.frames is None and uses_workers(options):
         raise RosyError("--jobs and --scheduler distribute frames: give --frames A-B")
@@ -130,37 +120,29 @@ def _check_bake_options(options: argparse.Namespace) -> None:
         check_folder(options.out)
 
 
-def _bake_animation(options: argparse.Namespace, scene: Any, settings: Any) -> None:
-    """Draw the frames in this process, and print what was written."""
-
+def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
+    """Draw the current frame or several in this process, and return what was made for each camera."""
     from ..animation import bake_animation
-    from ..scene.blend_files import save_blend
+    from ..bake import bake
     from ..scene.look_properties import read_look
 
+    has_look_options = bool(options.preset or options.set)
+    arguments = {
+        "objects": requested_objects(options),
+        "cameras": requested_cameras(scene, options),
+        "look": options.requested_look(read_look(scene.rosy)) if has_look_options else None,
+        "size": options.size,
+        "settings": settings,
+        "workers": options.workers,
+    }
+    if options.frames is None:
+        return bake(scene, **arguments)
     frames = parse_frames(options.frames)
     if uses_workers(options):
         # The workers have drawn all frames. The first and the last set the range of the materials.
         frames = sorted({frames[0], frames[-1]})
-    has_look_options = bool(options.preset or options.set)
     with listening(_FrameLog()):
-        results = bake_animation(
-            scene,
-            frames,
-            objects=requested_objects(options),
-            cameras=requested_cameras(scene, options),
-            look=requested_look(options, read_look(scene.rosy)) if has_look_options else None,
-            size=options.size,
-            settings=settings,
-            workers=options.workers,
-            show=options.save,
-        )
-    print_warnings(warning for result in results for warning in result.warnings)
-    for result in results:
-        if result.skipped:
-            print_line(f"{counted(len(result.skipped), 'frame')} of {result.camera} up to date")
-        print_line(f"{result.camera}: {result.sequence.path}")
-    if options.save:
-        print_line(save_blend())
+        return bake_animation(scene, frames, show=options.save, **arguments)
 
 
 class _FrameLog:
@@ -173,3 +155,78 @@ class _FrameLog:
         if label != self._last_label and label.startswith("frame "):
             self._last_label = label
             print_line(f"{label} ({100 * fraction:.0f} %)")
+
+
+def uses_workers(options: Options) -> bool:
+    """Return whether other processes draw the frames."""
+    return options.jobs > 1 or options.scheduler is not None
+
+
+def run_workers(options: Options) -> None:
+    """Draw the frames in other processes, on this machine or on a cluster."""
+    bpy, scene = sys.modules.get("bpy"), options.scene
+    if scene is None:
+        if bpy is None or not bpy.data.filepath or bpy.data.is_dirty:
+            raise RosyError(
+                "--jobs and --scheduler need a saved file: save it, or give SCENE.blend"
+            )
+        scene = Path(bpy.data.filepath)
+    check_readable(scene)
+    real_path, arguments = os.path.realpath(scene), _forwarded_args(options)
+    frames = parse_frames(options.frames)
+    if options.scheduler is not None:
+        arguments = ["bake", real_path, *arguments]
+        output_lines = options.extras.run_on_cluster(arguments, frames, options.scheduler)
+    else:
+        if bpy is not None and bpy.app.binary_path:
+            command = [bpy.app.binary_path, "-b", real_path, "--command", "rosy", "bake"]
+        elif options.extras.program:
+            command = [*options.extras.program, "bake", real_path]
+        else:
+            raise RosyError("--jobs needs Blender, or the command line of the Python package")
+        output_lines = run_local([*command, *arguments], frames, options.jobs)
+    for line in output_lines:
+        if line.startswith("frame "):
+            print_line(line)
+
+
+def _forwarded_args(options: Options) -> list[str]:
+    """Return the options that are passed on to the other processes.
+
+    Each is one word, because names may begin with a dash.
+    """
+    size, preset = options.size, options.preset
+    blender = getattr(options, "blender", None)
+    values = {
+        "out": [os.path.realpath(options.out)],
+        "object": options.object or [],
+        "camera": [options.camera],
+        "size": [size and "{}x{}".format(*size)],
+        "preset": [preset and _forwarded_preset(preset)],
+        "device": [options.device],
+        "set": options.set,
+        "blender": [blender and _forwarded_program(blender)],
+        # The processes for frames use all cores already.
+        "workers": [options.workers or 1],
+    }
+    arguments = [
+        f"--{name}={value}"
+        for name, given in values.items()
+        for value in given
+        if value is not None
+    ]
+    return [*arguments, "--all-cameras"] if options.all_cameras else arguments
+
+
+def _forwarded_preset(preset: str) -> str:
+    """Return the name of a preset of RoSy, or the path of another one.
+
+    RoSy may be installed in another folder where the worker runs.
+    """
+    path = find_preset_file(preset, user_presets_folder())
+    return path.stem if path.parent == SHIPPED_FOLDER else os.path.realpath(path)
+
+
+def _forwarded_program(program: str) -> str:
+    """Return the path of a program, which may be a link, or a name that is looked up on the PATH."""
+    return os.path.abspath(program) if os.path.exists(program) else program

@@ -1,8 +1,7 @@
-"""The commands `field` and `info`: write, convert and describe field files."""
+"""The commands `field`, `info` and `compare`: write, convert, describe and compare fields."""
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
@@ -10,20 +9,34 @@ from typing import Any
 import numpy as np
 
 from .. import api
+from ..api.figures import LINES, check_figure_path, load_drawing
+from ..api.pictures import picture_look
+from ..api.surface import simulation_suffixes
 from ..errors import RosyError, counted
+from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
-from ..field.field_io import WRITE_SUFFIXES
+from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
-from .extras import Extras
-from .mesh_field import add_mesh_options, load_mesh_and_field, printed_warnings, read_field
-from .options import add_subcommand, check_output, float_between
+from ..field.mesh_io import READERS
+from ..field.rosy_field import check_degree
+from .mesh_field import add_mesh_options, load_mesh_and_field, read_field
+from .options import Options, add_subcommand, float_between, int_between
 from .streams import print_line
 
+#: Generators that need nothing but the mesh and a degree.
+GENERATORS = {
+    "form": api.form,
+    "smoothest": api.smoothest,
+    "curvature": api.curvature,
+    "features": api.features,
+    "uv": api.along_uv,
+}
 
-def add_field_command(subparsers: Any, extras: Extras) -> None:
+
+def add_field_command(subparsers: Any) -> None:
     """Add the command `field`."""
     parser = add_subcommand(subparsers, "field", run_field)
-    add_mesh_options(parser, extras)
+    add_mesh_options(parser)
     parser.add_argument(
         "-o", "--output", required=True, type=Path, metavar="OUT", help=", ".join(WRITE_SUFFIXES)
     )
@@ -60,27 +73,24 @@ def add_field_command(subparsers: Any, extras: Extras) -> None:
     )
 
 
-def run_field(options: argparse.Namespace) -> None:
+def run_field(options: Options) -> None:
     """Write a field file: generate a field, or convert the format, degree or vectors of one."""
-    check_output(options)
-    _, field = load_mesh_and_field(options)
-    if options.to_degree is not None:
-        field = field.to_degree(options.to_degree)
-    if options.turn:
-        field = field.rotated(np.radians(options.turn))
-    if options.smooth:
-        field = field.smoothed(options.smooth)
-    if options.cancel_pairs:
-        field = field.without_pairs(options.cancel_pairs)
-    if options.magnitude is not None:
-        field = field.with_magnitude(options.magnitude)
-    field.save(options.output)
+    options.check_output()
+    surface, field = load_mesh_and_field(options)
+    conversion = Conversion(
+        degree=options.to_degree,
+        rotation=np.radians(options.turn),
+        smoothing_length=options.smooth,
+        pair_distance=options.cancel_pairs,
+        magnitude=options.magnitude,
+    )
+    api.Field(surface, convert(surface.mesh, field.rosy, conversion)).save(options.output)
 
 
-def add_info_command(subparsers: Any, extras: Extras) -> None:
+def add_info_command(subparsers: Any) -> None:
     """Add the command `info`."""
     parser = add_subcommand(subparsers, "info", run_info)
-    add_mesh_options(parser, extras)
+    add_mesh_options(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(
         "--against",
@@ -90,7 +100,7 @@ def add_info_command(subparsers: Any, extras: Extras) -> None:
     )
 
 
-def run_info(options: argparse.Namespace) -> None:
+def run_info(options: Options) -> None:
     """Describe a mesh and its field, and compare the field with another one."""
     surface, field = load_mesh_and_field(options)
     magnitude = field.magnitude
@@ -110,18 +120,13 @@ def run_info(options: argparse.Namespace) -> None:
     print_line(json.dumps(facts) if options.json else _format_info(facts))
 
 
-def _compare(options: argparse.Namespace, field: api.Field) -> dict[str, Any]:
+def _compare(options: Options, field: api.Field) -> dict[str, Any]:
     """Return the angles to the field in a file, or the differences from a file of singularities."""
     if options.against.suffix.lower() not in SINGULARITY_SUFFIXES:
-        with printed_warnings():
-            other = read_field(options, options.against, field.surface, field.degree)
+        other = read_field(options, options.against, field.surface, field.degree)
         difference = field.difference(other)
-        return {
-            "mean": np.degrees(difference.mean),
-            "rms": np.degrees(difference.rms),
-            "max": np.degrees(difference.max),
-            "compared": difference.compared,
-        }
+        angles = {name: np.degrees(getattr(difference, name)) for name in ("mean", "rms", "max")}
+        return {**angles, "compared": difference.compared}
     degree, other_element, other_index = read_sings(options.against)
     if degree != field.degree:
         raise RosyError(
@@ -173,3 +178,151 @@ def _format_comparison(against: dict[str, Any] | None) -> list[str]:
         f"off by {against['mean']:.4g} degrees on average, rms {against['rms']:.4g}, at most "
         f"{against['max']:.4g}, on {100 * against['compared']:.4g} % of the faces"
     ]
+
+
+def add_compare_command(subparsers: Any) -> None:
+    """Add the command `compare`."""
+    parser = add_subcommand(subparsers, "compare", run_compare, api.figure)
+    suffixes = [*READERS, *simulation_suffixes()]
+    parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
+    parser.add_argument(
+        "fields",
+        nargs="+",
+        metavar="[TITLE=]FIELD",
+        help=f"a field file ({', '.join(READ_SUFFIXES)}), or what to generate: "
+        f"{', '.join(GENERATORS)}. The first one is what the others are compared with",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="OUT.pdf|OUT.svg|OUT.png",
+        help="draw the fields, their differences and the table; a .pdf has two pages",
+    )
+    parser.add_argument(
+        "--format",
+        choices=("text", "json", "latex"),
+        default="text",
+        help="of the table that is printed (%(default)s)",
+    )
+    parser.add_argument(
+        "--degree",
+        type=int,
+        metavar="N",
+        help="degree of generated fields, 1 to 12; by default that of the first field file, or 4",
+    )
+    parser.add_argument(
+        "--field-mesh",
+        type=Path,
+        metavar="MESH",
+        help="mesh file that the field files belong to, if it is not MESH; the fields are transferred by "
+        "position",
+    )
+    parser.add_argument(
+        "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
+    )
+    parser.add_argument(
+        "--match-reach",
+        dest="reach",
+        type=float_between(0.0, 10.0),
+        metavar="SHARE",
+        help="largest distance of singularities that match, as a fraction of the size of the mesh "
+        "(%(default)g)",
+    )
+    parser.add_argument(
+        "--lines",
+        choices=LINES,
+        help="lines that are drawn over differences (%(default)s)",
+    )
+    parser.add_argument(
+        "--columns",
+        type=int_between(1, 100),
+        metavar="N",
+        help="panels side by side; by default at most 3",
+    )
+    parser.add_argument(
+        "--width",
+        type=float_between(0.5, 100.0),
+        metavar="INCHES",
+        help="width of the figure (%(default)g)",
+    )
+    parser.add_argument(
+        "--dpi",
+        type=int_between(10, 2400),
+        metavar="N",
+        help="resolution of the pictures (%(default)d)",
+    )
+    parser.add_argument("--caption", metavar="TEXT", help="text below the fields")
+    parser.add_argument(
+        "--scale-bar", metavar="UNIT", help="draw a scale bar, in this unit of the coordinates"
+    )
+    parser.add_argument(
+        "--color-label",
+        metavar="TEXT",
+        help="title of the color bar; by default the name of what is shown",
+    )
+    parser.add_direction_options()
+    parser.add_argument(
+        "--perspective",
+        dest="orthographic",
+        action="store_false",
+        help="perspective projection instead of orthographic",
+    )
+    parser.add_workers_option()
+    parser.add_look_options()
+
+
+def run_compare(options: Options) -> None:
+    """Compare fields on a mesh: angles, energies and singularities."""
+    preset, settings = options.requested_preset(), options.requested_settings()
+    if options.output is not None:
+        check_figure_path(options.output)
+        options.check_output()
+        picture_look(str(options.mesh), preset, settings, {})
+        load_drawing()
+    comparison = api.compare(_load_fields(options), reach=options.reach)
+    if options.output is not None:
+        _draw(options, comparison)
+    write = {"text": comparison.to_text, "json": comparison.to_json, "latex": comparison.to_latex}
+    print_line(write[options.format]())
+
+
+def _draw(options: Options, comparison: api.Comparison) -> None:
+    """Write the figures."""
+    rest = ("differences", "table") if comparison.differences else ("table",)
+    if options.output.suffix.lower() == ".pdf":
+        pages: list[dict[str, Any]] = [{}, {"parts": rest, "caption": ""}]
+    else:
+        pages = [{"parts": ("fields", *rest)}]
+    figures = [
+        api.figure(comparison, **options.api_arguments(api.figure, **page)) for page in pages
+    ]
+    api.save_figures(options.output, figures)
+
+
+def _load_fields(options: Options) -> dict[str, api.Field]:
+    """Read or generate the fields, by their titles."""
+    if options.degree is not None:
+        check_degree(options.degree)
+    sources = dict(_titled_source(text) for text in options.fields)
+    if len(sources) < len(options.fields):
+        raise RosyError(f"{options.mesh}: two fields have the same title: give TITLE=FIELD")
+    fields: dict[str, api.Field | None] = dict.fromkeys(sources)
+    surface = api.Surface(options.mesh, up=options.up)
+    degree = options.degree
+    # Files come first, because the first of them sets the degree of the generated fields.
+    for title, source in sorted(sources.items(), key=lambda item: item[1] in GENERATORS):
+        if source in GENERATORS:
+            fields[title] = GENERATORS[source](surface, degree or DEFAULT_DEGREE)
+        else:
+            field = fields[title] = read_field(options, Path(source), surface, None)
+            degree = degree or field.degree
+    return fields
+
+
+def _titled_source(text: str) -> tuple[str, str]:
+    """Return the title and the source of [TITLE=]FIELD."""
+    title, separator, source = text.partition("=")
+    if separator and source and not Path(text).exists():
+        return title, source
+    return (text.capitalize() if text in GENERATORS else Path(text).stem), text

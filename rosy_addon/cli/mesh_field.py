@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import argparse
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from .. import api
-from ..errors import RosyError, RosyWarning
+from ..api.generators import generated, uv_map
+from ..api.surface import simulation_suffixes
+from ..errors import RosyError
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.guide_strokes import read_guide_strokes
-from ..field.generate import GENERATORS
+from ..field.generate import GENERATORS, GeneratorSettings
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .extras import Extras
-from .options import float_between, float_tuple, int_between, print_note
+from .options import CommandParser, Options, float_between, float_tuple, int_between
 
 
-def add_mesh_options(
-    parser: argparse.ArgumentParser, extras: Extras, *, allow_scene: bool = False
-) -> None:
+def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> None:
     """Add MESH, FIELD and the options that generate a field.
 
     Parameters
     ----------
-    parser : argparse.ArgumentParser
-    extras : Extras
-        MESH may also be the file of a simulation, if they can read it.
+    parser : CommandParser
     allow_scene : bool
         Whether MESH may be a .blend file, or absent.
     """
@@ -46,7 +40,7 @@ def add_mesh_options(
     parser.add_argument(
         "field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ_SUFFIXES)
     )
-    of_array = ", 1 for an array of vectors" if extras.simulation_suffixes else ""
+    of_array = ", 1 for an array of vectors" if simulation_suffixes() else ""
     parser.add_argument(
         "--degree",
         type=int,
@@ -126,15 +120,15 @@ def add_mesh_options(
     parser.add_argument(
         "--undefined", action="store_true", help="treat NaN and infinite vectors as undefined"
     )
-    _add_simulation_options(parser, extras)
+    _add_simulation_options(parser)
 
 
-def _add_simulation_options(parser: argparse.ArgumentParser, extras: Extras) -> None:
+def _add_simulation_options(parser: CommandParser) -> None:
     """Add the options for files of simulations, if these can be read."""
     parser.set_defaults(array=None, step=None)
-    if not extras.simulation_suffixes:
+    if not simulation_suffixes():
         return
-    suffixes = ", ".join(extras.simulation_suffixes)
+    suffixes = ", ".join(simulation_suffixes())
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
     parser.add_argument(
         "--array",
@@ -150,7 +144,7 @@ def _add_simulation_options(parser: argparse.ArgumentParser, extras: Extras) -> 
     )
 
 
-def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.Field]:
+def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
     """Read the mesh; read the field, or generate one.
 
     In the file of a simulation, the field is one of its arrays, unless the options name another.
@@ -159,7 +153,7 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
         check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    is_simulation = options.mesh.suffix.lower() in options.extras.simulation_suffixes
+    is_simulation = options.mesh.suffix.lower() in simulation_suffixes()
     names = ("field", "generate", "strokes", "guides", "singularities")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
     for name in ("array", "step"):
@@ -169,90 +163,58 @@ def load_mesh_and_field(options: argparse.Namespace) -> tuple[api.Surface, api.F
             )
     if options.array is not None and has_source:
         raise RosyError(f"{options.mesh}: give either --array, or a field file or --generate")
-    with printed_warnings():
-        surface = api.Surface(options.mesh, up=getattr(options, "up", None), step=options.step)
-        if options.field is not None:
-            field = read_field(options, options.field, surface, options.degree)
-        elif is_simulation and not has_source:
-            nonfinite = "zero" if options.undefined else "error"
-            field = api.from_array(surface, options.array, options.degree, nonfinite=nonfinite)
-        else:
-            field = _generate_field(options, surface)
-        return surface, field
+    surface = api.Surface(options.mesh, up=getattr(options, "up", None), step=options.step)
+    if options.field is not None:
+        field = read_field(options, options.field, surface, options.degree)
+    elif is_simulation and not has_source:
+        nonfinite = "zero" if options.undefined else "error"
+        field = api.from_array(surface, options.array, options.degree, nonfinite=nonfinite)
+    else:
+        field = _generate_field(options, surface)
+    return surface, field
 
 
-def read_field(
-    options: argparse.Namespace, path: Path, surface: api.Surface, degree: int | None
-) -> api.Field:
+def read_field(options: Options, path: Path, surface: api.Surface, degree: int | None) -> api.Field:
     """Read a field file, with the options for field files."""
     nonfinite = "zero" if options.undefined else "error"
     return api.read_field(path, surface, degree, nonfinite=nonfinite, mesh=options.field_mesh)
 
 
-@contextmanager
-def printed_warnings() -> Iterator[None]:
-    """Print the warnings that are issued in a ``with`` block as notes."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RosyWarning)
-        try:
-            yield
-        finally:
-            for warning in caught:
-                if issubclass(warning.category, RosyWarning):
-                    print_note(str(warning.message))
-
-
-def _generate_field(options: argparse.Namespace, surface: api.Surface) -> api.Field:
+def _generate_field(options: Options, surface: api.Surface) -> api.Field:
     """Generate a field of the kind that the options name."""
     degree = DEFAULT_DEGREE if options.degree is None else options.degree
     has_guides = options.strokes is not None or options.guides is not None
     kind = options.generate or ("guided" if has_guides else "form")
     if options.singularities is not None and options.generate is None:
         kind = "prescribed"
-    match kind:
-        case "form":
-            return api.form(surface, degree)
-        case "smoothest":
-            return api.smoothest(surface, degree)
-        case "curvature":
-            return api.curvature(surface, degree, reach=options.reach)
-        case "features":
-            return api.features(surface, degree, sharp_angle=np.radians(options.sharp_angle))
-        case "prescribed":
-            if options.singularities is None:
-                raise RosyError(
-                    f"{options.mesh}: give the singularities: --singularities FILE.sings"
-                )
-            return api.prescribed(
-                surface,
-                options.singularities,
-                options.degree,
-                vectors=_guides(options, surface, options.degree),
-                reach=options.reach,
-                add_missing=options.add_missing,
-            )
-        case "axis":
-            return api.along_axis(surface, options.axis, degree)
-        case "uv":
-            return api.along_uv(surface, degree)
-        case "guided":
-            strokes = [] if options.strokes is None else read_guide_strokes(options.strokes)
-            return api.guided(
-                surface,
-                degree,
-                strokes=strokes,
-                vectors=_guides(options, surface, degree),
-                uv=options.uv,
-                reach=options.reach,
-                vectors_have_firmness=options.firmness,
-            )
-        case kind:
-            raise RosyError(f"unknown generator '{kind}': choose {', '.join(GENERATORS)}")
+    if kind == "prescribed":
+        if options.singularities is None:
+            raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
+        return api.prescribed(
+            surface,
+            options.singularities,
+            options.degree,
+            vectors=_guides(options, surface, options.degree),
+            reach=options.reach,
+            add_missing=options.add_missing,
+        )
+    if kind == "guided":
+        return api.guided(
+            surface,
+            degree,
+            strokes=[] if options.strokes is None else read_guide_strokes(options.strokes),
+            vectors=_guides(options, surface, degree),
+            uv=options.uv,
+            reach=options.reach,
+            vectors_have_firmness=options.firmness,
+        )
+    settings = GeneratorSettings(kind, options.axis, options.reach, np.radians(options.sharp_angle))
+    if kind == "uv":
+        settings = replace(settings, uv=uv_map(surface))
+    return generated(surface, settings, degree)
 
 
-def _guides(
-    options: argparse.Namespace, surface: api.Surface, degree: int | None
-) -> api.Field | None:
+def _guides(options: Options, surface: api.Surface, degree: int | None) -> api.Field | None:
     """Read the field of the option --guides, if it is given."""
     if options.guides is None:
         return None

@@ -1,45 +1,234 @@
-"""Helpers shared by the commands: value types for argparse, and notes to the user."""
+"""The parser of a command, its options, and those that several commands share."""
 
 from __future__ import annotations
 
 import argparse
+import inspect
 import os
 import re
+import sys
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 
+from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
+from ..compositor.look import Look
 from ..errors import RosyError
 from ..file_io import check_writable
-from .streams import print_error
+from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
+from ..projection.camera import check_size
+from ..projection.up_axis import UP_AXIS_MATRIX
+from ..settings import settings_of, stored_key
+from .streams import print_line
 
 
-def check_output(options: argparse.Namespace, suffix: str = "") -> None:
-    """Check the option -o, before long work computes its contents.
+class CommandParser(argparse.ArgumentParser):
+    """The parser of a command, which can add the options that several commands share.
+
+    Its messages are safe on any terminal.
+    """
+
+    def _print_message(self, message: str, file: TextIO | None = None) -> None:
+        print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
+
+    def add_object_option(self, help_text: str) -> None:
+        """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
+        self.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
+
+    def add_workers_option(self) -> None:
+        """Add --workers."""
+        self.add_argument(
+            "--workers",
+            type=int_between(0, 256),
+            default=0,
+            metavar="N",
+            help="number of processes that draw a large picture together; 0 is one for each core "
+            "(%(default)d). The picture is the same for any number",
+        )
+
+    def add_view_options(self) -> None:
+        """Add the options of the view."""
+        self.add_direction_options()
+        self.add_argument("--size", type=parse_size, metavar="WxH", help="size in pixels")
+        self.add_argument(
+            "--ortho",
+            dest="orthographic",
+            action="store_true",
+            help="orthographic projection instead of perspective",
+        )
+
+    def add_direction_options(self) -> None:
+        """Add --view and --up."""
+        self.add_argument(
+            "--view",
+            type=float_tuple(2, "AZ,EL"),
+            default=DEFAULT_VIEW,
+            metavar="AZ,EL",
+            help="azimuth and elevation in degrees: 0,0 is from the front, 90,0 from the right, 0,90 from "
+            "above",
+        )
+        self.add_argument(
+            "--up",
+            choices=list(UP_AXIS_MATRIX),
+            help="upward axis of the file; by default y for .obj and .off, otherwise z",
+        )
+
+    def add_look_options(self) -> None:
+        """Add --preset and --set."""
+        self.add_argument(
+            "--preset",
+            metavar="NAME",
+            help=f"preset of the look: {', '.join(preset_keys())}, one of your own, or a .json file; "
+            "`presets` lists them",
+        )
+        self.add_argument(
+            "--set",
+            action="append",
+            default=[],
+            metavar="NAME=VALUE",
+            help=f"one setting of the look, after the preset: {', '.join(settings_of(Look))}",
+        )
+
+    def add_flow_option(self) -> None:
+        """Add --flow, which is short for a setting of the look."""
+        self.add_argument(
+            "--flow",
+            dest="set",
+            action="append",
+            default=[],
+            type="flow={}".format,
+            metavar="PIXELS",
+            help="let streaks drift along the field by this many pixels per picture, as --set flow=PIXELS does",
+        )
+
+    def add_picture_options(self) -> None:
+        """Add the options of a picture of a mesh: view, look, and sources of its colors and its tone."""
+        self.add_view_options()
+        self.add_workers_option()
+        self.add_look_options()
+        self.add_argument(
+            "--color-values",
+            metavar="NAME",
+            help="color the lines by the numbers of a property of the faces or vertices, such as a vertex "
+            "property of a .ply file",
+        )
+        self.add_argument(
+            "--tone-attribute",
+            dest="tone_values",
+            metavar="NAME",
+            help="take the tone from a vertex property of a .ply file, or from the vertex colors: "
+            f"'{VERTEX_COLOR}'",
+        )
+        self.add_argument(
+            "--tone-image",
+            type=Path,
+            metavar="IMAGE.png",
+            help="take the tone from an image on the UV map of an .obj file",
+        )
+
+
+class Options(argparse.Namespace):
+    """The options of a command."""
+
+    def check_output(self, suffix: str = "") -> None:
+        """Check the option -o, before long work computes its contents.
+
+        Parameters
+        ----------
+        suffix : str
+            The extension that the name of the file must have; by default any.
+
+        Raises
+        ------
+        RosyError
+            If the name has another extension, the file cannot be written, or another option names it as
+            an input.
+        """
+        check_writable(self.output)
+        if suffix and self.output.suffix.lower() != suffix:
+            raise RosyError(f"{self.output}: the name of the file must end in {suffix}")
+        if not os.path.exists(self.output):
+            return
+        for name, value in vars(self).items():
+            for path in value if isinstance(value, list) else [value]:
+                is_path = name != "output" and isinstance(path, (str, os.PathLike))
+                if is_path and os.path.exists(path) and os.path.samefile(path, self.output):
+                    raise RosyError(f"{self.output}: is also an input: choose another output file")
+
+    def requested_preset(self) -> Path | None:
+        """Return the file of --preset, or None."""
+        return find_preset_file(self.preset, user_presets_folder()) if self.preset else None
+
+    def requested_settings(self) -> dict[str, Any]:
+        """Return the settings of --set."""
+        return dict(_parse_setting(text) for text in self.set)
+
+    def requested_look(self, default: Look) -> Look:
+        """Return the look of --preset, by default `default`, with the settings of --set."""
+        preset = self.requested_preset()
+        look = default if preset is None else read_preset(preset).look
+        return look.with_settings(self.requested_settings())
+
+    def api_arguments(self, function: Callable[..., Any], **others: Any) -> dict[str, Any]:
+        """Return the keyword arguments of a function: the options with these names, and the settings of the look.
+
+        Parameters
+        ----------
+        function : function
+            Of `api`.
+        **others
+            Arguments that replace those of the options.
+        """
+        names = inspect.getfullargspec(function).kwonlyargs
+        arguments = {name: value for name, value in vars(self).items() if name in names}
+        return arguments | {"preset": self.requested_preset()} | others | self.requested_settings()
+
+    def picture_arguments(self, function: Callable[..., Any]) -> dict[str, Any]:
+        """Return what the options say about a picture of a mesh, as arguments of a function of `api`.
+
+        Raises
+        ------
+        RosyError
+            If they are not possible.
+        """
+        sources = {"attribute": self.tone_values, "image": self.tone_image}
+        sources["picture"] = getattr(self, "tone_picture", None)
+        given = [f"--tone-{option}" for option, value in sources.items() if value is not None]
+        if len(given) > 1:
+            raise RosyError(f"give either {given[0]} or {given[1]}, not both")
+        preset, settings = self.requested_preset(), self.requested_settings()
+        # Mistakes are reported before the mesh is read.
+        picture_look(str(self.mesh), preset, settings, sources, self.color_values is not None)
+        check_size(*self.size)
+        return self.api_arguments(function)
+
+
+def add_subcommand(
+    subparsers: Any,
+    name: str,
+    run: Callable[[Options], None],
+    function: Callable[..., Any] | None = None,
+) -> CommandParser:
+    """Add a command.
 
     Parameters
     ----------
-    options : argparse.Namespace
-    suffix : str
-        The extension that the name of the file must have; by default any.
-
-    Raises
-    ------
-    RosyError
-        If the name has another extension, the file cannot be written, or another option names it as
-        an input.
+    subparsers : argparse action
+    name : str
+    run : function
+        Runs it. The first line of its docstring becomes the help.
+    function : function, optional
+        A function of `api` with whose keyword parameters the options have names and defaults in common;
+        see `api_arguments`.
     """
-    check_writable(options.output)
-    if suffix and options.output.suffix.lower() != suffix:
-        raise RosyError(f"{options.output}: the name of the file must end in {suffix}")
-    if not os.path.exists(options.output):
-        return
-    for name, value in vars(options).items():
-        for path in value if isinstance(value, list) else [value]:
-            is_path = name != "output" and isinstance(path, (str, os.PathLike))
-            if is_path and os.path.exists(path) and os.path.samefile(path, options.output):
-                raise RosyError(f"{options.output}: is also an input: choose another output file")
+    text = run.__doc__.splitlines()[0]
+    parser = subparsers.add_parser(name, help=text, description=text)
+    if function is not None:
+        parser.set_defaults(**inspect.getfullargspec(function).kwonlydefaults)
+    parser.set_defaults(run=run)
+    return parser
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -91,34 +280,25 @@ def int_between(low: int, high: int) -> Callable[[str], int]:
     return parse
 
 
-def add_object_option(parser: argparse.ArgumentParser, help_text: str) -> None:
-    """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
-    parser.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
+def _parse_setting(text: str) -> tuple[str, Any]:
+    """Return the name and the value of NAME=VALUE, converted to the type of the setting."""
+    name, separator, value = text.partition("=")
+    name, settings = stored_key(name), settings_of(Look)
+    if not separator:
+        raise RosyError(f"--set {text}: expected NAME=VALUE")
+    if name not in settings:
+        raise RosyError(f"--set {text}: unknown setting '{name}': choose {', '.join(settings)}")
+    try:
+        return name, settings[name].parse(value)
+    except ValueError:
+        expected = "a whole number" if isinstance(settings[name].default, int) else "a number"
+        raise RosyError(f"--set {text}: expected {expected}") from None
 
 
-def add_workers_option(parser: argparse.ArgumentParser) -> None:
-    """Add --workers."""
-    parser.add_argument(
-        "--workers",
-        type=int_between(0, 256),
-        default=0,
-        metavar="N",
-        help="number of processes that draw a large picture together; 0 is one for each core "
-        "(%(default)d). The picture is the same for any number",
-    )
+def user_presets_folder() -> Path:
+    """Return the folder of the user's presets: in Blender, the one of the extension."""
+    if sys.modules.get("bpy") is None:
+        return default_user_folder()
+    from ..scene.paths import user_presets_folder
 
-
-def add_subcommand(
-    subparsers: Any, name: str, function: Callable[[argparse.Namespace], None]
-) -> argparse.ArgumentParser:
-    """Add a command. The first line of the function's docstring becomes its help."""
-    text = function.__doc__.splitlines()[0]
-    parser = subparsers.add_parser(name, help=text, description=text)
-    parser.set_defaults(run=function)
-    return parser
-
-
-def print_note(text: str) -> None:
-    """Print a note to the error stream, unless it is empty."""
-    if text:
-        print_error(text)
+    return user_presets_folder()

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
-from collections.abc import Sequence
-from typing import TextIO
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from ..errors import REPORTED_ERRORS, error_text
+from ..turntable_video import Encoder
 from .bake import add_bake_command
-from .compare import add_compare_command
-from .extras import NO_EXTRAS, Extras
-from .field import add_field_command, add_info_command
+from .field import add_compare_command, add_field_command, add_info_command
+from .options import CommandParser, Options
+from .pictures import add_render_command, add_texture_command, add_turntable_command
 from .presets import add_presets_command
-from .render import add_render_command, add_turntable_command
-from .streams import discard_output, output_stream, print_error, print_line
+from .streams import discard_output, output_stream, print_error, printed_warnings
 from .strokes import add_strokes_command
-from .texture import add_texture_command
 
 #: Options whose values may begin with a minus sign.
 NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--light-direction", "--frames")
@@ -28,6 +28,40 @@ BLENDER_VERBS = {"bake", "strokes", "turntable", "film"}
 #: Exit statuses: success, standard output failed, an error in the user's input, interrupted by
 #: Ctrl-C, and standard output was closed.
 EXIT_OK, EXIT_OUTPUT_ERROR, EXIT_USER_ERROR, EXIT_INTERRUPTED, EXIT_BROKEN_PIPE = 0, 1, 2, 130, 141
+
+
+@dataclass(frozen=True)
+class Extras:
+    """What the Python package adds to the commands. The extension for Blender has none of it.
+
+    Attributes
+    ----------
+    program : tuple of str
+        The program that runs the commands and its first arguments.
+    run_on_cluster : function, optional
+        Runs a command for frames on a cluster, given its arguments, the frames and the address of the
+        cluster, and yields the lines that it prints.
+    add_commands : tuple of function
+        Each adds a command to the subparsers.
+    find_blender_encoder : function, optional
+        Returns an encoder of videos by a Blender, or None, given the Blender that the user named, or
+        None.
+    run_in_blender : function, optional
+        Runs the command in a Blender and exits with its status, given the options, the verb and the
+        .blend file. Returns if the command can run in this process.
+    is_in_blender : bool
+        Whether this is the Blender that runs a command again. Other processes have drawn its frames already.
+    """
+
+    program: tuple[str, ...] = ()
+    run_on_cluster: Callable[[Sequence[str], Sequence[int], str], Iterator[str]] | None = None
+    add_commands: tuple[Callable[[Any], None], ...] = ()
+    find_blender_encoder: Callable[[str | None], Encoder | None] | None = None
+    run_in_blender: Callable[[Options, str, Path | None], None] | None = None
+    is_in_blender: bool = False
+
+
+NO_EXTRAS = Extras()
 
 
 def main(
@@ -53,8 +87,10 @@ def main(
     """
     arguments = sys.argv[1:] if argv is None else argv
     try:
-        options = _build_parser(prog, extras).parse_args(_join_negative_values(arguments))
-        options.run(options)
+        parser = _build_parser(prog, extras)
+        options = parser.parse_args(_join_negative_values(arguments), Options())
+        with printed_warnings():
+            options.run(options)
         output_stream().flush()
     except REPORTED_ERRORS as error:
         print_error(error_text(error))
@@ -75,20 +111,15 @@ def main(
     return EXIT_OK
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose messages are safe on any terminal."""
-
-    def _print_message(self, message: str, file: TextIO | None = None) -> None:
-        print_line(message.removesuffix("\n"), sys.stderr if file is None else file)
-
-
-def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentParser:
+def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> CommandParser:
     """Return the parser of all commands."""
-    parser = _Parser(prog=prog, description="Draw N-way rotational symmetry fields on meshes.")
+    parser = CommandParser(
+        prog=prog, description="Draw N-way rotational symmetry fields on meshes."
+    )
     parser.set_defaults(extras=extras)
     subparsers = parser.add_subparsers(metavar="VERB", required=True)
+    add_bake_command(subparsers, extras.run_on_cluster is not None)
     for add_command in (
-        add_bake_command,
         add_render_command,
         add_strokes_command,
         add_turntable_command,
@@ -96,9 +127,9 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> argparse.ArgumentPar
         add_field_command,
         add_info_command,
         add_compare_command,
+        *extras.add_commands,
+        add_presets_command,
     ):
-        add_command(subparsers, extras)
-    for add_command in (*extras.add_commands, add_presets_command):
         add_command(subparsers)
     if extras.run_in_blender is not None:
         for verb in BLENDER_VERBS & subparsers.choices.keys():

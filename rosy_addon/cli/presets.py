@@ -1,22 +1,18 @@
-"""The command `presets`, and the folder of the user's presets."""
+"""The command `presets`."""
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
-from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
 from ..preset_files.store import (
-    default_user_folder,
     merge_preset_files,
     read_preset,
     user_preset_files,
 )
-from .options import add_subcommand, print_note
-from .streams import print_line
+from .options import Options, add_subcommand, user_presets_folder
+from .streams import print_error, print_line
 
 
 def add_presets_command(subparsers: Any) -> None:
@@ -25,14 +21,14 @@ def add_presets_command(subparsers: Any) -> None:
     parser.add_argument("--json", action="store_true", help="print a JSON list of objects")
 
 
-def run_presets(options: argparse.Namespace) -> None:
+def run_presets(options: Options) -> None:
     """List the presets of RoSy and your own, with their descriptions."""
     folder, records = user_presets_folder(), []
     for key, path in merge_preset_files(user_preset_files(folder)).items():
         try:
             preset = read_preset(path)
         except RosyError as error:
-            print_note(str(error))
+            print_error(str(error))
             continue
         facts = {"preset": key, "name": preset.name, "description": preset.description}
         records.append(facts | {"own": path.parent == folder})
@@ -45,12 +41,3 @@ def run_presets(options: argparse.Namespace) -> None:
             f"{record['preset']:{width}}  {record['description']}{'  (own)' * record['own']}"
         )
     print_line(f"Your presets are in {folder}")
-
-
-def user_presets_folder() -> Path:
-    """Return the folder of the user's presets: in Blender, the one of the extension."""
-    if sys.modules.get("bpy") is None:
-        return default_user_folder()
-    from ..scene.paths import user_presets_folder
-
-    return user_presets_folder()

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from ..errors import RosyError
+from .options import Options
 from .streams import print_error
 
 
-def open_scene(options: argparse.Namespace, command: str, path: Path | None) -> Any:
+def open_scene(options: Options, command: str, path: Path | None) -> Any:
     """Open a Blender file, if one is given, and return the scene.
 
     The Python package may run the command in a Blender instead, and exit.
@@ -39,7 +39,7 @@ def open_scene(options: argparse.Namespace, command: str, path: Path | None) -> 
     return bpy.context.scene
 
 
-def requested_cameras(scene: Any, options: argparse.Namespace) -> list[Any] | None:
+def requested_cameras(scene: Any, options: Options) -> list[Any] | None:
     """Return the camera objects that the options name; None for the scene's active camera."""
     from ..scene.cameras import scene_cameras
 
@@ -48,7 +48,7 @@ def requested_cameras(scene: Any, options: argparse.Namespace) -> list[Any] | No
     return None if options.camera is None else [find_camera(scene, options.camera)]
 
 
-def requested_objects(options: argparse.Namespace) -> list[Any] | None:
+def requested_objects(options: Options) -> list[Any] | None:
     """Return the objects that the options name; None for all whose fields can be drawn."""
     import bpy
 

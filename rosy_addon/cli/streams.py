@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TextIO
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
 
-from ..errors import escape_unsafe
+from ..errors import RosyWarning, escape_unsafe
 
 #: Where commands print, if that is not `sys.stdout`.
 _own_output: TextIO | None = None
@@ -57,3 +60,18 @@ def discard_output() -> None:
     descriptor = os.open(os.devnull, os.O_WRONLY)
     os.dup2(descriptor, output_stream().fileno())
     os.close(descriptor)
+
+
+@contextmanager
+def printed_warnings() -> Iterator[None]:
+    """Print each `RosyWarning` of a ``with`` block to the error stream; other warnings are for programmers."""
+
+    def show(message: Warning | str, category: type[Warning], *_: Any) -> None:
+        if issubclass(category, RosyWarning):
+            print_error(str(message))
+
+    with warnings.catch_warnings():
+        # The same text from the same place is printed once.
+        warnings.simplefilter("default", RosyWarning)
+        warnings.showwarning = show
+        yield

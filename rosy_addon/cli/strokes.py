@@ -6,53 +6,51 @@ import argparse
 import os
 import re
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from .. import api
-from ..api.pictures import DEFAULT_VIEW
+from ..api.drawings import draw_strokes
+from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
 from ..errors import RosyError
 from ..frame_workers import parse_frames
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
+from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
-from .extras import Extras
+from ..settings import Choice, Number, Setting, Switch, settings_of
 from .mesh_field import add_mesh_options, load_mesh_and_field
-from .options import add_object_option, add_subcommand, check_output
+from .options import CommandParser, Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
 from .streams import print_line
-from .stroke_style import (
-    add_pen_options,
-    add_style_options,
-    pen_of,
-    stroke_style_of,
-    style_overrides,
-)
-from .view import add_view_options, requested_size
 
 #: Default values of the options that are only for mesh files, and only for .blend files.
 MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
     **dict.fromkeys(("array", "step", "singularities")),
-    **dict.fromkeys(("uv", "undefined", "ortho"), False),
+    **dict.fromkeys(("uv", "undefined", "orthographic"), False),
     "view": DEFAULT_VIEW,
 }
-#: The options that are only for pictures, with the names of their values.
-PAGE_OPTIONS = {
-    "--plotter": "plotter",
-    "--mm": "millimetres",
-    "--colors": "colours",
-    "--paper": "paper",
+#: The same of the options that are only for pictures.
+PAGE_ONLY_DEFAULTS = dict.fromkeys(("plotter", "millimetres", "colours", "paper"))
+#: What users give for a value, if it has another name.
+OPTION_NAMES = {
+    "field": "FIELD",
+    "orthographic": "--ortho",
+    "millimetres": "--mm",
+    "colours": "--colors",
 }
+
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
 
 
-def add_strokes_command(subparsers: Any, extras: Extras) -> None:
+def add_strokes_command(subparsers: Any) -> None:
     """Add the command `strokes`."""
     parser = add_subcommand(subparsers, "strokes", run_strokes)
     parser.description += " For a .blend file, the defaults are the settings of the scene."
-    add_mesh_options(parser, extras, allow_scene=True)
+    add_mesh_options(parser, allow_scene=True)
     parser.add_argument(
         "-o",
         "--output",
@@ -61,8 +59,8 @@ def add_strokes_command(subparsers: Any, extras: Extras) -> None:
         metavar="OUT",
         help="file of strokes: a picture as .svg, or polylines in space as .ply, .obj or .csv",
     )
-    add_view_options(parser, None)
-    add_object_option(parser, "objects of a .blend file; by default all with a field")
+    parser.add_view_options()
+    parser.add_object_option("objects of a .blend file; by default all with a field")
     parser.add_argument(
         "--camera", metavar="NAME", help="camera of a .blend file; by default the scene's"
     )
@@ -75,47 +73,29 @@ def add_strokes_command(subparsers: Any, extras: Extras) -> None:
     add_pen_options(parser)
 
 
-def run_strokes(options: argparse.Namespace) -> None:
+def run_strokes(options: Options) -> None:
     """Draw evenly spaced strokes along the fields of meshes, as an .svg file or as polylines."""
-    check_output(options)
+    options.check_output()
     if check_drawing_suffix(options.output) != ".svg":
-        _reject_page_options(options)
+        _reject_options(options, PAGE_ONLY_DEFAULTS, options.output, ".svg files")
     if options.mesh is None and "bpy" not in sys.modules:
         raise RosyError("no input: give a mesh file, or SCENE.blend")
     if options.mesh is None or options.mesh.suffix.lower() == ".blend":
-        _reject_options(options, MESH_ONLY_DEFAULTS, "mesh files")
+        name = options.mesh or "the open file"
+        _reject_options(options, MESH_ONLY_DEFAULTS, name, "mesh files")
         _draw_scene_strokes(options)
         return
-    _reject_options(options, SCENE_ONLY_DEFAULTS, ".blend files")
-    arguments = _drawing_arguments(options)
-    surface, field = load_mesh_and_field(options)
-    api.strokes(surface, field, **arguments).save(options.output)
-
-
-def _drawing_arguments(options: argparse.Namespace) -> dict[str, Any]:
-    """Return what the options say about a drawing, as arguments of `api.strokes`.
-
-    Raises
-    ------
-    RosyError
-        If they are not possible.
-    """
+    _reject_options(options, SCENE_ONLY_DEFAULTS, options.mesh, ".blend files")
     # Mistakes are reported before the mesh is read.
     style, pen = stroke_style_of(options, StrokeStyle()), pen_of(options, Pen())
     check_light(style.light, str(options.mesh))
-    return style_overrides(options) | {
-        "view": options.view,
-        "size": requested_size(options),
-        "orthographic": options.ortho,
-        "width": pen.width,
-        "colors": pen.colours,
-        "paper": pen.paper,
-        "millimeters": pen.millimetres,
-        "plotter": pen.plotter,
-    }
+    size = check_size(*(options.size or DEFAULT_SIZE))
+    surface, field = load_mesh_and_field(options)
+    drawing = draw_strokes(surface, field, style, pen, options.view, size, options.orthographic)
+    drawing.save(options.output)
 
 
-def _draw_scene_strokes(options: argparse.Namespace) -> None:
+def _draw_scene_strokes(options: Options) -> None:
     """Draw the strokes of a Blender file, at one frame or several.
 
     The settings of the scene apply unless an option overrides them.
@@ -142,7 +122,7 @@ def _path_of_frame(path: Path, frame: int) -> Path:
     return path.with_name(re.sub("#+", lambda row: f"{frame:0{len(row[0])}d}", path.name))
 
 
-def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> None:
+def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     """Draw the strokes of the current frame, as the operator does."""
     import bpy
 
@@ -170,27 +150,107 @@ def _draw_frame_strokes(options: argparse.Namespace, scene: Any, path: Path) -> 
     print_line(f"{result.camera}: {result.path}")
 
 
-def _reject_page_options(options: argparse.Namespace) -> None:
-    """Raise an error if an option is set that is for pictures."""
-    for option, name in PAGE_OPTIONS.items():
-        if name in options:
-            raise RosyError(f"{options.output}: {option} applies only to .svg files")
-
-
-def _reject_options(options: argparse.Namespace, defaults: dict[str, Any], file_kind: str) -> None:
+def _reject_options(
+    options: Options, defaults: dict[str, Any], file: Path | str, file_kind: str
+) -> None:
     """Raise an error if an option is set that is for another kind of file.
 
     Parameters
     ----------
-    options : argparse.Namespace
+    options : Options
     defaults : dict
         Default values of the options that are not allowed.
+    file : Path or str
+        The file that they do not apply to.
     file_kind : str
         The files that they are for.
     """
     for name, default in defaults.items():
-        if getattr(options, name) != default:
-            option = "FIELD" if name == "field" else "--" + name.replace("_", "-")
-            raise RosyError(
-                f"{options.mesh or 'the open file'}: {option} applies only to {file_kind}"
-            )
+        if getattr(options, name, default) != default:
+            option = OPTION_NAMES.get(name, "--" + name.replace("_", "-"))
+            raise RosyError(f"{file}: {option} applies only to {file_kind}")
+
+
+#: Placeholders of numbers in the help, by their units.
+METAVARS = {"pixels": "PX", "length": "UNITS", "spacings": "SPACINGS", "": "AMOUNT"}
+
+
+def add_style_options(parser: CommandParser) -> None:
+    """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
+
+    The unit follows from the option: `--spacing` is in pixels, `--distance` in units of the mesh.
+    """
+    for name, setting in settings_of(StrokeStyle).items():
+        if name != "unit":
+            _add_setting_option(parser, setting)
+
+
+def _add_setting_option(parser: CommandParser, setting: Setting) -> None:
+    """Add the option of a setting, with its range or choices, help text and default."""
+    option = f"--{setting.name.replace('_', '-')}"
+    add = partial(parser.add_argument, option, default=argparse.SUPPRESS)
+    text = setting.text[0].lower() + setting.text[1:]
+    match setting:
+        case Switch():
+            add(action=argparse.BooleanOptionalAction, help=text)
+        case Choice(options=options, default=default):
+            add(choices=tuple(options), help=f"{text} ({default})")
+        case Number(low=low, high=high, unit=unit, default=default):
+            help_text = f"{text} ({default:g})"
+            add(type=float_between(low, high), metavar=METAVARS[unit], help=help_text)
+        case _:
+            raise TypeError(f"setting '{setting.name}' has no option")
+
+
+def stroke_style_of(options: Options, base: StrokeStyle) -> StrokeStyle:
+    """Return the style with the fields that the options override."""
+    values = vars(options)
+    overrides = {name: values[name] for name in settings_of(StrokeStyle) if name in values}
+    if "spacing" in overrides or "distance" in overrides:
+        overrides["unit"] = "world" if "distance" in overrides else "pixels"
+    return replace(base, **overrides)
+
+
+def add_pen_options(parser: CommandParser) -> None:
+    """Add options for the fields of `Pen`. Those not given are not set."""
+    add = partial(parser.add_argument, default=argparse.SUPPRESS)
+    add(
+        "--width",
+        type=float_between(0.01, 1e3),
+        metavar="PX",
+        help=f"width of the strokes ({Pen.width:g})",
+    )
+    add(
+        "--plotter",
+        action=argparse.BooleanOptionalAction,
+        help="lines of constant width, without paper, in an order that keeps the pen travel short",
+    )
+    add(
+        "--mm",
+        dest="millimetres",
+        type=float_between(1.0, 1e5),
+        metavar="WIDTH",
+        help="width of the page in millimeters",
+    )
+    add(
+        "--colours",
+        "--colors",
+        metavar="C,C,...",
+        help="SVG colors of the layers (#000000)",
+    )
+    add("--paper", action=argparse.BooleanOptionalAction, help="white paper behind the strokes")
+
+
+def pen_of(options: Options, base: Pen) -> Pen:
+    """Return the pen with the fields that the options override."""
+    values = vars(options)
+    overrides = {
+        name: values[name] for name in ("width", "millimetres", "plotter") if name in values
+    }
+    if "colours" in values:
+        overrides |= {"colours": values["colours"].split(","), "outline": None}
+    if values.get("plotter"):
+        overrides["paper"] = None
+    elif "paper" in values:
+        overrides["paper"] = Pen.paper if values["paper"] else None
+    return replace(base, **overrides)

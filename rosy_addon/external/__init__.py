@@ -1,6 +1,6 @@
 """What needs other libraries or programs. It is in the Python package, not in the extension for Blender.
 
-Each module says so if something is missing::
+Each module says so if something is missing; for `matplotlib_figure`, which imports matplotlib, `api.figures` does::
 
     ffmpeg             ffmpeg: videos in .mp4 files
     matplotlib_figure  matplotlib: figures

@@ -1,4 +1,7 @@
-"""Figures of pictures with their keys, drawn by matplotlib as vectors and text."""
+"""Figures of pictures with their keys, drawn by matplotlib as vectors and text.
+
+`api.figures` imports this module when a figure is drawn, and says so if matplotlib is missing.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,19 @@ import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TYPE_CHECKING
+from functools import cached_property
 
+import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba_array
+from matplotlib.figure import Figure as Figure
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.textpath import text_to_path
 
 from ..annotation.index_labels import placed_labels
 from ..annotation.round_numbers import MINUS
@@ -23,10 +35,6 @@ from ..annotation.singularity_marks import (
 )
 from ..errors import RosyError
 from ..field.singularities import format_index
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Figure
 
 #: Sizes of text in points: titles, everything else.
 TITLE_SIZE, TEXT_SIZE = 8.0, 7.0
@@ -115,26 +123,10 @@ class Row:
     color_bar: ColorBar | None = None
     legend: str = ""
 
-
-@dataclass(frozen=True, eq=False)
-class Page:
-    """What a figure shows, from top to bottom.
-
-    Attributes
-    ----------
-    rows : sequence of Row
-        Each may take several lines of the grid.
-    table : list of list of str
-        The first row has the titles. Empty without a table.
-    caption : str
-    scale_bar : (float, str) or None
-        Its length in pixels, and its text.
-    """
-
-    rows: Sequence[Row]
-    table: list[list[str]]
-    caption: str = ""
-    scale_bar: tuple[float, str] | None = None
+    @property
+    def drawn(self) -> list[Panel]:
+        """The panels without the empty places."""
+        return [panel for panel in self.panels if panel is not None]
 
 
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
@@ -153,9 +145,6 @@ def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     RosyError
         If a text between dollar signs is not a formula that matplotlib can read.
     """
-    import matplotlib
-    from matplotlib.backends.backend_pdf import PdfPages
-
     fonts = {"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "rosyfields"}
     contents = io.BytesIO()
     try:
@@ -175,22 +164,6 @@ def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
     return contents.getvalue()
 
 
-def check_matplotlib() -> None:
-    """Check that matplotlib is installed.
-
-    Raises
-    ------
-    RosyError
-        If not.
-    """
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError:
-        raise RosyError(
-            "figures are drawn by matplotlib: pip install rosyfields[figures]"
-        ) from None
-
-
 def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     """Return the width of a panel in pixels.
 
@@ -207,13 +180,28 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     return max(int(room / columns * dpi), 1)
 
 
-def draw_page(page: Page, width: float, columns: int, dpi: int) -> Figure:
-    """Draw a figure.
+class NotebookFigure(Figure):
+    """A figure that a notebook shows as a picture, without pyplot."""
 
-    Parameters
+    def _repr_png_(self) -> bytes:
+        contents = io.BytesIO()
+        self.savefig(contents, format="png")
+        return contents.getvalue()
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """What a figure shows, from top to bottom. Places are in inches from its upper left corner.
+
+    Attributes
     ----------
-    page : Page
-        Its pictures have the width `panel_width`.
+    rows : sequence of Row
+        Each may take several lines of the grid. The pictures have the width `panel_width`.
+    table : list of list of str
+        The first row has the titles. Empty without a table.
+    caption : str
+    scale_bar : (float, str) or None
+        Its length in pixels, and its text.
     width : float
         Inches. The height follows from the contents.
     columns : int
@@ -221,109 +209,94 @@ def draw_page(page: Page, width: float, columns: int, dpi: int) -> Figure:
     dpi : int
         Pixels of pictures in an inch.
     """
-    return _Layout(page, width, columns, dpi, _figure_class()(dpi=dpi)).draw()
 
+    rows: Sequence[Row]
+    table: list[list[str]]
+    caption: str
+    scale_bar: tuple[float, str] | None
+    width: float
+    columns: int
+    dpi: int
 
-@lru_cache(maxsize=1)
-def _figure_class() -> type[Figure]:
-    """Return the class of figures, which notebooks show without pyplot."""
-    from matplotlib.figure import Figure
-
-    class NotebookFigure(Figure):
-        """A figure that a notebook shows as a picture."""
-
-        def _repr_png_(self) -> bytes:
-            contents = io.BytesIO()
-            self.savefig(contents, format="png")
-            return contents.getvalue()
-
-    return NotebookFigure
-
-
-class _Layout:
-    """The places of the parts of a figure, in inches from its upper left corner."""
-
-    def __init__(self, page: Page, width: float, columns: int, dpi: int, figure: Figure) -> None:
-        self.page, self.columns, self.dpi, self.figure = page, columns, dpi, figure
-        self.width = width
-        first = (
-            next(panel for row in page.rows for panel in row.panels if panel is not None)
-            if (page.rows)
-            else None
-        )
-        self.panel_size = (
-            (0.0, 0.0)
-            if first is None
-            else (first.picture.shape[1] / dpi, first.picture.shape[0] / dpi)
-        )
-        self.has_letters = sum(panel is not None for row in page.rows for panel in row.panels) > 1
-        letters = max(int(width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
-        self.caption = [
-            line
-            for paragraph in page.caption.splitlines()
-            for line in textwrap.wrap(paragraph, letters) or [""]
-        ]
-        self.height = self._table_top() + self._table_height() + self._caption_height()
-        figure.set_size_inches(width, max(self.height, 0.1))
+    @cached_property
+    def _figure(self) -> Figure:
+        """The figure that is drawn."""
+        size = self.width, max(self._height, 0.1)
+        return NotebookFigure(figsize=size, dpi=self.dpi)
 
     # --- places --------------------------------------------------------------------------------
+
+    @cached_property
+    def _panels(self) -> list[Panel]:
+        return [panel for row in self.rows for panel in row.drawn]
+
+    @cached_property
+    def _panel_size(self) -> tuple[float, float]:
+        height, width = self._panels[0].picture.shape[:2] if self._panels else (0, 0)
+        return width / self.dpi, height / self.dpi
+
+    @cached_property
+    def _caption_lines(self) -> list[str]:
+        letters = max(int(self.width * POINTS / (TITLE_SIZE * LETTER_WIDTH)), 8)
+        return [
+            line
+            for paragraph in self.caption.splitlines()
+            for line in textwrap.wrap(paragraph, letters) or [""]
+        ]
+
+    @cached_property
+    def _height(self) -> float:
+        height = sum(self._row_height(row) + ROW_GAP for row in self.rows) + self._table_height
+        lines = self._caption_lines
+        return height + ((len(lines) + 0.5) * _text_height(TITLE_SIZE) if lines else 0.0)
+
+    @property
+    def _table_height(self) -> float:
+        return (len(self.table) + 1) * _text_height(TEXT_SIZE) * 1.15 if self.table else 0.0
 
     def _row_height(self, row: Row) -> float:
         lines = -(-len(row.panels) // self.columns)
         return lines * self._line_height(row) + (lines - 1) * ROW_GAP
 
     def _line_height(self, row: Row) -> float:
-        has_notes = any(panel is not None and panel.note for panel in row.panels)
-        note = _text_height(TEXT_SIZE) if has_notes else 0.0
-        return self._title_height(row) + self.panel_size[1] + note
+        note = _text_height(TEXT_SIZE) if any(panel.note for panel in row.drawn) else 0.0
+        return self._title_height(row) + self._panel_size[1] + note
 
     def _title_height(self, row: Row) -> float:
-        has_titles = any(panel is not None and panel.title for panel in row.panels)
-        return TITLE_HEIGHT if has_titles else 0.0
-
-    def _table_top(self) -> float:
-        return sum(self._row_height(row) + ROW_GAP for row in self.page.rows)
-
-    def _table_height(self) -> float:
-        rows = len(self.page.table)
-        return (rows + 1) * _text_height(TEXT_SIZE) * 1.15 if rows else 0.0
-
-    def _caption_height(self) -> float:
-        return (len(self.caption) + 0.5) * _text_height(TITLE_SIZE) if self.caption else 0.0
+        return TITLE_HEIGHT if any(panel.title for panel in row.drawn) else 0.0
 
     def _axes(self, left: float, top: float, width: float, height: float) -> Axes:
         """Add axes with their upper left corner and size in inches, on whole pixels."""
-        unit = self.dpi * self.width, self.dpi * self.height
-        x, y = round(left * self.dpi), round((self.height - top - height) * self.dpi)
+        unit = self.dpi * self.width, self.dpi * self._height
+        x, y = round(left * self.dpi), round((self._height - top - height) * self.dpi)
         size = round(width * self.dpi), round(height * self.dpi)
         place = x / unit[0], y / unit[1], size[0] / unit[0], size[1] / unit[1]
-        return self.figure.add_axes(place)
+        return self._figure.add_axes(place)
 
     def _text(self, left: float, top: float, text: str, size: float, **options: object) -> None:
         """Write a line of text whose upper left corner is at a place in inches."""
         baseline = top + 0.8 * _text_height(size)
-        place = left / self.width, 1 - baseline / self.height
-        self.figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
+        place = left / self.width, 1 - baseline / self._height
+        self._figure.text(*place, text, fontsize=size, color=INK, va="baseline", **options)
 
     # --- drawing -------------------------------------------------------------------------------
 
     def draw(self) -> Figure:
         """Draw all parts."""
-        top, number = 0.0, 0
-        for row in self.page.rows:
-            number = self._draw_row(row, top, number)
+        top = 0.0
+        for row in self.rows:
+            self._draw_row(row, top)
             top += self._row_height(row) + ROW_GAP
-        if self.page.table:
+        if self.table:
             self._draw_table(top)
-        top += self._table_height()
-        for line_number, line in enumerate(self.caption):
-            offset = (line_number + 0.25) * _text_height(TITLE_SIZE)
-            self._text(0.0, top + offset, line, TITLE_SIZE)
-        return self.figure
+        top += self._table_height
+        for number, line in enumerate(self._caption_lines):
+            self._text(0.0, top + (number + 0.25) * _text_height(TITLE_SIZE), line, TITLE_SIZE)
+        return self._figure
 
-    def _draw_row(self, row: Row, top: float, number: int) -> int:
-        """Draw the panels of a row and its keys; return the number of panels so far."""
-        panel_width, panel_height = self.panel_size
+    def _draw_row(self, row: Row, top: float) -> None:
+        """Draw the panels of a row and its keys."""
+        panel_width, panel_height = self._panel_size
         legend, title_height = row.legend, self._title_height(row)
         for place, panel in enumerate(row.panels):
             line, column = divmod(place, self.columns)
@@ -335,36 +308,29 @@ class _Layout:
                     self._text(left, line_top + offset, text, TEXT_SIZE)
                 legend = ""
                 continue
-            letter = f"({chr(ord('a') + number % 26)}) " if self.has_letters else ""
+            number = self._panels.index(panel)
+            letter = f"({chr(ord('a') + number % 26)}) " if len(self._panels) > 1 else ""
             self._text(left, line_top, letter + panel.title, TITLE_SIZE)
             axes = self._axes(left, line_top + title_height, panel_width, panel_height)
             _draw_panel(axes, panel, self.dpi)
+            note_top = line_top + title_height + panel_height
             if panel.note:
-                note_top = line_top + title_height + panel_height
                 self._text(left, note_top, panel.note, TEXT_SIZE)
-            if self.page.scale_bar is not None and number == 0:
-                _draw_scale_bar(axes, *self.page.scale_bar, self.dpi)
-            number += 1
+            if self.scale_bar is not None and number == 0:
+                _draw_scale_bar(axes, *self.scale_bar, self.dpi)
         self._draw_keys(row, top)
-        return number
 
     def _draw_keys(self, row: Row, top: float) -> None:
         """Draw the color bar and the legend of the singularities of a row, in the column of keys."""
-        left = self.columns * (self.panel_size[0] + GAP) + GAP
+        left = self.columns * (self._panel_size[0] + GAP) + GAP
         top += self._title_height(row)
-        marks = [
-            marks
-            for panel in row.panels
-            if panel is not None
-            for marks in (panel.dots, panel.rings)
-            if marks is not None
-        ]
-        entries = _legend_entries(marks)
+        marks = [marks for panel in row.drawn for marks in (panel.dots, panel.rings)]
+        entries = _legend_entries([each for each in marks if each is not None])
         legend_height = len(entries) * _text_height(TEXT_SIZE) * 1.2
         if row.color_bar is not None:
-            height = self.panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)
-            self._draw_color_bar(row.color_bar, left, top, max(height, 0.5 * self.panel_size[1]))
-        bottom = top + self.panel_size[1] - legend_height
+            height = self._panel_size[1] - (legend_height + ROW_GAP if entries else 0.0)
+            self._draw_color_bar(row.color_bar, left, top, max(height, 0.5 * self._panel_size[1]))
+        bottom = top + self._panel_size[1] - legend_height
         for number, (text, color, diameter) in enumerate(entries):
             line_top = bottom + number * _text_height(TEXT_SIZE) * 1.2
             middle = (
@@ -381,10 +347,6 @@ class _Layout:
 
     def _draw_color_bar(self, bar: ColorBar, left: float, top: float, height: float) -> None:
         """Draw a color bar with ticks and its label."""
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colorbar import Colorbar
-        from matplotlib.colors import LinearSegmentedColormap, Normalize
-
         axes = self._axes(left, top, 0.12, height)
         colors = LinearSegmentedColormap.from_list("rosy", bar.stops)
         low, high = sorted((bar.low, bar.high))
@@ -399,9 +361,7 @@ class _Layout:
 
     def _draw_table(self, top: float) -> None:
         """Draw a table with lines above, below and under its titles."""
-        from matplotlib.lines import Line2D
-
-        table, height = self.page.table, _text_height(TEXT_SIZE) * 1.15
+        table, height = self.table, _text_height(TEXT_SIZE) * 1.15
         widths = np.array([max(map(_text_width, column)) for column in zip(*table, strict=True)])
         # The text is smaller if the columns are too wide for the figure.
         room, least_gap = self.width, _text_width("mm") * (len(widths) - 1)
@@ -415,9 +375,9 @@ class _Layout:
                 left = 0.0 if column == 0 else float(right[column])
                 self._text(left, line_top, text, size, ha="left" if column == 0 else "right")
         for offset, line_width in ((0.1, 0.8), (1.25, 0.5), (len(table) + 0.55, 0.8)):
-            y = 1 - (top + offset * height) / self.height
+            y = 1 - (top + offset * height) / self._height
             line = Line2D([0, 1], [y, y], linewidth=line_width, color=INK)
-            self.figure.add_artist(line)
+            self._figure.add_artist(line)
 
 
 def _text_height(size: float) -> float:
@@ -427,9 +387,6 @@ def _text_height(size: float) -> float:
 
 def _text_width(text: str) -> float:
     """Return the width of a text in the size `TEXT_SIZE`, in inches."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import text_to_path
-
     font = FontProperties(size=TEXT_SIZE)
     width, _, _ = text_to_path.get_text_width_height_descent(text, font, ismath=False)
     return width / POINTS
@@ -455,8 +412,6 @@ def _draw_panel(axes: Axes, panel: Panel, dpi: int) -> None:
 
 def _draw_marks(axes: Axes, marks: SingularityMarks, dpi: int, is_open: bool) -> None:
     """Draw dots or rings, and the labels beside visible dots."""
-    from matplotlib.colors import to_rgba_array
-
     marks = marks.in_drawing_order()
     signs = np.sign(marks.index).astype(int)
     colors = to_rgba_array([COLOR_BY_SIGN[sign] for sign in signs.tolist()])

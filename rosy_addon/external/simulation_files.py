@@ -7,7 +7,6 @@ Every file becomes a `SimulationMesh`: the polygons of a surface, with arrays at
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
 import json
 import os
@@ -25,15 +24,7 @@ import numpy as np
 from ..errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
-from ..field.mesh_io import SHARP_ANGLE
-from ..field.surface import (
-    Surface,
-    face_area_vectors,
-    mean_per_face,
-)
-from ..field.surface import (
-    build_surface as field_build_surface,
-)
+from ..field.surface import face_area_vectors, mean_per_face
 from ..file_io import check_readable, open_file, read_bytes
 
 #: Files that VTK reads, and among them those that may hold several steps of time.
@@ -134,9 +125,12 @@ class Step:
     def read(self) -> SimulationMesh:
         """Read the mesh of the step."""
         datasets = [_read_dataset(path, self.index) for path in self.paths]
-        dataset = datasets[0] if len(datasets) == 1 else datasets
         with _reporting(self.paths[0]):
-            return replace(_mesh_of(dataset, self.paths[0], self.name), time=self.time)
+            grid = _joined_grid(datasets, self.paths[0], self.name)
+            polygons, points, cells = _surface_polygons(grid, self.name)
+            point_arrays = _arrays(grid.point_data, points)
+            cell_arrays = _arrays(grid.cell_data, cells)
+        return SimulationMesh(self.name, polygons, point_arrays, cell_arrays, self.time)
 
 
 # Reading files
@@ -236,11 +230,6 @@ def simulation_steps(
     return ((step, step.read()) for step in list_steps(paths))
 
 
-def build_surface(mesh: SimulationMesh) -> Surface:
-    """Return the surface of a mesh. As for other mesh files, edges are sharp above `SHARP_ANGLE`."""
-    return field_build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
-
-
 def in_order(paths: list[Path]) -> list[Path]:
     """Return paths sorted by the numbers in their names, if nothing else differs."""
     parts = [re.split(r"(\d+)", str(path)) for path in paths]
@@ -290,7 +279,6 @@ def _listed_steps(path: Path) -> list[Step]:
 
 def _time_reader(path: Path) -> Any:
     """Return VTK's reader of a file with steps of time, after it has read what there is."""
-    _library("pyvista", path)
     if path.suffix.lower() in XDMF_SUFFIXES:
         from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
@@ -304,9 +292,7 @@ def _time_reader(path: Path) -> Any:
     reader.UpdateInformation()
     if path.suffix.lower() in EXODUS_SUFFIXES:
         for kind in (reader.NODAL, reader.ELEM_BLOCK):
-            for array in range(reader.GetNumberOfObjectArrays(kind)):
-                name = reader.GetObjectArrayName(kind, array)
-                reader.SetObjectArrayStatus(kind, name, 1)
+            reader.SetAllArrayStatus(kind, 1)
     return reader
 
 
@@ -341,10 +327,13 @@ def _read_dataset(path: Path, index: int | None) -> Any:
     """Return the contents of a file as one of pyvista's datasets."""
     suffix = path.suffix.lower()
     check_readable(path)
-    pyvista = _library("pyvista", path)
     with _reporting(path):
+        import pyvista
+
         if suffix in MESHIO_SUFFIXES:
-            return pyvista.from_meshio(_library("meshio", path).read(path))
+            import meshio
+
+            return pyvista.from_meshio(meshio.read(path))
         if suffix in VTK_SUFFIXES:
             return pyvista.read(str(path))
         reader = _time_reader(path)
@@ -354,20 +343,6 @@ def _read_dataset(path: Path, index: int | None) -> Any:
         else:
             reader.Update()
         return pyvista.wrap(reader.GetOutputDataObject(0))
-
-
-def _library(name: str, path: Path) -> Any:
-    """Import a library.
-
-    Raises
-    ------
-    RosyError
-        If it is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        raise _missing(path, error) from None
 
 
 def _missing(path: Path, error: ModuleNotFoundError) -> RosyError:
@@ -381,7 +356,10 @@ def _reporting(path: Path) -> Iterator[None]:
 
     VTK and the libraries below it print errors and continue. meshio prints them and exits.
     """
-    pyvista = _library("pyvista", path)
+    try:
+        import pyvista
+    except ModuleNotFoundError as error:
+        raise _missing(path, error) from None
     catcher = pyvista.VtkErrorCatcher(send_to_logging=False)
     reason = None
     with _discarded_output() as printed:
@@ -389,12 +367,10 @@ def _reporting(path: Path) -> Iterator[None]:
             with warnings.catch_warnings(), np.errstate(all="ignore"), catcher:
                 warnings.simplefilter("ignore")
                 yield
-        except RosyError:
+        except (RosyError, MemoryError):
             raise
         except ModuleNotFoundError as error:
             raise _missing(path, error) from None
-        except MemoryError:
-            raise
         except (Exception, SystemExit) as error:
             text = "" if isinstance(error, SystemExit) else str(error)
             reason = text or printed() or type(error).__name__
@@ -436,14 +412,14 @@ def _discarded_output() -> Iterator[Any]:
 # From datasets to polygons
 
 
-def _mesh_of(dataset: Any, path: Path, name: str) -> SimulationMesh:
-    """Return the surface of one of pyvista's datasets, or of the parts of a step."""
+def _joined_grid(datasets: list[Any], path: Path, name: str) -> Any:
+    """Return the unstructured grid of the datasets of a step; several are its parts."""
     import pyvista
 
-    if isinstance(dataset, list):
-        dataset = pyvista.MultiBlock(dataset)
-    has_parts = isinstance(dataset, pyvista.MultiBlock) or path.suffix.lower() in _PARTED_SUFFIXES
+    dataset = datasets[0] if len(datasets) == 1 else pyvista.MultiBlock(datasets)
+    has_parts = path.suffix.lower() in _PARTED_SUFFIXES
     if isinstance(dataset, pyvista.MultiBlock):
+        has_parts = True
         blocks = _blocks(dataset)
         if path.suffix.lower() in XDMF_SUFFIXES:
             blocks = _without_copies(blocks)
@@ -455,10 +431,7 @@ def _mesh_of(dataset: Any, path: Path, name: str) -> SimulationMesh:
         grid = grid.remove_ghost_cells()
     if has_parts and grid.n_cells:
         grid = grid.clean(tolerance=0.0, remove_unused_points=False, average_point_data=False)
-    polygons, points, cells = _surface_polygons(grid, name)
-    return SimulationMesh(
-        name, polygons, _arrays(grid.point_data, points), _arrays(grid.cell_data, cells)
-    )
+    return grid
 
 
 def _blocks(dataset: Any) -> list[Any]:
@@ -554,11 +527,10 @@ def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.nd
     faces_of_cell = np.where(is_strip, np.maximum(corner_count[cells] - 2, 0), 1)
     face_cell = np.repeat(cells, faces_of_cell)
     in_strip = np.repeat(is_strip, faces_of_cell)
-    first_face = offsets_from_sizes(faces_of_cell)[:-1]
-    rank = np.arange(len(face_cell)) - np.repeat(first_face, faces_of_cell)
+    rank = _ranks(offsets_from_sizes(faces_of_cell))
     face_start = offsets_from_sizes(np.where(in_strip, 3, corner_count[face_cell]))
     sizes = np.diff(face_start)
-    position = np.arange(face_start[-1]) - np.repeat(face_start[:-1], sizes)
+    position = _ranks(face_start)
     # Every other triangle of a strip is clockwise. The points of a pixel are in rows.
     is_turned = np.repeat(in_strip & (rank % 2 == 1), sizes) & (position > 0)
     position = np.where(is_turned, 3 - position, position)
@@ -589,26 +561,29 @@ def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray
     corner_point = np.asarray(surface.point_data["vtkOriginalPointIds"])[corner].astype(np.int64)
     surface_cell = np.asarray(surface.cell_data["vtkOriginalCellIds"])[face_cell]
     face_cell = volume_cells[surface_cell]
-    cell_center = mean_per_face(
-        np.asarray(grid.points, dtype=np.float64)[np.asarray(grid.cell_connectivity)],
-        np.asarray(grid.offset),
-    )
+    points = np.asarray(grid.points, dtype=np.float64)
+    cell_points = points[np.asarray(grid.cell_connectivity)]
+    cell_center = mean_per_face(cell_points, np.asarray(grid.offset))[surface_cell]
+    # Cells may be inside out, so faces are turned away from the centers of their cells.
+    outward = mean_per_face(points[corner_point], face_start) - cell_center
+    area_vectors = face_area_vectors(*Polygons(points, corner_point, face_start))
+    is_inward = dot(area_vectors, outward) < 0
     # VTK's order of the faces is not documented.
     smallest = np.minimum.reduceat(corner_point, face_start[:-1])
     total = np.add.reduceat(corner_point, face_start[:-1])
     order = np.lexsort((total, smallest, face_cell))
     sizes = np.diff(face_start)[order]
     ordered_start = offsets_from_sizes(sizes)
-    # Cells may be inside out, so faces are turned away from the centers of their cells.
-    position = np.arange(ordered_start[-1]) - np.repeat(ordered_start[:-1], sizes)
-    points = np.asarray(grid.points, dtype=np.float64)
-    corners = Polygons(points, corner_point, face_start)
-    outward = mean_per_face(points[corner_point], face_start) - cell_center[surface_cell]
-    is_turned = dot(face_area_vectors(*corners), outward)[order] < 0
+    position = _ranks(ordered_start)
     mirrored = np.where(position > 0, np.repeat(sizes, sizes) - position, 0)
-    position = np.where(np.repeat(is_turned, sizes), mirrored, position)
+    position = np.where(np.repeat(is_inward[order], sizes), mirrored, position)
     corner_point = corner_point[np.repeat(face_start[:-1][order], sizes) + position]
     return corner_point, ordered_start, face_cell[order]
+
+
+def _ranks(start: np.ndarray) -> np.ndarray:
+    """Return the number of each element in its run from 0, given the first elements of the runs, and the end."""
+    return np.arange(start[-1]) - np.repeat(start[:-1], np.diff(start))
 
 
 def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, Any]:
@@ -623,8 +598,8 @@ def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray,
         linear_type[is_type], sizes[is_type] = linear, count
     # In front of its points, each cell has their number.
     start = offsets_from_sizes(sizes + 1)
-    position = np.arange(start[-1]) - np.repeat(start[:-1], sizes + 1) - 1
     first = np.repeat(np.asarray(grid.offset)[cells], sizes + 1)
-    connectivity = np.asarray(grid.cell_connectivity)[first + np.maximum(position, 0)]
+    position = np.maximum(_ranks(start) - 1, 0)
+    connectivity = np.asarray(grid.cell_connectivity)[first + position]
     connectivity[start[:-1]] = sizes
     return cells, pyvista.UnstructuredGrid(connectivity, linear_type, np.asarray(grid.points))

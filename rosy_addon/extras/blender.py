@@ -11,7 +11,6 @@ status than 0. If there is no report, Blender failed, and its log says why.
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import json
 import os
@@ -26,8 +25,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
-from ..cli.bake_workers import uses_workers
-from ..cli.presets import user_presets_folder
+from ..cli.options import Options, user_presets_folder
 from ..errors import RosyError
 from ..turntable_video import Encoder
 from ..worker.program import run_program
@@ -52,7 +50,7 @@ BLENDER_OPTIONS = ("-b", "--factory-startup", "--disable-autoexec", "--python-ex
 #: Names of Blender on the PATH. The second one is that of Flatpak.
 PROGRAM_NAMES = ("blender", "org.blender.Blender")
 
-#: Where installers and users put Blender, by `sys.platform`. ``{...}`` is an environment variable.
+#: Where installers and users put Blender, by `sys.platform`. ``%...%`` is an environment variable.
 USUAL_PLACES = {
     "darwin": (
         "/Applications/Blender*.app",
@@ -61,9 +59,9 @@ USUAL_PLACES = {
         "~/Library/Application Support/Steam/steamapps/common/Blender/Blender.app",
     ),
     "win32": (
-        "{ProgramFiles}/Blender Foundation/Blender*/blender.exe",
-        "{LOCALAPPDATA}/Programs/Blender*/blender.exe",
-        "{ProgramFiles(x86)}/Steam/steamapps/common/Blender/blender.exe",
+        "%ProgramFiles%/Blender Foundation/Blender*/blender.exe",
+        "%LOCALAPPDATA%/Programs/Blender*/blender.exe",
+        "%ProgramFiles(x86)%/Steam/steamapps/common/Blender/blender.exe",
     ),
     "linux": (
         "/opt/blender*/blender",
@@ -151,14 +149,8 @@ def installed_blenders() -> list[str]:
 
 def _usual_places() -> list[str]:
     """Return the patterns of paths where Blender may be on this system."""
-    places = USUAL_PLACES.get(sys.platform, USUAL_PLACES["linux"])
-    variables = dict.fromkeys(re.findall(r"{(.*?)}", " ".join(places)))
-    values = {name: os.environ.get(name) for name in variables}
-    return [
-        re.sub(r"{(.*?)}", lambda match: values[match[1]], place)
-        for place in places
-        if all(values[name] for name in re.findall(r"{(.*?)}", place))
-    ]
+    places = map(os.path.expandvars, USUAL_PLACES.get(sys.platform, USUAL_PLACES["linux"]))
+    return [place for place in places if not place.startswith("%")]
 
 
 def _numbers(path: str) -> list[int]:
@@ -201,65 +193,51 @@ def has_bpy() -> bool:
     return True
 
 
-class BlenderRunner:
-    """Runs a command again in a Blender.
+def run_in_blender(
+    arguments: Sequence[str], options: Options, command: str, path: Path | None
+) -> None:
+    """Run a command again in a Blender and exit with its status.
+
+    Return if the option --blender is not set and Python has the module ``bpy``.
 
     Parameters
     ----------
     arguments : sequence of str
-        The arguments of the command.
+        Of the command.
+    options : Options
+        The options of the command.
+    command : str
+        The verb.
+    path : Path or None
+        The .blend file.
+
+    Raises
+    ------
+    SystemExit
+        With the status of the command.
+    RosyError
+        If there is no file, no Blender, or Blender failed.
     """
-
-    def __init__(self, arguments: Sequence[str]) -> None:
-        self._arguments = list(arguments)
-
-    def __call__(self, options: argparse.Namespace, command: str, path: Path | None) -> None:
-        """Run the command in a Blender and exit with its status.
-
-        Return if the option --blender is not set and Python has the module ``bpy``.
-
-        Parameters
-        ----------
-        options : argparse.Namespace
-            The options of the command.
-        command : str
-            The verb.
-        path : Path or None
-            The .blend file.
-
-        Raises
-        ------
-        SystemExit
-            With the status of the command.
-        RosyError
-            If there is no file, no Blender, or Blender failed.
-        """
-        if options.blender is None and has_bpy():
-            return
-        if path is None:
-            raise RosyError(f"{command}: no input: give SCENE.blend")
-        try:
-            program = find_blender(options.blender)
-        except RosyError as error:
-            raise RosyError(f"{command} needs Blender: {error}") from None
-        job = {
-            "package": PACKAGE,
-            "folder": str(PACKAGE_FOLDER),
-            "arguments": self._arguments,
-            "frames_are_drawn": command == "bake" and uses_workers(options),
-        }
-        raise SystemExit(run_job(program, job))
+    if options.blender is None and has_bpy():
+        return
+    if path is None:
+        raise RosyError(f"{command}: no input: give SCENE.blend")
+    try:
+        program = find_blender(options.blender)
+    except RosyError as error:
+        raise RosyError(f"{command} needs Blender: {error}") from None
+    raise SystemExit(run_job(program, arguments))
 
 
-def run_job(program: str, job: dict[str, Any]) -> int:
+def run_job(program: str, arguments: Sequence[str]) -> int:
     """Run `blender_script.py` in a Blender, and return the exit status of its command.
 
     Parameters
     ----------
     program : str
         Of Blender.
-    job : dict
-        What the script needs, besides its streams.
+    arguments : sequence of str
+        Of the command.
 
     Raises
     ------
@@ -273,7 +251,10 @@ def run_job(program: str, job: dict[str, Any]) -> int:
         report = stack.enter_context(tempfile.TemporaryFile("a+b", buffering=0))
         descriptors = [_copy(sys.stdout, 1, stack), _copy(sys.stderr, 2, stack), report.fileno()]
         handles, inheritance = _inheritance(descriptors)
-        job = job | {
+        job = {
+            "package": PACKAGE,
+            "folder": str(PACKAGE_FOLDER),
+            "arguments": list(arguments),
             "handles": handles,
             "encodings": [_encoding(sys.stdout), _encoding(sys.stderr)],
         }

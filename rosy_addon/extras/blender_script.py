@@ -11,8 +11,6 @@ package, folder
     Name of the package, and its folder.
 arguments
     Of the command.
-frames_are_drawn
-    Whether other processes have drawn the frames.
 handles
     Descriptors for the output of the command, for its errors, and for the report: the word "begun",
     and then the exit status. On Windows they are handles.
@@ -82,7 +80,7 @@ def run_command(job: dict[str, Any], output: TextIO) -> int:
     sys.modules[name] = package
     spec.loader.exec_module(package)
     command_line = importlib.import_module(f"{name}.extras.command_line")
-    return command_line.main_in_blender(job["arguments"], output, job["frames_are_drawn"])
+    return command_line.main_in_blender(job["arguments"], output)
 
 
 if __name__ == "__main__":

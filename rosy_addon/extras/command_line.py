@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import TextIO
 
-from ..cli.extras import Extras
+from ..cli.parser import Extras
 from ..cli.parser import main as cli_main
 from ..cli.streams import use_output
-from ..external.simulation_files import SUFFIXES
-from .blender import PACKAGE, BlenderRunner, blender_encoder
+from .blender import PACKAGE, blender_encoder, run_in_blender
 from .cluster import run_on_cluster
 from .film import add_film_command
 
@@ -21,15 +21,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     extras = Extras(
         program=(sys.executable, "-m", PACKAGE),
         run_on_cluster=run_on_cluster,
-        simulation_suffixes=SUFFIXES,
         add_commands=(add_film_command,),
         find_blender_encoder=blender_encoder,
-        run_in_blender=BlenderRunner(arguments),
+        run_in_blender=partial(run_in_blender, arguments),
     )
     return cli_main(arguments, f"python -m {PACKAGE}", extras)
 
 
-def main_in_blender(argv: Sequence[str], output: TextIO, frames_are_drawn: bool) -> int:
+def main_in_blender(argv: Sequence[str], output: TextIO) -> int:
     """Run a command of `main` in the Blender that it has started, and return the exit status.
 
     Parameters
@@ -38,14 +37,11 @@ def main_in_blender(argv: Sequence[str], output: TextIO, frames_are_drawn: bool)
         The arguments of `main`.
     output : text file
         Standard output of the command. Blender prints reports of operators to `sys.stdout`.
-    frames_are_drawn : bool
-        Whether other processes have drawn the frames already.
     """
     use_output(output)
     extras = Extras(
         run_on_cluster=run_on_cluster,
-        simulation_suffixes=SUFFIXES,
         run_in_blender=lambda *_: None,
-        frames_are_drawn=frames_are_drawn,
+        is_in_blender=True,
     )
     return cli_main(argv, f"python -m {PACKAGE}", extras)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,24 +11,15 @@ import numpy as np
 
 from .. import api
 from ..api.films import MAX_BETWEEN
-from ..api.mesh_objects import MeshArrays
-from ..api.pictures import DEFAULT_VIDEO_SIZE, picture_look
-from ..cli.look import add_flow_option, add_look_options, requested_preset, requested_settings
-from ..cli.mesh_field import printed_warnings
-from ..cli.options import (
-    add_subcommand,
-    add_workers_option,
-    check_output,
-    int_between,
-    print_note,
-)
-from ..cli.render import add_rate_option, video_encoder
+from ..api.pictures import picture_look
+from ..api.surface import MeshArrays
+from ..cli.options import Options, add_subcommand, int_between
+from ..cli.pictures import add_motion_options, video_encoder
 from ..cli.streams import print_line
-from ..cli.view import add_view_options, requested_size
 from ..errors import RosyError
 from ..external.simulation_files import SUFFIXES, Step, in_order, list_steps
 from ..field.array_field import SurfaceArrays, array_field
-from ..field.field_io import READ_SUFFIXES, load_field
+from ..field.field_io import READ_SUFFIXES
 from ..field.formats.polygons import Polygons
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
@@ -38,7 +29,7 @@ from ..turntable_video import check_video_path
 
 def add_film_command(subparsers: Any) -> None:
     """Add the command `film`."""
-    parser = add_subcommand(subparsers, "film", run_film)
+    parser = add_subcommand(subparsers, "film", run_film, api.film)
     parser.description += (
         " Files whose names differ only in numbers are shown in the order of the numbers."
     )
@@ -68,7 +59,6 @@ def add_film_command(subparsers: Any) -> None:
     parser.add_argument(
         "--between",
         type=_count_or_auto,
-        default=0,
         metavar="N|auto",
         help="pictures between two steps, for which fields and vertices are interpolated (%(default)d); auto: as "
         "many as keep streaks steady",
@@ -78,11 +68,10 @@ def add_film_command(subparsers: Any) -> None:
         action="store_true",
         help="let the first step follow the last one, for films that are shown in a loop",
     )
-    add_rate_option(parser)
-    add_flow_option(parser)
-    add_view_options(parser, DEFAULT_VIDEO_SIZE)
-    add_workers_option(parser)
-    add_look_options(parser)
+    add_motion_options(parser)
+    parser.add_view_options()
+    parser.add_workers_option()
+    parser.add_look_options()
 
 
 def _count_or_auto(text: str) -> int | None:
@@ -90,13 +79,13 @@ def _count_or_auto(text: str) -> int | None:
     return None if text == "auto" else int_between(0, MAX_BETWEEN)(text)
 
 
-def run_film(options: argparse.Namespace) -> None:
+def run_film(options: Options) -> None:
     """Draw the steps of a simulation, or a series of fields, under one camera, as a video."""
-    check_output(options)
+    options.check_output()
     check_video_path(options.output)
     if options.degree is not None:
         check_degree(options.degree)
-    preset, settings = requested_preset(options), requested_settings(options)
+    preset, settings = options.requested_preset(), options.requested_settings()
     # Mistakes are reported before the files are read.
     picture_look(str(options.series[0]), preset, settings, {})
     encode = video_encoder(options)
@@ -112,25 +101,11 @@ def run_film(options: argparse.Namespace) -> None:
         else:
             print_line(f"picture {number}{total}")
 
-    with printed_warnings():
-        api.film(
-            fields,
-            options.output,
-            between=between,
-            loop=options.loop,
-            rate=options.rate,
-            view=options.view,
-            size=requested_size(options),
-            orthographic=options.ortho,
-            preset=preset,
-            workers=options.workers,
-            encode=encode,
-            on_picture=announce,
-            **settings,
-        )
+    arguments = options.api_arguments(api.film, encode=encode, on_picture=announce)
+    api.film(fields, options.output, **arguments)
 
 
-def requested_fields(options: argparse.Namespace) -> SimulationFields | FieldFiles:
+def requested_fields(options: Options) -> SimulationFields | FieldFiles:
     """Return the fields of the files of a series.
 
     Raises
@@ -153,62 +128,53 @@ def requested_fields(options: argparse.Namespace) -> SimulationFields | FieldFil
                 f"{name}: a film needs 2 or more field files after the mesh, not {len(others)}"
             )
         surface = api.Surface(name, up=options.up)
-        return FieldFiles(surface, in_order(others), options.degree, nonfinite)
+        for path in others:
+            check_readable(path)
+        return FieldFiles(in_order(others), surface, options.degree, nonfinite)
     steps = list_steps(options.series)
     if len(steps) < 2:
         raise RosyError(f"{name}: has one step only: draw it with the command render")
     return SimulationFields(steps, options.array, options.degree, nonfinite, options.up or "z")
 
 
+@dataclass(eq=False)
 class FieldFiles(Sequence[api.Field]):
     """The fields of files, on one surface. A file is read each time that its field is asked for.
 
     Parameters
     ----------
-    surface : Surface
     paths : sequence of Path
+    surface : Surface
     degree, nonfinite
         See `api.read_field`. By default the degree is that of the first field.
     """
 
-    def __init__(
-        self,
-        surface: api.Surface,
-        paths: Sequence[Path],
-        degree: int | None = None,
-        nonfinite: str = "error",
-    ) -> None:
-        self._surface, self._paths = surface, paths
-        self._degree, self._nonfinite = degree, nonfinite
-        self._first_degree: int | None = None
-        self._noted: set[int] = set()
-        for path in paths:
-            check_readable(path)
+    paths: Sequence[Path]
+    surface: api.Surface
+    degree: int | None = None
+    nonfinite: str = "error"
+    _first_degree: int | None = None
 
     def __len__(self) -> int:
-        return len(self._paths)
+        return len(self.paths)
 
     def __getitem__(self, index: Any) -> Any:
-        path = self._paths[index]
-        loaded = load_field(path, self._surface.mesh, self._degree, self._nonfinite)
-        field = loaded.field
-        if self._first_degree is None:
-            self._first_degree = field.degree
+        path = self.paths[index]
+        field = api.read_field(path, self.surface, self.degree, nonfinite=self.nonfinite)
+        self._first_degree = self._first_degree or field.degree
         if field.degree != self._first_degree:
             raise RosyError(
-                f"{path}: the field has degree {field.degree}, but {self._paths[0]} has "
+                f"{path}: the field has degree {field.degree}, but {self.paths[0]} has "
                 f"{self._first_degree}"
             )
-        if index not in self._noted:
-            self._noted.add(index)
-            print_note(loaded.note)
-        return api.Field(self._surface, field)
+        return field
 
     def time_text(self, index: int) -> str:
         """Return the name of the file, for the line that is printed."""
-        return f", {self._paths[index].name}"
+        return f", {self.paths[index].name}"
 
 
+@dataclass(eq=False)
 class SimulationFields(Sequence[api.Field]):
     """The fields of the steps of a simulation. A step is read each time that its field is asked for.
 
@@ -221,33 +187,28 @@ class SimulationFields(Sequence[api.Field]):
         The upward axis of the meshes.
     """
 
-    def __init__(
-        self,
-        steps: Sequence[Step],
-        array: str | None = None,
-        degree: int | None = None,
-        nonfinite: str = "error",
-        up: str = "z",
-    ) -> None:
-        self._steps, self._up = steps, up
-        self._field_options = (array, degree, nonfinite)
-        self._last: tuple[Polygons, api.Surface] | None = None
+    steps: Sequence[Step]
+    array: str | None = None
+    degree: int | None = None
+    nonfinite: str = "error"
+    up: str = "z"
+    _last: tuple[Polygons, api.Surface] | None = None
 
     def __len__(self) -> int:
-        return len(self._steps)
+        return len(self.steps)
 
     def __getitem__(self, index: Any) -> Any:
-        mesh = self._steps[index].read()
-        polygons = mesh.polygons
+        mesh = self.steps[index].read()
         # If the mesh is that of the last step, its surface is used again.
-        if self._last is None or not all(map(np.array_equal, polygons, self._last[0])):
-            arrays = MeshArrays(*polygons)
-            self._last = polygons, api.Surface(arrays, name=mesh.name, up=self._up)
+        if self._last is None or not all(map(np.array_equal, mesh.polygons, self._last[0])):
+            arrays = MeshArrays(*mesh.polygons)
+            self._last = mesh.polygons, api.Surface(arrays, name=mesh.name, up=self.up)
         surface = self._last[1]
         arrays = SurfaceArrays(mesh.name, surface.mesh, mesh.point_arrays, mesh.cell_arrays)
-        return api.Field(surface, array_field(arrays, *self._field_options))
+        field = array_field(arrays, self.array, self.degree, self.nonfinite)
+        return api.Field(surface, field)
 
     def time_text(self, index: int) -> str:
         """Return the time of a step, for the line that is printed; empty if the files state none."""
-        time = self._steps[index].time
+        time = self.steps[index].time
         return "" if time is None else f", time {time:g}"

@@ -18,12 +18,13 @@ from rosy_addon.cli.parser import main as cli_main
 from rosy_addon.compositor.look import Look
 from rosy_addon.external.simulation_files import (
     SimulationMesh,
-    build_surface,
     list_steps,
     read_simulation,
 )
 from rosy_addon.extras.film import SimulationFields
 from rosy_addon.field.array_field import SurfaceArrays, array_field
+from rosy_addon.field.mesh_io import SHARP_ANGLE
+from rosy_addon.field.surface import build_surface
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
 
@@ -180,7 +181,7 @@ def test_film_has_one_camera_and_one_range(growing):
     fields = [view.instances[0].field for view in views]
     assert {view.look.magnitude_range for view in views} == {fields[0].magnitude.max()}
     mesh = read_simulation(steps[0].paths[0])
-    surface = build_surface(mesh)
+    surface = build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
     arrays = SurfaceArrays(mesh.name, surface, mesh.point_arrays, mesh.cell_arrays)
     instance = mesh_instance(surface, array_field(arrays), "z")
     look = views[0].look

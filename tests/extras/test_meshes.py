@@ -8,8 +8,14 @@ import pytest
 import pyvista as pv
 from extras.rotations import rotation
 
-from rosy_addon.external.simulation_files import build_surface, read_simulation
-from rosy_addon.field.surface import face_area_vectors
+from rosy_addon.external.simulation_files import SimulationMesh, read_simulation
+from rosy_addon.field.mesh_io import SHARP_ANGLE
+from rosy_addon.field.surface import Surface, build_surface, face_area_vectors
+
+
+def surface_of(mesh: SimulationMesh) -> Surface:
+    """Return the surface of a mesh, with sharp edges as those of other mesh files."""
+    return build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
 
 
 def triangles_of(mesh):
@@ -62,7 +68,7 @@ def test_boundary_of_a_volume(tmp_path, box):
     assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0).all(), "the cells are inside out"
     box.save(tmp_path / "box.vtu")
     mesh = read_simulation(tmp_path / "box.vtu")
-    surface = build_surface(mesh)
+    surface = surface_of(mesh)
     assert surface.face_count == 6 * 9 * 2 and len(surface.vertices) == 4**3 - 2**3
     assert total_area(mesh) == pytest.approx(6)
     assert ((surface.face_center - 0.5) * surface.face_normal).sum(axis=1) == pytest.approx(0.5)
@@ -115,7 +121,7 @@ def test_polygons_and_strips(tmp_path):
     strips.clear_data()
     strips.save(tmp_path / "strips.vtp")
     mesh = read_simulation(tmp_path / "strips.vtp")
-    surface = build_surface(mesh)
+    surface = surface_of(mesh)
     assert len(triangles_of(mesh)) == sphere.n_cells
     assert ((surface.face_center * surface.face_normal).sum(axis=1) > 0.9).all()
     assert total_area(mesh) == pytest.approx(sphere.area, rel=1e-5)
@@ -127,7 +133,7 @@ def test_images_and_structured_grids(tmp_path):
     image.save(tmp_path / "image.vti")
     image.cast_to_structured_grid().save(tmp_path / "grid.vts")
     for name in ("image.vti", "grid.vts"):
-        surface = build_surface(read_simulation(tmp_path / name))
+        surface = surface_of(read_simulation(tmp_path / name))
         assert surface.face_count == 6 and (surface.face_normal == [0, 0, 1]).all()
 
 

@@ -21,14 +21,14 @@ FILE_OPTIONS = {
     *(
         "tone_image",
         "tone_picture",
-        "tone_attribute",
+        "tone_values",
         "color_values",
         "uv",
         "object",
         "camera",
         "frames",
     ),
-    *("singularities", "all_cameras", "out", "save", "jobs", "scheduler"),
+    *("singularities", "all_cameras", "out", "save", "jobs", "scheduler", "array", "step"),
     "fields",
 }
 
@@ -169,7 +169,6 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "overshoot": _number(0, 256, (5.0,)),
     "singularity_size": _number(1, 256, (9.0, 20.0)),
     "width": _number(0.01, 1000, (1.6,)),
-    "match_reach": _number(0, 10, (0.05, 0.5)),
     "columns": lambda rng: str(rng.integers(0, 5)),
     "dpi": lambda rng: str(rng.integers(9, 70)),
     "caption": _text,

@@ -71,7 +71,12 @@ def scene_case(rng: Generator, folder: Path) -> Case:
 def _scene_command(rng: Generator) -> Case:
     """Return a random command for the file scene.blend."""
     command = "bake" if rng.random() < 0.7 else "strokes"
-    leave_out = {*("degree", "generate", "axis", "reach", "sharp_angle"), "up", "view", "ortho"}
+    leave_out = {
+        *("degree", "generate", "axis", "reach", "sharp_angle"),
+        "up",
+        "view",
+        "orthographic",
+    }
     leave_out = leave_out if rng.random() < 0.95 else set()
     words = random_options(rng, command, rate=0.06, leave_out=leave_out)
     case = Case([command, "scene.blend", *words], outputs={"out/"})

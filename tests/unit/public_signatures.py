@@ -20,7 +20,7 @@ SPECIAL = {"__init__", "__len__", "__array__"}
 def signatures(module: ModuleType) -> str:
     """Return one entry for each public name of a module and each member of its classes."""
     entries: list[str] = []
-    for name in module.__all__:
+    for name in public_names(module):
         item = getattr(module, name)
         if not inspect.isclass(item):
             entries.append(function_entry(name, item))
@@ -41,6 +41,15 @@ def signatures(module: ModuleType) -> str:
             elif inspect.isfunction(member):
                 entries.append(function_entry(f"{name}.{key}", member))
     return "\n".join(entries) + "\n"
+
+
+def public_names(module: ModuleType) -> list[str]:
+    """Return what a module imports for others, without its own modules."""
+    return sorted(
+        name
+        for name, item in vars(module).items()
+        if not (name.startswith("_") or inspect.ismodule(item))
+    )
 
 
 def type_text(annotation: object) -> str:

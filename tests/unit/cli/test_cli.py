@@ -17,7 +17,7 @@ from conftest import ROOT, long
 from harness.forked import run_command
 from shapes import cube, icosphere, torus
 
-from rosy_addon.cli import bake_workers, parser
+from rosy_addon.cli import bake, parser
 from rosy_addon.color import to_linear
 from rosy_addon.extras.command_line import main
 from rosy_addon.field.surface import Surface
@@ -367,9 +367,7 @@ def test_bake_without_an_output_is_refused(capsys):
 def test_workers_get_the_options_as_they_are(tmp_path, monkeypatch):
     """Names may begin with a dash."""
     commands = []
-    monkeypatch.setattr(
-        bake_workers, "run_local", lambda command, *_: commands.append(command) or iter(())
-    )
+    monkeypatch.setattr(bake, "run_local", lambda command, *_: commands.append(command) or iter(()))
     scene = tmp_path / "scene.blend"
     scene.touch()
     words = [f"--out={tmp_path}", "--object=-a", "--object=b", "--object=--save", "--camera=-x"]

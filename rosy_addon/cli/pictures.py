@@ -1,0 +1,167 @@
+"""The commands `render`, `turntable` and `texture`: pictures, videos and textures of a mesh file."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from .. import api
+from ..api.pictures import find_ffmpeg
+from ..api.textures import UDIM_TOKEN, texture_look
+from ..errors import RosyError
+from ..surface_texture.draw import CONTENTS, MAX_MARGIN, MAX_SIZE, MIN_SIZE
+from ..turntable_video import NO_ENCODER, Encoder, check_video_path
+from .mesh_field import add_mesh_options, load_mesh_and_field
+from .options import (
+    CommandParser,
+    Options,
+    add_subcommand,
+    float_between,
+    float_tuple,
+    int_between,
+)
+from .streams import print_line
+
+
+def add_render_command(subparsers: Any) -> None:
+    """Add the command `render`."""
+    parser = add_subcommand(subparsers, "render", run_render, api.render)
+    add_mesh_options(parser)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.png")
+    parser.add_picture_options()
+    parser.add_argument(
+        "--tone-picture",
+        type=Path,
+        metavar="PICTURE.png",
+        help="take the tone from a picture of the same mesh in the same view",
+    )
+
+
+def run_render(options: Options) -> None:
+    """Draw the field of a mesh file as a picture."""
+    options.check_output(".png")
+    arguments = options.picture_arguments(api.render)
+    surface, field = load_mesh_and_field(options)
+    api.render(surface, field, **arguments).save(options.output)
+
+
+def add_turntable_command(subparsers: Any) -> None:
+    """Add the command `turntable`."""
+    parser = add_subcommand(subparsers, "turntable", run_turntable, api.turntable)
+    add_mesh_options(parser)
+    parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT.mp4|OUT.gif")
+    parser.add_argument(
+        "--pictures",
+        type=int_between(1, 10_000),
+        metavar="N",
+        help="pictures in a full turn (%(default)d)",
+    )
+    add_motion_options(parser)
+    parser.add_argument(
+        "--still",
+        action="store_true",
+        help="leave the camera where it is: only streaks drift, as --flow says",
+    )
+    parser.add_picture_options()
+
+
+def add_motion_options(parser: CommandParser) -> None:
+    """Add --rate, of a video, and --flow."""
+    parser.add_argument(
+        "--rate",
+        type=float_between(0.1, 1000.0),
+        metavar="N",
+        help="pictures per second (%(default)g)",
+    )
+    parser.add_flow_option()
+
+
+def run_turntable(options: Options) -> None:
+    """Draw the field of a mesh file from all sides, as a video."""
+    options.check_output()
+    check_video_path(options.output)
+    if options.pictures < 2:
+        raise RosyError("a turntable needs 2 or more --pictures")
+    arguments = options.picture_arguments(api.turntable)
+    encode = video_encoder(options)
+
+    def announce(number: int) -> None:
+        print_line(f"picture {number} of {options.pictures}")
+
+    surface, field = load_mesh_and_field(options)
+    arguments |= {"path": options.output, "encode": encode, "on_picture": announce}
+    api.turntable(surface, field, **arguments)
+
+
+def video_encoder(options: Options) -> Encoder | None:
+    """Return ffmpeg's or Blender's encoder for an .mp4 as the output; None for a .gif.
+
+    Raises
+    ------
+    RosyError
+        If there is no encoder.
+    """
+    if options.output.suffix.lower() != ".mp4":
+        return None
+    find_blender_encoder, encode = options.extras.find_blender_encoder, None
+    if find_blender_encoder is not None and options.blender is not None:
+        encode = find_blender_encoder(options.blender)
+    encode = encode or find_ffmpeg()
+    if encode is None:
+        with suppress(ImportError):
+            from ..scene.video import encode_video as encode
+    if encode is None and find_blender_encoder is not None:
+        encode = find_blender_encoder(None)
+    if encode is None:
+        raise RosyError(f"{options.output}: {NO_ENCODER}")
+    return encode
+
+
+def add_texture_command(subparsers: Any) -> None:
+    """Add the command `texture`."""
+    parser = add_subcommand(subparsers, "texture", run_texture, api.texture)
+    add_mesh_options(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        required=True,
+        type=Path,
+        metavar="OUT.png",
+        help=f"{UDIM_TOKEN} in the name stands for the number of a tile: each has a file of its own",
+    )
+    parser.add_argument(
+        "--size",
+        type=int_between(MIN_SIZE, MAX_SIZE),
+        metavar="N",
+        help="width and height in texels (%(default)d)",
+    )
+    parser.add_argument(
+        "--margin",
+        type=int_between(0, MAX_MARGIN),
+        metavar="N",
+        help="width of the margin around charts, in texels (%(default)d)",
+    )
+    parser.add_argument(
+        "--light-direction",
+        type=float_tuple(3, "X,Y,Z"),
+        metavar="X,Y,Z",
+        help="direction to a lamp, in the axes of the mesh: draw its hatching as ink, and not thresholds "
+        "for a shader",
+    )
+    parser.add_argument(
+        "--content",
+        choices=list(CONTENTS),
+        help="; ".join(f"{name}: {text[0].lower()}{text[1:]}" for name, text in CONTENTS.items()),
+    )
+    parser.add_look_options()
+
+
+def run_texture(options: Options) -> None:
+    """Draw the field of a mesh file as a texture for its UV map."""
+    options.check_output(".png")
+    # Mistakes are reported before the mesh is read.
+    texture_look(options.requested_preset(), options.requested_settings())
+    surface, field = load_mesh_and_field(options)
+    arguments = options.api_arguments(api.texture, udim=UDIM_TOKEN in options.output.name)
+    api.texture(surface, field, **arguments).save(options.output)

@@ -281,11 +281,6 @@ class GpuResources:
         key = name, width, height, texel_format, layers
         return self._cached(key, lambda: self.device.texture(width, height, texel_format, layers))
 
-    def depth_image(self, width: int, height: int) -> Any:
-        """Return the depth buffer of a size."""
-        key = "depth", width, height
-        return self._cached(key, lambda: self.device.depth_texture(width, height))
-
     def lookup_texture(self, name: str, key: Any, create: Callable[[], np.ndarray]) -> Any:
         """Return (H, W, 4) values as a texture. Of each name, the last key is kept."""
         cached = self._lookup_textures.get(name)

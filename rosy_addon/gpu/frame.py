@@ -100,7 +100,7 @@ class Frame:
     @cached_property
     def first_triangle_ids(self) -> list[int]:
         """The id of the first triangle of each item in the id buffer; those that only occlude are last."""
-        order = sorted(range(len(self.items)), key=lambda index: self.items[index].field is None)
+        order = sorted(range(len(self.items)), key=lambda index: self.items[index].kind is None)
         counts = [self.items[index].mesh.buffers.triangle_count for index in order]
         # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
         spans = [count + count // MAX_TRIANGLES for count in counts]
@@ -111,7 +111,7 @@ class Frame:
     def occluder_id(self) -> int:
         """The first id of triangles without a field, which only occlude. All others are before."""
         ids = zip(self.first_triangle_ids, self.items, strict=True)
-        return min((first_id for first_id, item in ids if item.field is None), default=STOP_ID)
+        return min((first_id for first_id, item in ids if item.kind is None), default=STOP_ID)
 
     @property
     def kinds(self) -> list[FieldKind]:
@@ -134,7 +134,7 @@ class Frame:
         boxes = [
             (instance_id, item, screen_box(item, self.camera))
             for instance_id, item in enumerate(self.items)
-            if item.field is not None
+            if item.kind is not None
         ]
         return [entry for entry in boxes if not is_empty(entry[2])]
 

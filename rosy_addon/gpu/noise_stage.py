@@ -70,7 +70,7 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
     raw_noise = frame.resources.image("raw_noise", *frame.size)
     frame.clear(raw_noise)
     shared_uniforms = surface_noise_uniforms(settings)
-    names = [item.mesh.keep_alive[0].name for item in frame.items]
+    names = [item.instance.surface.name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
     for instance_id, item, box in frame.fields_in_view():
         textures = {"feature_curvature": lookup_tables.palette(frame.resources)}

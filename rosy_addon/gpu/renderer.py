@@ -215,7 +215,7 @@ class GpuRenderer:
         batches = [
             (item.mesh.batch, clip_uniforms(item, view.camera, clip_planes))
             for item in items
-            if item.field is not None
+            if item.kind is not None
         ]
         draw_texture(self.device, texture, batches, opacity, depth_bias=COMPOSITE_DEPTH_BIAS)
 

@@ -55,7 +55,7 @@ def render_target_tones(frame: Frame) -> None:
 
 def _lighting(frame: Frame) -> Any:
     """Return the light of all light sources together, as `shading.diffuse` at full strength."""
-    boxes = [screen_box(item, frame.camera) for item in frame.items if item.field is not None]
+    boxes = [screen_box(item, frame.camera) for item in frame.items if item.kind is not None]
     box = union_box(boxes)
     images = [frame.resources.image(f"lighting {index}", *frame.size) for index in range(2)]
     lights = [] if is_empty(box) else light_uniforms(frame.look, frame.lights)

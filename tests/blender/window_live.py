@@ -1165,13 +1165,13 @@ def nothing_leaks():
 
     def count():
         gc.collect()
-        return sum(renderer.resources.texture_count for renderer in renderers), resident_memory()
+        return sum(renderer.resources.count for renderer in renderers), resident_memory()
 
     def toggle():
         switch("ON")
         renderers[:] = [*renderers[-9:], session_module()._session.progressive.renderer]
         view()[1].tag_redraw()
-        yield from wait_until(lambda: renderers[-1].resources.texture_count > 8)
+        yield from wait_until(lambda: renderers[-1].resources.count > 8)
         switch("OFF")
         yield 0.02
 

@@ -413,9 +413,8 @@ def draw_item(surface, matrix=None):
     matrix = np.eye(4) if matrix is None else matrix
     buffers = build_mesh_buffers(surface, np.eye(3), None, "smooth")
     mesh = resources.GpuMesh(buffers, None, None, ())
-    return resources.DrawItem(
-        mesh, None, matrix @ mesh_buffers.translation_matrix(buffers.center), 1.0, None
-    )
+    model_matrix = matrix @ mesh_buffers.translation_matrix(buffers.center)
+    return resources.DrawItem(MeshInstance(surface, matrix, None), mesh, model_matrix, None)
 
 
 def camera_at(eye=(0, -5, 0), size=(64, 48), perspective=True, clip=(0.1, 100.0)):
@@ -1545,7 +1544,7 @@ def test_meshes_stay_on_the_card(device):
         card.upload([moved], "smooth")
     assert [mesh.buffers for mesh in card.resources.meshes] == [first.mesh.buffers]
     card.release()
-    assert not card.resources.texture_count
+    assert not card.resources.count
 
 
 def test_nothing_is_compiled_or_sent_after_the_preparation(device):

@@ -14,8 +14,7 @@ from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..compositor.target_tone import ReferenceRender
 from ..projection.camera import Camera
-from .field_kind import FieldKind
-from .mesh_buffers import MAX_TRIANGLES
+from .mesh_buffers import MAX_TRIANGLES, FieldKind
 from .passes import ComputePass, RasterPass
 from .resources import DrawItem, GpuResources
 from .uniforms import camera_uniforms, instance_uniforms
@@ -93,6 +92,11 @@ class Frame:
         return self.camera.width, self.camera.height
 
     @property
+    def box(self) -> Box:
+        """The box of all pixels."""
+        return 0, 0, *self.size
+
+    @property
     def samples_per_side(self) -> int:
         """Samples along each side of a pixel."""
         return 1 if self.samples is None else self.samples.look.supersampling
@@ -122,6 +126,10 @@ class Frame:
     @cached_property
     def _shared_uniforms(self) -> dict[str, Any]:
         return {**vars(self.look), **camera_uniforms(self.camera)}
+
+    def image(self, name: str, texel_format: str = "RGBA32F", layers: int = 0) -> Any:
+        """Return the image of a name, of the size of the frame; see `GpuResources.image`."""
+        return self.resources.image(name, *self.size, texel_format, layers)
 
     def box_of_kind(self, kind: FieldKind) -> Box:
         """Return the box of all instances whose fields are of a kind."""
@@ -179,7 +187,7 @@ class Frame:
     def clear(self, image: Any, texel_format: str | None = None) -> None:
         """Set an image of the size of the frame to 0; without a format, it is RGBA32F."""
         formats = () if texel_format is None else (("cleared", texel_format),)
-        self.run(ComputePass("clear", formats), (0, 0, *self.size), {}, {"cleared": image}, {})
+        self.run(ComputePass("clear", formats), self.box, {}, {"cleared": image}, {})
 
     def run(
         self,

@@ -45,17 +45,17 @@ def _visibility(frame: Frame) -> Any:
     ]
     is_clipped = not np.array_equal(frame.clip_planes, NO_CLIP_PLANES)
     shader = RasterPass("visibility_clipped" if is_clipped else "visibility")
-    visibility = frame.resources.image("visibility", *frame.size, "R32F")
+    visibility = frame.image("visibility", "R32F")
     frame.draw(shader, batches, visibility)
     return visibility
 
 
 def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
     """Return the id of the triangle that each pixel sees, at its center or else at a sample."""
-    visibility = frame.resources.image("pixel_visibility", *frame.size, "R32F")
+    visibility = frame.image("pixel_visibility", "R32F")
     frame.run(
         ComputePass("pixel_visibility"),
-        (0, 0, *frame.size),
+        frame.box,
         {
             "center_visibility": _visibility(frame),
             "sample_visibility": samples.textures["visibility"],
@@ -68,15 +68,12 @@ def _pixel_visibility(frame: Frame, samples: Frame) -> Any:
 
 def _render_surfaces(frame: Frame, visibility: Any) -> None:
     """Render the surface and field at each pixel, given the ids of visible triangles."""
-    image, size = frame.resources.image, frame.size
     channel_count = max((item.mesh.buffers.channel_count for item in frame.items), default=0)
-    channel_size = size if channel_count else (1, 1)
-    gbuffer = {
-        "normals": image("normals", *size),
-        "field_values": image("field_values", *size),
-        "depth_slopes": image("depth_slopes", *size),
-        "field_channels": image("field_channels", *channel_size, layers=max(channel_count, 1)),
-    }
+    channel_size = frame.size if channel_count else (1, 1)
+    gbuffer = {name: frame.image(name) for name in ("normals", "field_values", "depth_slopes")}
+    gbuffer["field_channels"] = frame.resources.image(
+        "field_channels", *channel_size, layers=max(channel_count, 1)
+    )
     frame.clear(gbuffer["field_values"])
     frame.textures["visibility"] = visibility
     for instance_id, item, box in frame.fields_in_view():
@@ -91,7 +88,7 @@ def _render_surfaces(frame: Frame, visibility: Any) -> None:
 
 def _sample_entries(frame: Frame, samples: Frame) -> Any:
     """Return the pixel whose surface each sample shows."""
-    entries = samples.resources.image("sample_entries", *samples.size, "R32F")
+    entries = samples.image("sample_entries", "R32F")
     samples.clear(entries, "R32F")
     textures = {**frame.textures, "sample_visibility": samples.textures["visibility"]}
     images, uniforms = {"sample_entries": entries}, {"samples_per_side": frame.samples_per_side}

@@ -18,11 +18,11 @@ from ..compositor.look import is_hatched
 from ..compositor.look_units import instance_line_spacing
 from . import lookup_tables
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
-from .field_kind import FieldKind
 from .frame import Box, Frame
+from .mesh_buffers import FieldKind
 from .passes import WORKGROUP_SIZE, ComputePass
 from .resources import GpuResources
-from .uniforms import covering_uniforms, direction_uniforms, even_line_uniforms, look_uniforms
+from .uniforms import direction_uniforms, even_line_uniforms, look_uniforms
 
 #: Factor of the contrast of streaks whose noise is interpolated between pixels, which makes them a little
 #: stronger. Smooth streaks do not need it.
@@ -54,12 +54,11 @@ def render_even_lines(frame: Frame) -> None:
     The method is that of `even_lines.even_lines`. The lines that replace crowded ones are in the
     layers after the others, whether any are crowded or not. Nothing is rendered for other looks.
     """
-    image = frame.resources.image
     if not has_even_lines(frame.look):
-        frame.textures["line_image"] = image("line_image", 1, 1, "RGBA16F", 1)
+        frame.textures["line_image"] = frame.resources.image("line_image", 1, 1, "RGBA16F", 1)
         return
     line_count = max((kind.line_count for kind in frame.kinds), default=1)
-    images = {"line_image": image("line_image", *frame.size, "RGBA16F", 2 * line_count)}
+    images = {"line_image": frame.image("line_image", "RGBA16F", 2 * line_count)}
     for instance_id, item, box in frame.fields_in_view():
         uniforms = even_line_uniforms(frame.look, item, frame.camera)
         for ratio, first_layer in ((1.0, 0), (COARSE_RATIO, item.kind.line_count)):
@@ -88,11 +87,8 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
         Of the size of the frame.
     """
     look, resources = frame.look, frame.resources
-    uniforms = {
-        **covering_uniforms(kind),
-        **look_uniforms(kind, look),
-        "is_antialiased": int(frame.samples is not None),
-    }
+    is_antialiased = int(frame.samples is not None)
+    uniforms = {**look_uniforms(kind, look), "is_antialiased": is_antialiased}
     textures = _unfold(frame, kind, box)
     textures |= {
         "noise_gradients": textures["directions"],
@@ -118,16 +114,16 @@ def _streaks(
     frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
 ) -> Any:
     """Return the means along the lines of a look with ink; another texture if it needs none."""
-    image, layers = frame.resources.image, kind.line_count
+    layers = kind.line_count
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
     if not (has_streaks or uniforms["overshoot_steps"]):
         return textures["directions"]
-    means = image("line_means", *frame.size, "RGBA16F", layers)
+    means = frame.image("line_means", "RGBA16F", layers)
     images = {"line_means": means}
     _trace(frame, kind, box, ComputePass("streaks"), textures, images, uniforms, layers)
     if frame.samples is None or not has_streaks:
         return means
-    smooth = image("smooth_means", *frame.size, "RGBA16F", layers)
+    smooth = frame.image("smooth_means", "RGBA16F", layers)
     textures, images = {**textures, "line_means": means}, {"smooth_means": smooth}
     frame.run(ComputePass("smooth_streaks"), box, textures, images, uniforms, layers)
     return smooth
@@ -177,15 +173,15 @@ def _trace(
 
 def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     """Return the images of the covering: its cells, and directions without and with their gradients."""
-    image, lines = frame.resources.image, kind.line_count
+    lines = kind.line_count
     cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"
     uniforms = direction_uniforms(kind, frame.look, frame.camera)
     covering = {
-        "cells": image("cells", *frame.size, cell_format),
-        "directions": image("directions", *frame.size, "RGBA16F", lines),
+        "cells": frame.image("cells", cell_format),
+        "directions": frame.image("directions", "RGBA16F", lines),
     }
     frame.run(ComputePass("directions", (("cells", cell_format),)), box, {}, covering, uniforms)
-    gradients = {"angle_gradients": image("angle_gradients", *frame.size, "RGBA16F", lines)}
+    gradients = {"angle_gradients": frame.image("angle_gradients", "RGBA16F", lines)}
     shader = ComputePass("angle_gradient")
     frame.run(shader, box, covering, gradients, uniforms, lines, pause=0.0)
     return {**covering, **gradients}
@@ -194,7 +190,7 @@ def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
 def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
     """Return the derivatives of the noise, two channels in a layer."""
     layers = 2 if noise_args(frame.look)["channels"] > 1 else 1
-    gradients = frame.resources.image("noise_gradients", *frame.size, "RGBA16F", layers)
+    gradients = frame.image("noise_gradients", "RGBA16F", layers)
     images, uniforms = {"noise_gradients": gradients}, {"noise_layers": layers}
     frame.run(ComputePass("noise_gradients"), box, textures, images, uniforms)
     return gradients

@@ -20,7 +20,7 @@ from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
 from ..compositor.wobble import wave_table
-from .field_kind import FieldKind
+from .mesh_buffers import FieldKind
 from .resources import GpuResources
 
 #: Noise is computed for whole tiles of this side, so that a frame can grow a little.

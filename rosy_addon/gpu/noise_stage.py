@@ -57,7 +57,7 @@ def _render_wobble(frame: Frame) -> None:
     if not has_wobble(frame.look):
         frame.textures["wobble_angles"] = lookup_tables.palette(frame.resources)
         return
-    images = {"wobble_angles": frame.resources.image("wobble_angles", *frame.size)}
+    images = {"wobble_angles": frame.image("wobble_angles")}
     textures = {"wave_table": lookup_tables.waves(frame.resources)}
     for instance_id, item, box in frame.fields_in_view():
         uniforms = wobble_uniforms(frame.look, item, frame.camera)
@@ -67,7 +67,7 @@ def _render_wobble(frame: Frame) -> None:
 
 def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
     """Return noise that moves with the surfaces, as `surface_noise.surface_noise`."""
-    raw_noise = frame.resources.image("raw_noise", *frame.size)
+    raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
     shared_uniforms = surface_noise_uniforms(settings)
     names = [item.instance.surface.name for item in frame.items]
@@ -88,24 +88,24 @@ def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
 
 def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:
     """Return centered noise, without its low frequencies if `high_pass` is not 0."""
-    box, blurred = (0, 0, *frame.size), raw_noise
+    blurred = raw_noise
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)
         for index, axis in enumerate(((1, 0), (0, 1)) * 3):
-            next_blurred = frame.resources.image(f"blurred {index % 2}", *frame.size)
+            next_blurred = frame.image(f"blurred {index % 2}")
             frame.run(
                 ComputePass("box_blur"),
-                box,
+                frame.box,
                 {"source_image": blurred},
                 {"blurred_image": next_blurred},
                 {"blur_axis": axis, "radius": radius},
                 pause=0.5,
             )
             blurred = next_blurred
-    noise = frame.resources.image(name, *frame.size)
+    noise = frame.image(name)
     frame.run(
         ComputePass("center_noise"),
-        box,
+        frame.box,
         {"raw_noise": raw_noise, "blurred_noise": blurred},
         {"noise": noise},
         {"high_passed": int(high_pass > 0)},

@@ -38,10 +38,10 @@ def render_outline(frame: Frame) -> None:
         frame.textures["outline_coverage"] = _coverage(frame, frame.prepared)
         return
     coverage = _coverage(frame.samples, frame.prepared)
-    mean = frame.resources.image("outline_coverage", *frame.size, "R32F")
+    mean = frame.image("outline_coverage", "R32F")
     frame.run(
         ComputePass("outline_mean"),
-        (0, 0, *frame.size),
+        frame.box,
         {"sample_coverage": coverage},
         {"outline_coverage": mean},
         {"samples_per_side": frame.samples_per_side},
@@ -51,18 +51,10 @@ def render_outline(frame: Frame) -> None:
 
 def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
     """Return the share of each pixel, or sample, that outlines cover."""
-    look = frame.look
-    image, size = frame.resources.image, frame.size
-    crease_marks, edges = (
-        image("crease_marks", *size, "R32F"),
-        image("outline_edges", *size, "RG32F"),
-    )
+    crease_marks = frame.image("crease_marks", "R32F")
+    edges = frame.image("outline_edges", "RG32F")
     frame.clear(crease_marks, "R32F")
     frame.clear(edges, "RG32F")
-    uniforms = {
-        "supersampling": look.supersampling,
-        "min_normal_cosine": min_normal_cosine(look),
-    }
     for instance_id, item, box in frame.fields_in_view():
         found = prepared["outline", instance_id]
         if found.crease_count:
@@ -71,29 +63,24 @@ def _coverage(frame: Frame, prepared: dict[Hashable, Any]) -> Any:
             "crease_marks": crease_marks,
             "triangle_parts": found.triangle_parts or frame.textures["visibility"],
         }
-        flags = {
+        uniforms = {
+            "min_normal_cosine": min_normal_cosine(frame.look),
             "has_creases": int(found.crease_count > 0),
             "has_parts": int(found.triangle_parts is not None),
         }
-        frame.run_on_instance(
-            ComputePass("outline_edges"),
-            instance_id,
-            box,
-            textures,
-            {"outline_edges": edges},
-            {**uniforms, **flags},
-        )
-    width, height = (side // look.supersampling for side in size)
+        images, shader = {"outline_edges": edges}, ComputePass("outline_edges")
+        frame.run_on_instance(shader, instance_id, box, textures, images, uniforms)
+    width, height = (side // frame.look.supersampling for side in frame.size)
     images = {
-        "outline_blocks": image("outline_blocks", width, height, "R32F"),
-        "outline_widths": image("outline_widths", *size, "R32F"),
-        "outline_coverage": image("outline_coverage", *size, "R32F"),
+        "outline_blocks": frame.resources.image("outline_blocks", width, height, "R32F"),
+        "outline_widths": frame.image("outline_widths", "R32F"),
+        "outline_coverage": frame.image("outline_coverage", "R32F"),
     }
     textures = {**images, "outline_edges": edges}
     blocks = 0, 0, width, height
-    frame.run(ComputePass("outline_blocks"), blocks, textures, images, uniforms, pause=0.5)
-    frame.run(ComputePass("outline_widths"), blocks, textures, images, uniforms)
-    frame.run(ComputePass("outline_coverage"), (0, 0, *size), textures, images, uniforms)
+    frame.run(ComputePass("outline_blocks"), blocks, textures, images, {}, pause=0.5)
+    frame.run(ComputePass("outline_widths"), blocks, textures, images, {})
+    frame.run(ComputePass("outline_coverage"), frame.box, textures, images, {})
     return images["outline_coverage"]
 
 

@@ -188,7 +188,7 @@ class GpuRenderer:
         blend = partial(
             frame.run,
             ComputePass("blend_samples"),
-            (0, 0, *frame.size),
+            frame.box,
             {"shaded_picture": texture},
             {"picture": picture},
             {"samples_per_side": frame.samples_per_side},

@@ -19,9 +19,10 @@ from ..projection.rest_coordinates import matrix_scale
 from ..projection.surface_lines import rest_matrix
 from ..worker.job import Call, run
 from .device import Device
-from .field_kind import FieldKind, field_kinds
 from .mesh_buffers import (
+    FieldKind,
     MeshBuffers,
+    field_kinds,
     mesh_buffers,
     mip_atlas,
     split_matrix,

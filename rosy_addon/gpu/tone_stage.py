@@ -22,7 +22,7 @@ def render_target_tones(frame: Frame) -> None:
     numbers are colored, their places in the color map are in the last component, or -1.
     """
     look, reference = frame.look, frame.reference
-    tones = frame.resources.image("tones", *frame.size)
+    tones = frame.image("tones")
     low, scale = value_scale(look, [item.mesh.buffers.value_range for item in frame.items])
     shared_uniforms = {
         **tone_uniforms(look, frame.camera, reference),
@@ -57,7 +57,7 @@ def _lighting(frame: Frame) -> Any:
     """Return the light of all light sources together, as `shading.diffuse` at full strength."""
     boxes = [screen_box(item, frame.camera) for item in frame.items if item.kind is not None]
     box = union_box(boxes)
-    images = [frame.resources.image(f"lighting {index}", *frame.size) for index in range(2)]
+    images = [frame.image(f"lighting {index}") for index in range(2)]
     lights = [] if is_empty(box) else light_uniforms(frame.look, frame.lights)
     for index, light in enumerate(lights):
         is_shadowed = frame.look.shadows and light["light_kind"] != HEADLIGHT
@@ -77,11 +77,10 @@ def _shadow_visibility(frame: Frame, light: dict[str, Any], box: Box) -> Any:
     """Return the share of a light that reaches each pixel, as `shadow_maps.shadow_visibility`."""
     kind = "sun" if light["light_kind"] == SUN_LIGHT else "point"
     vector = np.array(light["light_vector"][:3])
-    image = frame.resources.image
-    images = [image(f"shadow visibility {index}", *frame.size, "RGBA16F") for index in range(2)]
+    images = [frame.image(f"shadow visibility {index}", "RGBA16F") for index in range(2)]
     instances = [item.instance for item in frame.items]
     for index, light_view in enumerate(light_cameras(instances, frame.camera, kind, vector)):
-        shadow_map = image("shadow_map", light_view.width, light_view.height)
+        shadow_map = frame.resources.image("shadow_map", light_view.width, light_view.height)
         batches = [(item.mesh.batch, shadow_uniforms(item, light_view)) for item in frame.items]
         frame.draw(RasterPass("shadow_map"), batches, shadow_map)
         frame.run(

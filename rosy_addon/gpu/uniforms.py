@@ -60,7 +60,7 @@ from .defines import (
     POINT_LIGHT,
     SUN_LIGHT,
 )
-from .field_kind import FieldKind
+from .mesh_buffers import FieldKind
 from .resources import DrawItem
 
 #: Planes that clip nothing.
@@ -109,6 +109,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
     statistics = look_streak_statistics(look) if is_hatched(look) else None
     return {
+        **covering_uniforms(kind),
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, look),
         "half_length": 0 if has_even_lines(look) else look.length,

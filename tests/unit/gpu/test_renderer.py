@@ -31,9 +31,8 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.gpu import lic_stage, mesh_buffers, passes, preparation, resources, uniforms
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
-from rosy_addon.gpu.field_kind import field_kinds
 from rosy_addon.gpu.frame import is_empty, screen_box, union_box
-from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, split_matrix
+from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, field_kinds, split_matrix
 from rosy_addon.gpu.mesh_buffers import mesh_buffers as build_mesh_buffers
 from rosy_addon.gpu.preparation import prepare_steps
 from rosy_addon.gpu.renderer import GpuRenderer

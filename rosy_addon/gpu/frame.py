@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compositor.look import Look
-from ..compositor.shading import Light
-from ..compositor.target_tone import ReferenceRender
 from ..projection.camera import Camera
+from ..rendering.view_input import ViewInput
 from .mesh_buffers import MAX_TRIANGLES, FieldKind
 from .passes import ComputePass, RasterPass
 from .resources import DrawItem, GpuResources
@@ -57,13 +56,11 @@ class Frame:
     resources : GpuResources
         The device, and what stays on it.
     items : sequence of DrawItem
+    view : ViewInput
     camera : Camera
         Of the pixels of the frame: those of the picture, or its samples.
     look : Look
         Its lengths are in these pixels. Its supersampling is their number in one of the picture, along a side.
-    lights : sequence of Light
-    reference : ReferenceRender or None
-    clip_planes : (6, 4) ndarray
     samples : Frame or None
         The samples of the pixels, if these have several. The pixels are shaded once.
     textures : dict of str to texture
@@ -76,11 +73,9 @@ class Frame:
 
     resources: GpuResources
     items: Sequence[DrawItem]
+    view: ViewInput
     camera: Camera
     look: Look
-    lights: Sequence[Light]
-    reference: ReferenceRender | None
-    clip_planes: np.ndarray
     samples: Frame | None = None
     textures: dict[str, Any] = field(default_factory=dict)
     prepared: dict[Hashable, Any] = field(default_factory=dict)

@@ -9,7 +9,7 @@ import numpy as np
 from ..compositor.hatching import has_outline
 from .frame import Frame
 from .passes import ComputePass, RasterPass
-from .uniforms import NO_CLIP_PLANES, clip_uniforms
+from .uniforms import clip_uniforms
 
 
 def render_gbuffer(frame: Frame) -> None:
@@ -38,12 +38,13 @@ def _visibility(frame: Frame) -> Any:
             item.mesh.batch,
             {
                 "first_triangle_id": first_triangle_id,
-                **clip_uniforms(item, frame.camera, frame.clip_planes),
+                **clip_uniforms(item, frame.camera, frame.view.clip_planes),
             },
         )
         for first_triangle_id, item in zip(frame.first_triangle_ids, frame.items, strict=True)
     ]
-    is_clipped = not np.array_equal(frame.clip_planes, NO_CLIP_PLANES)
+    # The planes take a third of the time.
+    is_clipped = frame.view.clip_planes is not None
     shader = RasterPass("visibility_clipped" if is_clipped else "visibility")
     visibility = frame.image("visibility", "R32F")
     frame.draw(shader, batches, visibility)

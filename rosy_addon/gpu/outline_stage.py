@@ -95,7 +95,7 @@ def _mark_creases(
         {"crease_points": found.crease_points},
         {"crease_marks": crease_marks},
         {
-            **clip_uniforms(item, frame.camera, frame.clip_planes),
+            **clip_uniforms(item, frame.camera, frame.view.clip_planes),
             **frame.instance_uniforms(instance_id),
             "crease_count": found.crease_count,
         },

@@ -39,7 +39,7 @@ from .passes import ComputePass, all_passes
 from .preparation import compile_lookups, prepare_steps
 from .resources import DrawItem, GpuResources
 from .tone_stage import render_target_tones
-from .uniforms import NO_CLIP_PLANES, clip_uniforms
+from .uniforms import clip_uniforms
 
 #: How much closer to the eye than the surface its picture is drawn, in normalized depth.
 COMPOSITE_DEPTH_BIAS = 2e-5
@@ -198,9 +198,7 @@ class GpuRenderer:
     def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
         """Return the frame of the pixels, and of their samples, if these are several."""
         look = look_in_pixels(view.look, view.sample_camera, [item.instance for item in items])
-        clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
-        lights, reference = view.lights, view.reference
-        frame = Frame(self.resources, items, view.camera, look, lights, reference, clip_planes)
+        frame = Frame(self.resources, items, view, view.camera, look)
         if look.supersampling == 1:
             return frame
         fine_look = supersampled_look(look)
@@ -211,9 +209,8 @@ class GpuRenderer:
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
     ) -> None:
         """As `ViewportRenderer.composite`: the surfaces are drawn with the picture on them."""
-        clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
         batches = [
-            (item.mesh.batch, clip_uniforms(item, view.camera, clip_planes))
+            (item.mesh.batch, clip_uniforms(item, view.camera, view.clip_planes))
             for item in items
             if item.kind is not None
         ]

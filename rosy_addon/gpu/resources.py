@@ -162,16 +162,6 @@ class GpuResources:
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
 
-    @property
-    def meshes(self) -> list[GpuMesh]:
-        """The meshes on the device."""
-        return list(self._meshes.values())
-
-    @property
-    def count(self) -> int:
-        """The number of meshes, images and textures on the device."""
-        return len(self._meshes) + len(self._images) + len(self._lookup_textures)
-
     def release(self) -> None:
         """Free all resources."""
         for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):

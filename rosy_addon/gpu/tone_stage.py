@@ -21,7 +21,7 @@ def render_target_tones(frame: Frame) -> None:
     The method is that of `target_tone.target_tone`. The light alone is in the texture ``lighting``. If
     numbers are colored, their places in the color map are in the last component, or -1.
     """
-    look, reference = frame.look, frame.reference
+    look, reference = frame.look, frame.view.reference
     tones = frame.image("tones")
     low, scale = value_scale(look, [item.mesh.buffers.value_range for item in frame.items])
     shared_uniforms = {
@@ -58,7 +58,7 @@ def _lighting(frame: Frame) -> Any:
     boxes = [screen_box(item, frame.camera) for item in frame.items if item.kind is not None]
     box = union_box(boxes)
     images = [frame.image(f"lighting {index}") for index in range(2)]
-    lights = [] if is_empty(box) else light_uniforms(frame.look, frame.lights)
+    lights = [] if is_empty(box) else light_uniforms(frame.look, frame.view.lights)
     for index, light in enumerate(lights):
         is_shadowed = frame.look.shadows and light["light_kind"] != HEADLIGHT
         textures = {

@@ -26,6 +26,7 @@ from ..compositor.hatching import (
     has_breaks,
     has_overshoot,
     has_paper_grain,
+    overshoot_steps,
 )
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
@@ -73,11 +74,12 @@ def matrix_rows(name: str, labels: Iterable[Any], rows: np.ndarray) -> dict[str,
 
 
 def clip_uniforms(
-    item: DrawItem, camera: Camera, clip_planes: np.ndarray
+    item: DrawItem, camera: Camera, clip_planes: np.ndarray | None
 ) -> dict[str, tuple[float, ...]]:
     """Return the rows of the model-to-clip matrix, and the clip planes in model space."""
     clip = camera.projection @ camera.view @ item.model_matrix
-    object_planes = np.asarray(clip_planes) @ item.model_matrix
+    planes = NO_CLIP_PLANES if clip_planes is None else np.asarray(clip_planes)
+    object_planes = planes @ item.model_matrix
     return matrix_rows("clip", "xyzw", clip) | matrix_rows("plane", range(6), object_planes)
 
 
@@ -131,7 +133,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "softness": softness(look.crispness),
         "streak_std": statistics.std if statistics else 1.0,
         "break_steps": break_steps(look) if has_breaks(look) else 0,
-        "overshoot_steps": max(round(look.overshoot / look.step), 1) if has_overshoot(look) else 0,
+        "overshoot_steps": overshoot_steps(look) if has_overshoot(look) else 0,
         "break_samples": full_sample_count(replace(look, length=break_steps(look))),
         "break_std": statistics.break_std if statistics else 1.0,
         "disc_std": statistics.disc_std if statistics else 1.0,

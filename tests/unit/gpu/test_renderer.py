@@ -1393,7 +1393,7 @@ def test_even_lines_stay_on_the_card(device):
     for distance in (4.0, 4.0, 4.5, 5.0, 6.0, 7.0):
         items = card.upload([instance], "smooth")
         render_texture(card, items, view(distance=distance), EVEN_LINES)
-    (mesh,) = card.resources.meshes
+    (mesh,) = card.resources._meshes.values()
     assert len(mesh.line_textures) == 2 * 3
     textures = list(mesh.line_textures.values())
     render_texture(card, items, view(distance=7.0, azimuth=1.0), EVEN_LINES)
@@ -1541,9 +1541,10 @@ def test_meshes_stay_on_the_card(device):
     assert sheared.mesh is not first.mesh
     for _ in range(resources.MESH_LIFETIME_UPLOADS + 1):
         card.upload([moved], "smooth")
-    assert [mesh.buffers for mesh in card.resources.meshes] == [first.mesh.buffers]
+    assert [mesh.buffers for mesh in card.resources._meshes.values()] == [first.mesh.buffers]
     card.release()
-    assert not card.resources.count
+    held = card.resources
+    assert not (held._meshes or held._images or held._lookup_textures)
 
 
 def test_nothing_is_compiled_or_sent_after_the_preparation(device):
@@ -1551,7 +1552,7 @@ def test_nothing_is_compiled_or_sent_after_the_preparation(device):
     instance = ball(4)
     labels = [step.label for step in card.prepare_steps([instance], "smooth")]
     assert any("preparing the mesh" in label for label in labels)
-    (mesh,) = card.resources.meshes
+    (mesh,) = card.resources._meshes.values()
     prepared = {shader for shader in passes.all_passes() if not shader.switches}
     assert set(device._programs) >= prepared
     items = card.upload([instance], "smooth")

@@ -63,26 +63,27 @@ def read_source(*files: str) -> Source:
     """Return source files, one after the other."""
     text = "".join(map(_with_includes, files))
     # By name, as several files may declare what they use together.
-    declared = {
-        name + "[]" * kind.endswith("Array"): (storage, kind.removesuffix("Array"), texel_format)
-        for texel_format, storage, kind, names in _DECLARATION.findall(text)
-        for name in names.split(", ")
-    }
-    uniforms = {
-        name: (kind, texel_format)
-        for name, (storage, kind, texel_format) in declared.items()
-        if storage == "uniform"
-    }
+    textures: dict[str, str] = {}
+    images: dict[str, str] = {}
+    uniforms: dict[str, str] = {}
+    outputs: dict[str, str] = {}
+    for texel_format, storage, kind, names in _DECLARATION.findall(text):
+        array = "[]" * kind.endswith("Array")
+        for name in names.split(", "):
+            if storage == "out":
+                outputs[name] = kind
+            elif kind.startswith("sampler2D"):
+                textures[name + array] = kind
+            elif kind.startswith("image2D"):
+                images[name + array] = texel_format.upper()
+            elif storage == "uniform":
+                uniforms[name] = kind
     return Source(
         _DECLARATION.sub("", _CONSTANTS.sub("", text)),
-        tuple(name for name, (kind, _) in uniforms.items() if kind == "sampler2D"),
-        {name: form.upper() for name, (kind, form) in uniforms.items() if kind == "image2D"},
-        tuple(
-            (name, kind)
-            for name, (kind, _) in uniforms.items()
-            if kind not in ("sampler2D", "image2D")
-        ),
-        tuple((name, kind) for name, (storage, kind, _) in declared.items() if storage == "out"),
+        tuple(textures),
+        images,
+        tuple(uniforms.items()),
+        tuple(outputs.items()),
         tuple(name for names in _CONSTANTS.findall(text) for name in names.split(", ")),
     )
 

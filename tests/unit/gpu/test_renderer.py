@@ -332,6 +332,12 @@ def base_names(names):
 
 
 @pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
+def test_all_declarations_are_read(shader):
+    left = r"^\s*(?:uniform|in|out|layout|#include|#pragma)\b.*"
+    assert not re.findall(left, own_source(shader), flags=re.M)
+
+
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_sources_use_all_listed_names(shader):
     words = names_in(own_source(shader))
     listed = base_names(shader.textures) | {name for name, _ in shader.uniforms}

@@ -70,7 +70,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="folder with the meshes of bunny and vase")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
     rosy = rooms()
-    device = module_of(rosy.package, "gpu.device").BlenderDevice()
+    device = module_of(rosy.package, "gpu.device").Device()
     lines = []
     for line in table_lines(rosy, rosy.GpuRenderer(device), options.size, options.data):
         print(line, flush=True)

@@ -25,8 +25,7 @@ from .cache import Cache, content_hash
 from .compositor.look import Look, has_flow
 from .errors import RosyError
 from .file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
-from .gpu.image_steps import image_steps
-from .gpu.select import select_device
+from .gpu.select import image_steps, select_device
 from .projection.camera import Camera
 from .rendering.marks import sequence_key
 from .rendering.view_input import ViewInput

@@ -11,8 +11,7 @@ from .cache import BAKE_CACHE
 from .compositor.ink_thresholds import unlit_look
 from .compositor.look import Look, is_hatched
 from .compositor.picture_key import picture_key
-from .gpu.image_steps import image_steps
-from .gpu.select import select_device
+from .gpu.select import image_steps, select_device
 from .scene.backdrop import update_backdrops
 from .scene.bake_records import DrawnFrom
 from .scene.cameras import CameraSource, render_camera

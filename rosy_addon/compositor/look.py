@@ -89,10 +89,9 @@ class Look:
     Lengths are in pixels of the finished picture or, with the unit "world", in multiples of
     `unit_size` Blender units.
 
-    To add a setting that both renderers draw with, edit four files: add a field here, use it in
-    this package, add its name to `LIC_SETTINGS` or `TONE_SETTINGS` in `gpu/passes.py`, and use the
-    uniform of that name in the shader. All else is derived from the field; see
-    `rosy_addon.settings`.
+    To add a setting that both renderers draw with, edit three files: add a field here, use it in
+    this package, and declare and use the uniform of that name in the shader. All else is derived
+    from the field; see `rosy_addon.settings`.
 
     Raises
     ------

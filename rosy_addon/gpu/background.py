@@ -1,12 +1,45 @@
-"""A color behind everything in a 3D view."""
+"""What is drawn into a 3D view: pictures over its surfaces, and a color behind everything."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..rendering.view_input import Background
 from .device import Device
-from .passes import BACKGROUND
+from .passes import RasterPass
+
+
+def draw_texture(
+    device: Device,
+    texture: Any,
+    batches: Sequence[tuple[Any, dict[str, Any]]],
+    opacity: float,
+    depth_bias: float = 0.0,
+) -> None:
+    """Draw a picture over the 3D view that is being drawn.
+
+    Parameters
+    ----------
+    device : Device
+    texture : texture
+        Of any size: it fills the view.
+    batches : sequence of (batch, dict)
+        Where the picture is drawn, with the uniforms of `uniforms.clip_uniforms`.
+    opacity : float
+    depth_bias : float
+        How much closer to the eye, in normalized depth.
+    """
+    left, bottom, width, height = device.viewport()
+    uniforms = {
+        "depth_bias": depth_bias,
+        "view_origin": (float(left), float(bottom)),
+        "pixel_scale": (texture.width / width, texture.height / height),
+        "opacity": opacity,
+    }
+    device.draw_to_view(RasterPass("composite"), batches, {"picture": texture}, uniforms)
 
 
 def draw_background(device: Device, background: Background) -> None:
@@ -18,4 +51,4 @@ def draw_background(device: Device, background: Background) -> None:
         "low_corner": background.low_corner,
         "high_corner": background.high_corner,
     }
-    device.draw_to_view(BACKGROUND, [(device.batch(vertices), {})], {}, uniforms)
+    device.draw_to_view(RasterPass("background"), [(device.batch(vertices), {})], {}, uniforms)

@@ -14,10 +14,11 @@ from ..projection.gbuffer import MeshInstance
 from ..rendering.draw import bake_picture
 from ..rendering.view_input import Background, ViewInput
 from ..worker.job import Call, Steps
-from .background import draw_background
+from .background import draw_background, draw_texture
 from .device import Device
-from .passes import BACKGROUND, COMPOSITE
+from .passes import RasterPass
 from .preparation import compile_lookups, prepare_steps
+from .uniforms import NO_CLIP_PLANES, matrix_rows
 
 
 class CpuViewportRenderer:
@@ -45,11 +46,16 @@ class CpuViewportRenderer:
         vertices = np.zeros((6, 4), dtype=np.float32)
         vertices[:, :2] = [(-1, -1), (1, -1), (1, 1), (-1, -1), (1, 1), (-1, 1)]
         vertices[:, 2] = -0.9999
-        self._fullscreen_batch = device.batch(vertices)
+        uniforms = {
+            **matrix_rows("clip", "xyzw", np.eye(4)),
+            **matrix_rows("plane", range(6), NO_CLIP_PLANES),
+        }
+        self._fullscreen_batch = device.batch(vertices), uniforms
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """As `ViewportRenderer.prepare_steps`."""
-        return prepare_steps(compile_lookups(self._device, (COMPOSITE, BACKGROUND)))
+        shaders = RasterPass("composite"), RasterPass("background")
+        return prepare_steps(compile_lookups(self._device, shaders))
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[MeshInstance]:
         """As `ViewportRenderer.upload`."""
@@ -76,18 +82,7 @@ class CpuViewportRenderer:
         """As `ViewportRenderer.composite`: the texture fills the view."""
         if texture is None:
             return
-        left, bottom, width, height = self._device.viewport()
-        uniforms = {
-            **{f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", np.eye(4), strict=True)},
-            **{f"plane{number}": (0.0, 0.0, 0.0, 1.0) for number in range(6)},
-            "depth_bias": 0.0,
-            "view_origin": (float(left), float(bottom)),
-            "pixel_scale": (texture.width / width, texture.height / height),
-            "opacity": opacity,
-        }
-        self._device.draw_to_view(
-            COMPOSITE, [(self._fullscreen_batch, {})], {"picture": texture}, uniforms
-        )
+        draw_texture(self._device, texture, [self._fullscreen_batch], opacity)
 
     def draw_background(self, background: Background) -> None:
         """As `ViewportRenderer.draw_background`."""

@@ -1,13 +1,13 @@
 """A thin layer over Blender's `gpu` module: textures, batches and shader runs.
 
-Tests and benchmarks implement the protocol `Device` without Blender.
+Tests and benchmarks have a device with the same methods without Blender.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -23,79 +23,13 @@ UNIFORM_BLOCK = "rosy_constants"
 UNIFORM_WORDS = {"vec4": 4, "vec2": 2, "ivec2": 2, "float": 1, "int": 1}
 
 
-class Device(Protocol):
-    """A graphics device. Textures and batches are opaque handles.
+class Device:
+    """Blender's graphics context. Textures and batches are opaque handles.
 
     Attributes
     ----------
     max_texture_size : int
         Maximum side of a texture, in texels.
-    """
-
-    max_texture_size: int
-
-    def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
-        """Return whether a shader is compiled. Those that are not are compiled when they are used."""
-
-    def compile(self, shader: ComputePass | RasterPass) -> None:
-        """Compile a shader. If the driver rejects it, that is an error only when it is used."""
-
-    def texture(
-        self,
-        width: int,
-        height: int,
-        texel_format: str,
-        layers: int = 0,
-        data: np.ndarray | None = None,
-    ) -> Any:
-        """Return a texture of ``RGBA32F`` or ``RGBA16F``, an array if it has layers.
-
-        `data` is its (height, width, 4) float32 contents.
-        """
-
-    def depth_texture(self, width: int, height: int) -> Any:
-        """Return a depth buffer."""
-
-    def batch(self, vertices: np.ndarray) -> Any:
-        """Return a vertex buffer of triangles from (3 T, 4) float32 corners."""
-
-    def compute(
-        self,
-        shader: ComputePass,
-        size: Sequence[int],
-        textures: NamedValues,
-        images: NamedValues,
-        uniforms: NamedValues,
-    ) -> None:
-        """Run a compute shader over width, height and, optionally, layers."""
-
-    def draw(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        target: tuple[Any, Any],
-        uniforms: NamedValues,
-    ) -> None:
-        """Draw batches, each with its own uniforms, into a color and a depth texture."""
-
-    def draw_to_view(
-        self,
-        shader: RasterPass,
-        batches: Sequence[tuple[Any, NamedValues]],
-        textures: NamedValues,
-        uniforms: NamedValues,
-    ) -> None:
-        """Draw batches into the current view, with its depth test."""
-
-    def viewport(self) -> tuple[int, int, int, int]:
-        """Return left, bottom, width and height of the current view in its frame buffer."""
-
-    def read(self, texture: Any, width: int, height: int) -> np.ndarray:
-        """Return the (height, width, 4) float32 contents of a texture."""
-
-
-class BlenderDevice:
-    """Blender's graphics context.
 
     Raises
     ------
@@ -112,15 +46,15 @@ class BlenderDevice:
                 "later"
             )
         self._gpu = gpu
-        self._shaders: dict[Hashable, Any] = {}
+        self._shaders: dict[ComputePass | RasterPass, Any] = {}
         self.max_texture_size: int = gpu.capabilities.max_texture_size_get()
 
     def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
-        """As `Device.is_compiled`."""
-        return shader.key in self._shaders
+        """Return whether a shader is compiled. Those that are not are compiled when they are used."""
+        return shader in self._shaders
 
     def compile(self, shader: ComputePass | RasterPass) -> None:
-        """As `Device.compile`."""
+        """Compile a shader. If the driver rejects it, that is an error only when it is used."""
         with suppress(DeviceError):
             self._program(shader)
 
@@ -132,7 +66,10 @@ class BlenderDevice:
         layers: int = 0,
         data: np.ndarray | None = None,
     ) -> Any:
-        """As `Device.texture`."""
+        """Return a texture, an array if it has layers.
+
+        `data` is its (height, width, 4) float32 contents.
+        """
         options = {}
         if data is not None:
             flat = np.ascontiguousarray(data, dtype=np.float32).reshape(-1)
@@ -141,12 +78,8 @@ class BlenderDevice:
             (width, height), layers=layers, format=texel_format, **options
         )
 
-    def depth_texture(self, width: int, height: int) -> Any:
-        """As `Device.depth_texture`."""
-        return self._gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
-
     def batch(self, vertices: np.ndarray) -> Any:
-        """As `Device.batch`."""
+        """Return a vertex buffer of triangles from (3 T, 4) float32 corners."""
         layout = self._gpu.types.GPUVertFormat()
         layout.attr_add(id="vertex_data", comp_type="F32", len=4, fetch_mode="FLOAT")
         buffer = self._gpu.types.GPUVertBuf(layout, len(vertices))
@@ -161,7 +94,10 @@ class BlenderDevice:
         images: NamedValues,
         uniforms: NamedValues,
     ) -> None:
-        """As `Device.compute`."""
+        """Run a compute shader over width, height and, optionally, layers.
+
+        It has the constants of its switches; see `ComputePass.variant`.
+        """
         program, _block = self._bind(shader, textures, uniforms)
         for name, _ in shader.images:
             program.image(_base_name(name), images[_base_name(name)])
@@ -173,11 +109,11 @@ class BlenderDevice:
         self,
         shader: RasterPass,
         batches: Sequence[tuple[Any, NamedValues]],
-        target: tuple[Any, Any],
-        uniforms: NamedValues,
+        color: Any,
+        depth: Any,
     ) -> None:
-        """As `Device.draw`."""
-        state, (color, depth) = self._gpu.state, target
+        """Draw batches, each with its own uniforms, into a color and a depth texture."""
+        state = self._gpu.state
         framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
         saved_state = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         with framebuffer.bind():
@@ -189,7 +125,7 @@ class BlenderDevice:
                 # Front faces first: cards skip what is hidden behind them.
                 for culled in ("BACK", "FRONT"):
                     state.face_culling_set(culled)
-                    self._draw_batches(shader, batches, {}, uniforms)
+                    self._draw_batches(shader, batches, {}, {})
             finally:
                 state.face_culling_set("NONE")
                 state.depth_test_set(saved_state[0])
@@ -203,7 +139,7 @@ class BlenderDevice:
         textures: NamedValues,
         uniforms: NamedValues,
     ) -> None:
-        """As `Device.draw_to_view`."""
+        """Draw batches into the current view, with its depth test."""
         state = self._gpu.state
         state.depth_test_set("LESS_EQUAL")
         # With depth writes, the picture is drawn once where surfaces overlap.
@@ -217,7 +153,7 @@ class BlenderDevice:
             state.depth_test_set("NONE")
 
     def viewport(self) -> tuple[int, int, int, int]:
-        """As `Device.viewport`."""
+        """Return left, bottom, width and height of the current view in its frame buffer."""
         return tuple(self._gpu.state.viewport_get())
 
     def _draw_batches(
@@ -232,15 +168,13 @@ class BlenderDevice:
             batch.draw(program)
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
-        """As `Device.read`."""
+        """Return the (height, width, 4) float32 contents of a texture."""
         return np.asarray(texture.read(), dtype=np.float32).reshape(height, width, 4)
 
     def _bind(
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> tuple[Any, Any]:
         """Return the bound program and its uniform block, which must outlive the run."""
-        if isinstance(shader, ComputePass):
-            shader = shader.variant(uniforms)
         program = self._program(shader)
         program.bind()
         for name in shader.textures:
@@ -258,16 +192,14 @@ class BlenderDevice:
         DeviceError
             If the driver rejects it.
         """
-        if shader.key not in self._shaders:
+        if shader not in self._shaders:
             try:
-                self._shaders[shader.key] = self._gpu.shader.create_from_info(
-                    self._shader_info(shader)
-                )
+                self._shaders[shader] = self._gpu.shader.create_from_info(self._shader_info(shader))
             except Exception as error:
                 raise DeviceError(
                     f"the graphics driver cannot compile the shader '{shader.name}': {error}"
                 ) from error
-        return self._shaders[shader.key]
+        return self._shaders[shader]
 
     def _shader_info(self, shader: ComputePass | RasterPass) -> Any:
         info = self._gpu.types.GPUShaderCreateInfo()
@@ -297,10 +229,10 @@ class BlenderDevice:
         return info
 
 
-_device: BlenderDevice | None = None
+_device: Device | None = None
 
 
-def blender_device() -> BlenderDevice:
+def blender_device() -> Device:
     """Return the device. It is created once, and its shaders are compiled once.
 
     Raises
@@ -310,7 +242,7 @@ def blender_device() -> BlenderDevice:
     """
     global _device
     if _device is None:
-        _device = BlenderDevice()
+        _device = Device()
     return _device
 
 

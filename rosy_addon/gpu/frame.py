@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import accumulate
@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compositor.look import Look
-from ..compositor.shading import Light
-from ..compositor.target_tone import ReferenceRender
 from ..projection.camera import Camera
-from .field_kind import FieldKind
-from .mesh_buffers import MAX_TRIANGLES
-from .passes import ComputePass, RasterPass, clear_pass
+from ..rendering.view_input import ViewInput
+from .mesh_buffers import MAX_TRIANGLES, FieldKind
+from .passes import ComputePass, RasterPass
 from .resources import DrawItem, GpuResources
-from .screen_box import Box, box_size, is_empty, screen_box, union_box
 from .uniforms import camera_uniforms, instance_uniforms
+
+#: Left, bottom, right and top, in pixels; right and top are exclusive.
+Box = tuple[int, int, int, int]
 
 #: The smallest id in the id buffer. Ids are the bits of floats, which are then neither 0 nor subnormal.
 FIRST_TRIANGLE_ID = 0x00800000
@@ -56,13 +56,11 @@ class Frame:
     resources : GpuResources
         The device, and what stays on it.
     items : sequence of DrawItem
+    view : ViewInput
     camera : Camera
         Of the pixels of the frame: those of the picture, or its samples.
     look : Look
         Its lengths are in these pixels. Its supersampling is their number in one of the picture, along a side.
-    lights : sequence of Light
-    reference : ReferenceRender or None
-    clip_planes : (6, 4) ndarray
     samples : Frame or None
         The samples of the pixels, if these have several. The pixels are shaded once.
     textures : dict of str to texture
@@ -75,11 +73,9 @@ class Frame:
 
     resources: GpuResources
     items: Sequence[DrawItem]
+    view: ViewInput
     camera: Camera
     look: Look
-    lights: Sequence[Light]
-    reference: ReferenceRender | None
-    clip_planes: np.ndarray
     samples: Frame | None = None
     textures: dict[str, Any] = field(default_factory=dict)
     prepared: dict[Hashable, Any] = field(default_factory=dict)
@@ -91,6 +87,11 @@ class Frame:
         return self.camera.width, self.camera.height
 
     @property
+    def box(self) -> Box:
+        """The box of all pixels."""
+        return 0, 0, *self.size
+
+    @property
     def samples_per_side(self) -> int:
         """Samples along each side of a pixel."""
         return 1 if self.samples is None else self.samples.look.supersampling
@@ -98,7 +99,7 @@ class Frame:
     @cached_property
     def first_triangle_ids(self) -> list[int]:
         """The id of the first triangle of each item in the id buffer; those that only occlude are last."""
-        order = sorted(range(len(self.items)), key=lambda index: self.items[index].field is None)
+        order = sorted(range(len(self.items)), key=lambda index: self.items[index].kind is None)
         counts = [self.items[index].mesh.buffers.triangle_count for index in order]
         # Shaders round the ids of meshes with more triangles than `MAX_TRIANGLES`.
         spans = [count + count // MAX_TRIANGLES for count in counts]
@@ -109,13 +110,21 @@ class Frame:
     def occluder_id(self) -> int:
         """The first id of triangles without a field, which only occlude. All others are before."""
         ids = zip(self.first_triangle_ids, self.items, strict=True)
-        return min((first_id for first_id, item in ids if item.field is None), default=STOP_ID)
+        return min((first_id for first_id, item in ids if item.kind is None), default=STOP_ID)
 
     @property
     def kinds(self) -> list[FieldKind]:
         """The kinds of the fields, by degree."""
         kinds = {item.kind for item in self.items} - {None}
         return sorted(kinds, key=lambda kind: kind.degree)
+
+    @cached_property
+    def _shared_uniforms(self) -> dict[str, Any]:
+        return {**vars(self.look), **camera_uniforms(self.camera)}
+
+    def image(self, name: str, texel_format: str = "RGBA32F", layers: int = 0) -> Any:
+        """Return the image of a name, of the size of the frame; see `GpuResources.image`."""
+        return self.resources.image(name, *self.size, texel_format, layers)
 
     def box_of_kind(self, kind: FieldKind) -> Box:
         """Return the box of all instances whose fields are of a kind."""
@@ -128,7 +137,7 @@ class Frame:
         boxes = [
             (instance_id, item, screen_box(item, self.camera))
             for instance_id, item in enumerate(self.items)
-            if item.field is not None
+            if item.kind is not None
         ]
         return [entry for entry in boxes if not is_empty(entry[2])]
 
@@ -143,12 +152,13 @@ class Frame:
         shader: ComputePass,
         instance_id: int,
         box: Box,
+        textures: dict[str, Any],
         images: dict[str, Any],
         uniforms: dict[str, Any],
     ) -> None:
-        """Add a compute pass over the pixels of one instance.
+        """Add a compute pass over the pixels of one instance; see `run`.
 
-        The pass can read all ``textures`` and the triangle records of the instance.
+        The pass can also read the triangle records of the instance.
 
         Parameters
         ----------
@@ -156,34 +166,23 @@ class Frame:
         instance_id : int
             Index into ``items``.
         box : Box
-        images : dict of str to texture
-            Images that the pass writes.
+        textures, images : dict of str to texture
         uniforms : dict
-            In addition to those of the camera and the instance.
+            In addition to those of the instance.
         """
-        item = self.items[instance_id]
-        self.run(
-            shader,
-            box,
-            {**self.textures, "triangle_records": item.mesh.records_texture},
-            images,
-            {
-                **self.instance_uniforms(instance_id),
-                **uniforms,
-            },
-        )
+        records = {"triangle_records": self.items[instance_id].mesh.records_texture}
+        uniforms = {**self.instance_uniforms(instance_id), **uniforms}
+        self.run(shader, box, {**records, **textures}, images, uniforms)
 
     def instance_uniforms(self, instance_id: int) -> dict[str, Any]:
-        """Return the uniforms of the camera and of one instance."""
+        """Return the uniforms of one instance."""
         first_triangle_id, item = self.first_triangle_ids[instance_id], self.items[instance_id]
-        return {
-            **camera_uniforms(self.camera),
-            **instance_uniforms(instance_id, first_triangle_id, item, self.camera),
-        }
+        return instance_uniforms(instance_id, first_triangle_id, item, self.camera)
 
-    def clear(self, image: Any, texel_format: str = "RGBA32F") -> None:
-        """Set an image of the size of the frame to 0."""
-        self.run(clear_pass(texel_format), (0, 0, *self.size), {}, {"cleared": image}, {})
+    def clear(self, image: Any, texel_format: str | None = None) -> None:
+        """Set an image of the size of the frame to 0; without a format, it is RGBA32F."""
+        formats = () if texel_format is None else (("cleared", texel_format),)
+        self.run(ComputePass("clear", formats), self.box, {}, {"cleared": image}, {})
 
     def run(
         self,
@@ -201,15 +200,19 @@ class Frame:
         ----------
         shader : ComputePass
         box : Box
-        textures, images : dict of str to texture
-            What the pass reads and writes.
+        textures : dict of str to texture
+            What the pass reads besides the ``textures`` of the frame.
+        images : dict of str to texture
+            What the pass writes.
         uniforms : dict
+            In addition to those of the camera, and to the settings of the look by their own names.
         layers : int
             Layers of array images.
         pause : float, optional
             See `FramePass`.
         """
-        uniforms = {**uniforms, "box_origin": box[:2]}
+        uniforms = {**self._shared_uniforms, **uniforms, "box_origin": box[:2]}
+        textures = {**self.textures, **textures}
         self.compute(shader, (*box_size(box), layers), textures, images, uniforms, pause)
 
     def compute(
@@ -222,15 +225,58 @@ class Frame:
         pause: float | None = None,
     ) -> None:
         """Add a compute pass; see `Device.compute`."""
-        run = partial(self.resources.device.compute, shader, size, dict(textures), images, uniforms)
-        self.passes.append(FramePass(shader.variant(uniforms), run, pause))
+        shader = shader.variant(uniforms)
+        run = partial(self.resources.device.compute, shader, size, textures, images, uniforms)
+        self.passes.append(FramePass(shader, run, pause))
 
     def draw(
         self,
         shader: RasterPass,
         batches: Sequence[tuple[Any, dict[str, Any]]],
-        target: tuple[Any, Any],
+        target: Any,
     ) -> None:
         """Add a pass that draws triangles; see `Device.draw`."""
-        run = partial(self.resources.device.draw, shader, batches, target, {})
+        size = target.width, target.height
+        depth = self.resources.image("depth", *size, "DEPTH_COMPONENT32F")
+        run = partial(self.resources.device.draw, shader, batches, target, depth)
         self.passes.append(FramePass(shader, run, None))
+
+
+def screen_box(item: DrawItem, camera: Camera) -> Box:
+    """Return the box of the pixels that a mesh can cover.
+
+    The whole frame if the near plane cuts off a part of the bounds; an empty box if it cuts off all.
+    """
+    points = np.concatenate([item.mesh.buffers.bounds, np.ones((8, 1))], axis=1)
+    clip = points @ (camera.projection @ camera.view @ item.model_matrix).T
+    is_cut_off = clip[:, 2] < -clip[:, 3]
+    if is_cut_off.all():
+        return 0, 0, 0, 0
+    if is_cut_off.any() or (clip[:, 3] <= 0).any():
+        return 0, 0, camera.width, camera.height
+    ends = clip[:, :2] / clip[:, 3:] * 0.5 + 0.5
+    size = np.array([camera.width, camera.height])
+    low = np.clip(np.floor(ends.min(axis=0) * size), 0, size).astype(int)
+    high = np.clip(np.ceil(ends.max(axis=0) * size), 0, size).astype(int)
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def is_empty(box: Box) -> bool:
+    """Return whether a box contains no pixel."""
+    left, bottom, right, top = box
+    return left >= right or bottom >= top
+
+
+def union_box(boxes: Iterable[Box]) -> Box:
+    """Return the smallest box around others. Empty boxes are ignored."""
+    boxes = [box for box in boxes if not is_empty(box)]
+    if not boxes:
+        return 0, 0, 0, 0
+    left, bottom, right, top = zip(*boxes, strict=True)
+    return min(left), min(bottom), max(right), max(top)
+
+
+def box_size(box: Box) -> tuple[int, int]:
+    """Return width and height."""
+    left, bottom, right, top = box
+    return right - left, top - bottom

@@ -1,27 +1,28 @@
-"""Line integral convolution: the covering of a field, streamlines on it, and their ink."""
+"""The lines of a picture: evenly spaced ones, or line integral convolution on the covering of a field.
+
+Even lines are phases on the surfaces, evaluated at the pixels. Then the picture is drawn: streamlines are
+traced, and what they show becomes light or ink.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from functools import partial
 from typing import Any
 
+from ..compositor.even_lines import COARSE_RATIO, SPACING_GRAINS, has_even_lines
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, is_hatched
-from . import lookup_tables, passes
+from ..compositor.look import is_hatched
+from ..compositor.look_units import instance_line_spacing
+from . import lookup_tables
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
-from .field_kind import FieldKind
-from .frame import Frame
+from .frame import Box, Frame
+from .mesh_buffers import FieldKind
 from .passes import WORKGROUP_SIZE, ComputePass
 from .resources import GpuResources
-from .screen_box import Box
-from .uniforms import (
-    camera_uniforms,
-    covering_uniforms,
-    direction_uniforms,
-    look_uniforms,
-)
+from .uniforms import direction_uniforms, even_line_uniforms, look_uniforms
 
 #: Factor of the contrast of streaks whose noise is interpolated between pixels, which makes them a little
 #: stronger. Smooth streaks do not need it.
@@ -30,6 +31,47 @@ INTERPOLATED_CONTRAST = 0.96
 #: Maximum steps, of all streamlines together, in one run of the LIC pass: drivers abort runs that
 #: take too long.
 MAX_DISPATCH_STEPS = 1 << 29
+
+
+def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
+    """Return what looks up the lines of the instances, by the keys of `Frame.prepared`."""
+    look = frame.look
+    if not has_even_lines(look):
+        return {}
+    lookups: dict[Hashable, Callable[[], Any]] = {}
+    for instance_id, item, _ in frame.fields_in_view():
+        spacing = instance_line_spacing(look, SPACING_GRAINS, frame.camera, item.instance)
+        for ratio in (1.0, COARSE_RATIO):
+            lookups["lines", instance_id, ratio] = partial(
+                frame.resources.line_records, item, look.display, ratio * spacing
+            )
+    return lookups
+
+
+def render_even_lines(frame: Frame) -> None:
+    """Render the lines of all instances into ``frame.textures["line_image"]``.
+
+    The method is that of `even_lines.even_lines`. The lines that replace crowded ones are in the
+    layers after the others, whether any are crowded or not. Nothing is rendered for other looks.
+    """
+    if not has_even_lines(frame.look):
+        frame.textures["line_image"] = frame.resources.image("line_image", 1, 1, "RGBA16F", 1)
+        return
+    line_count = max((kind.line_count for kind in frame.kinds), default=1)
+    images = {"line_image": frame.image("line_image", "RGBA16F", 2 * line_count)}
+    for instance_id, item, box in frame.fields_in_view():
+        uniforms = even_line_uniforms(frame.look, item, frame.camera)
+        for ratio, first_layer in ((1.0, 0), (COARSE_RATIO, item.kind.line_count)):
+            records, node_count = frame.prepared["lines", instance_id, ratio]
+            frame.run_on_instance(
+                ComputePass("even_lines"),
+                instance_id,
+                box,
+                {"line_records": records},
+                images,
+                {**uniforms, "node_count": node_count, "first_layer": first_layer},
+            )
+    frame.textures |= images
 
 
 def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None:
@@ -45,59 +87,61 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
         Of the size of the frame.
     """
     look, resources = frame.look, frame.resources
-    covering = covering_uniforms(kind, look)
     is_antialiased = int(frame.samples is not None)
-    uniforms = {**covering, **look_uniforms(kind, look), "is_antialiased": is_antialiased}
-    textures = {**frame.textures, **_unfold(frame, kind, box, covering)}
+    uniforms = {**look_uniforms(kind, look), "is_antialiased": is_antialiased}
+    textures = _unfold(frame, kind, box)
     textures |= {
         "noise_gradients": textures["directions"],
-        "max_magnitude": _max_magnitude(frame, textures, kind, look),
+        "max_magnitude": textures["cells"],  # only read if the look shows it
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
     }
+    if MAGNITUDE_MODES[look.magnitude] and not look.magnitude_range:
+        values, compute = frame.textures["field_values"], frame.compute
+        textures["max_magnitude"] = largest_magnitude(resources, values, kind.degree, compute)
     if frame.samples is not None:
         textures["noise_gradients"] = _noise_gradients(frame, box, textures)
-        uniforms["gain"] *= INTERPOLATED_CONTRAST
+        uniforms["gain"] = look.gain * INTERPOLATED_CONTRAST
     if not is_hatched(look):
-        _trace(frame, kind, box, passes.LIC, textures, {"picture": picture}, uniforms)
+        _trace(frame, kind, box, ComputePass("lic"), textures, {"picture": picture}, uniforms)
         return
     textures["line_means"] = _streaks(frame, kind, box, textures, uniforms)
-    textures |= _ink_textures(frame, kind, textures)
-    frame.run(passes.INK, box, textures, {"picture": picture}, uniforms, pause=1.0)
+    textures |= _ink_textures(frame, kind)
+    frame.run(ComputePass("ink"), box, textures, {"picture": picture}, uniforms, pause=1.0)
 
 
 def _streaks(
     frame: Frame, kind: FieldKind, box: Box, textures: dict[str, Any], uniforms: dict[str, Any]
 ) -> Any:
     """Return the means along the lines of a look with ink; another texture if it needs none."""
-    image, layers = frame.resources.image, kind.line_count
+    layers = kind.line_count
     has_streaks = not uniforms["even_lines"] or uniforms["break_steps"] > 0
     if not (has_streaks or uniforms["overshoot_steps"]):
         return textures["directions"]
-    means = image("line_means", *frame.size, "RGBA16F", layers)
+    means = frame.image("line_means", "RGBA16F", layers)
     images = {"line_means": means}
-    _trace(frame, kind, box, passes.STREAKS, textures, images, uniforms, layers)
+    _trace(frame, kind, box, ComputePass("streaks"), textures, images, uniforms, layers)
     if frame.samples is None or not has_streaks:
         return means
-    smooth = image("smooth_means", *frame.size, "RGBA16F", layers)
+    smooth = frame.image("smooth_means", "RGBA16F", layers)
     textures, images = {**textures, "line_means": means}, {"smooth_means": smooth}
-    frame.run(passes.SMOOTH_STREAKS, box, textures, images, uniforms, layers)
+    frame.run(ComputePass("smooth_streaks"), box, textures, images, uniforms, layers)
     return smooth
 
 
-def _ink_textures(frame: Frame, kind: FieldKind, textures: dict[str, Any]) -> dict[str, Any]:
+def _ink_textures(frame: Frame, kind: FieldKind) -> dict[str, Any]:
     """Return the lookup tables of the ink, and images that the look does not have."""
     resources, look = frame.resources, frame.look
     result = {
         "ink_thresholds": lookup_tables.thresholds(
-            resources, look_for_symmetry(frame.look, kind.symmetry)
+            resources, look_for_symmetry(look, kind.symmetry)
         ),
-        "disc_offsets": lookup_tables.undirected_offsets(resources, frame.look),
+        "disc_offsets": lookup_tables.undirected_offsets(resources, look),
         "ink_table": lookup_tables.ink_table(resources, kind, look),
     }
-    if "outline_coverage" not in textures:
-        result["outline_coverage"] = textures["depth_slopes"]
-    if "paper_grain" not in textures:
+    if "outline_coverage" not in frame.textures:
+        result["outline_coverage"] = frame.textures["depth_slopes"]
+    if "paper_grain" not in frame.textures:
         result["paper_grain"] = lookup_tables.picture_grain(
             resources, *frame.size, look, kind.line_count
         )
@@ -127,44 +171,29 @@ def _trace(
         frame.run(shader, band, textures, images, uniforms, layers, pause=done)
 
 
-def _unfold(frame: Frame, kind: FieldKind, box: Box, covering: dict[str, Any]) -> dict[str, Any]:
+def _unfold(frame: Frame, kind: FieldKind, box: Box) -> dict[str, Any]:
     """Return the images of the covering: its cells, and directions without and with their gradients."""
-    image, lines = frame.resources.image, kind.line_count
-    has_color_noise = noise_args(frame.look)["channels"] > 1
-    shader = passes.COLOR_DIRECTIONS if has_color_noise else passes.DIRECTIONS
-    uniforms = {**covering, **direction_uniforms(kind, frame.look, frame.camera)}
-    cells = image("cells", *frame.size, dict(shader.images)["cells"])
-    directions = image("directions", *frame.size, "RGBA16F", lines)
-    frame.run(
-        shader,
-        box,
-        frame.textures,
-        {"cells": cells, "directions": directions},
-        {**camera_uniforms(frame.camera), **uniforms},
-    )
-    textures = {"cells": cells, "directions": directions}
-    images = {"angle_gradients": image("angle_gradients", *frame.size, "RGBA16F", lines)}
-    frame.run(passes.ANGLE_GRADIENT, box, textures, images, covering, lines, pause=0.0)
-    return {**textures, **images}
+    lines = kind.line_count
+    cell_format = "RG32F" if noise_args(frame.look)["channels"] == 1 else "RGBA32F"
+    uniforms = direction_uniforms(kind, frame.look, frame.camera)
+    covering = {
+        "cells": frame.image("cells", cell_format),
+        "directions": frame.image("directions", "RGBA16F", lines),
+    }
+    frame.run(ComputePass("directions", (("cells", cell_format),)), box, {}, covering, uniforms)
+    gradients = {"angle_gradients": frame.image("angle_gradients", "RGBA16F", lines)}
+    shader = ComputePass("angle_gradient")
+    frame.run(shader, box, covering, gradients, uniforms, lines, pause=0.0)
+    return {**covering, **gradients}
 
 
 def _noise_gradients(frame: Frame, box: Box, textures: dict[str, Any]) -> Any:
     """Return the derivatives of the noise, two channels in a layer."""
     layers = 2 if noise_args(frame.look)["channels"] > 1 else 1
-    gradients = frame.resources.image("noise_gradients", *frame.size, "RGBA16F", layers)
+    gradients = frame.image("noise_gradients", "RGBA16F", layers)
     images, uniforms = {"noise_gradients": gradients}, {"noise_layers": layers}
-    frame.run(passes.NOISE_GRADIENTS, box, textures, images, uniforms)
+    frame.run(ComputePass("noise_gradients"), box, textures, images, uniforms)
     return gradients
-
-
-def _max_magnitude(frame: Frame, textures: dict[str, Any], kind: FieldKind, look: Look) -> Any:
-    """Return `largest_magnitude` of the fields of a kind.
-
-    If the look does not need it, another texture that the shader does not read.
-    """
-    if not MAGNITUDE_MODES[look.magnitude] or look.magnitude_range:
-        return textures["cells"]
-    return largest_magnitude(frame.resources, textures["field_values"], kind.degree, frame.compute)
 
 
 def largest_magnitude(
@@ -181,7 +210,7 @@ def largest_magnitude(
         width, height = -(-width // REDUCE_BLOCK), -(-height // REDUCE_BLOCK)
         tiles = resources.image(f"tiles {level}", width, height)
         compute(
-            passes.MAX_REDUCE,
+            ComputePass("max_reduce"),
             (width, height),
             {"source_values": source},
             {"tiles": tiles},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
 from ..compositor.wobble import wave_table
-from .field_kind import FieldKind
+from .mesh_buffers import FieldKind
 from .resources import GpuResources
 
 #: Noise is computed for whole tiles of this side, so that a frame can grow a little.
@@ -28,13 +29,13 @@ NOISE_TILE_PIXELS = 256
 
 def palette(resources: GpuResources) -> Any:
     """Return `family_hues.PALETTE`. It is also bound in place of textures that are not read."""
-    return _color_table(resources, "palette", None, lambda: PALETTE)
+    return resources.lookup_texture("palette", None, lambda: PALETTE[None])
 
 
 def color_map(resources: GpuResources, look: Look) -> Any:
     """Return the color map of a look."""
     name = look.colour_map
-    return _color_table(resources, "colours", name, lambda: color_stops(name))
+    return resources.lookup_texture("colours", name, lambda: color_stops(name)[None])
 
 
 def thresholds(resources: GpuResources, look: Look) -> Any:
@@ -48,9 +49,7 @@ def thresholds(resources: GpuResources, look: Look) -> Any:
     statistics = look_streak_statistics(look)
     table = look_width_table(look) if has_even_lines(look) else statistics.threshold
     rows = np.stack([table, statistics.disc_threshold])
-    return resources.lookup_texture(
-        "thresholds", rows.tobytes(), lambda: _in_channels(rows[..., None])
-    )
+    return resources.lookup_texture("thresholds", rows.tobytes(), lambda: rows[..., None])
 
 
 def undirected_offsets(resources: GpuResources, look: Look) -> Any:
@@ -58,7 +57,7 @@ def undirected_offsets(resources: GpuResources, look: Look) -> Any:
     if not is_hatched(look):
         return palette(resources)
     return resources.lookup_texture(
-        "disc_offsets", look.grain, lambda: _in_channels(disc_offsets(look.grain)[None])
+        "disc_offsets", look.grain, lambda: disc_offsets(look.grain)[None]
     )
 
 
@@ -66,7 +65,7 @@ def ink_table(resources: GpuResources, kind: FieldKind, look: Look) -> Any:
     """Return the inks of `inks.Inks`: the dark ones, then the middle ones, then the light ones."""
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
     stops = np.concatenate([inks.dark, inks.middle, inks.light])
-    return _color_table(resources, "inks", stops.tobytes(), lambda: stops)
+    return resources.lookup_texture("inks", stops.tobytes(), lambda: stops[None])
 
 
 def waves(resources: GpuResources) -> Any:
@@ -85,48 +84,34 @@ def picture_grain(
         return palette(resources)
     width += (line_count - 1) * line_offset(look.grain)
 
-    def create(width: int, height: int) -> np.ndarray:
-        pixel = np.arange(width * height, dtype=np.int32)
-        values = picture_paper_grain(pixel, width, look.grain, look.seed)
-        return _in_channels(values.reshape(height, width, 1))
+    def values_at(pixel: np.ndarray, width: int) -> np.ndarray:
+        return picture_paper_grain(pixel, width, look.grain, look.seed)
 
-    return resources.growing_texture(
-        "paper_grain", (look.grain, look.seed), _whole_tiles(width, height), create
-    )
+    key = look.grain, look.seed
+    return _pixel_texture(resources, "paper_grain", key, width, height, values_at)
 
 
 def picture_noise(resources: GpuResources, width: int, height: int, look: Look) -> Any:
     """Return the noise of `image_noise.image_noise` for a frame of this size."""
     settings = noise_args(look)
-
-    def create(width: int, height: int) -> np.ndarray:
-        pixel = np.arange(width * height, dtype=np.int32)
-        values = image_noise(pixel, width, **settings)
-        return _in_channels(values.reshape(height, width, settings["channels"]))
-
-    return resources.growing_texture("noise", settings, _whole_tiles(width, height), create)
+    values_at = partial(image_noise, **settings)
+    return _pixel_texture(resources, "noise", settings, width, height, values_at)
 
 
-def _whole_tiles(width: int, height: int) -> tuple[int, int]:
-    """Return a size rounded up to whole tiles."""
-    tile = NOISE_TILE_PIXELS
-    return -(-width // tile) * tile, -(-height // tile) * tile
-
-
-def _in_channels(values: np.ndarray) -> np.ndarray:
-    """Return (H, W, C) values as (H, W, 4) float32; the other channels are 0."""
-    data = np.zeros((*values.shape[:2], 4), dtype=np.float32)
-    data[:, :, : values.shape[2]] = values
-    return data
-
-
-def _color_table(
-    resources: GpuResources, name: str, key: Any, create: Callable[[], np.ndarray]
+def _pixel_texture(
+    resources: GpuResources,
+    name: str,
+    key: Any,
+    width: int,
+    height: int,
+    values_at: Callable[[np.ndarray, int], np.ndarray],
 ) -> Any:
-    """Return (C, 3) colors as a texture of one row."""
+    """Return values at the pixels of a frame, given those at (P,) pixels of a width, for whole tiles."""
+    tile = NOISE_TILE_PIXELS
+    width, height = -(-width // tile) * tile, -(-height // tile) * tile
 
-    def as_row() -> np.ndarray:
-        rgb = np.asarray(create(), dtype=np.float32)
-        return np.concatenate([rgb, np.ones_like(rgb[:, :1])], axis=1)[None]
+    def create() -> np.ndarray:
+        pixel = np.arange(width * height, dtype=np.int32)
+        return values_at(pixel, width).reshape(height, width, -1)
 
-    return resources.lookup_texture(name, key, as_row)
+    return resources.lookup_texture(name, key, create, (width, height))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, box_corners
+from ..field.symmetry import FieldSymmetry
 from ..projection.corner_field import CornerField, field_at_corners
 from ..projection.face_values import SIMILARITY_EPS
 from ..projection.field_channel import FieldChannel, rotation_order
@@ -120,6 +121,66 @@ def field_channels(field: RosyField) -> list[FieldChannel]:
     if field.family_count > 1:
         channels.append(("family", field.family_count))
     return channels
+
+
+@dataclass(frozen=True)
+class FieldKind:
+    """The shader constants of all fields of one degree.
+
+    Attributes
+    ----------
+    degree : int
+        N.
+    channels : tuple of FieldChannel
+        Layers of the image of field channels: harmonics without gaps, then the families.
+    symmetry : FieldSymmetry
+    """
+
+    degree: int
+    channels: tuple[FieldChannel, ...]
+    symmetry: FieldSymmetry
+
+    @property
+    def harmonic_orders(self) -> list[int]:
+        """Orders j of the harmonics, the first layers. Layers that fill a gap are 0."""
+        return [order for kind, order in self.channels if kind == "deviation"]
+
+    @property
+    def line_count(self) -> int:
+        """M, the number of lines through a pixel."""
+        return self.symmetry.line_count
+
+    @property
+    def sheets_per_turn(self) -> int:
+        """Sheets of a full turn."""
+        return self.symmetry.sheets_per_turn
+
+    @property
+    def family_count(self) -> int:
+        """The number of families, 1 without labels."""
+        return self.channels[-1][1] if self.channels and self.channels[-1][0] == "family" else 1
+
+
+def field_kinds(fields: Iterable[RosyField]) -> dict[int, FieldKind]:
+    """Return the kinds of fields, by degree."""
+    channels: dict[int, list[FieldChannel]] = {}
+    for field in fields:
+        channels.setdefault(field.degree, []).extend(field_channels(field))
+    return {
+        degree: _field_kind(degree, kind_channels)
+        for degree, kind_channels in sorted(channels.items())
+    }
+
+
+def _field_kind(degree: int, channels: Sequence[FieldChannel]) -> FieldKind:
+    """Return a kind with harmonics without gaps, and the first channel of families."""
+    harmonic_orders = [order for kind, order in channels if kind == "deviation"]
+    ordered: list[FieldChannel] = []
+    if harmonic_orders:
+        ordered = [("deviation", j) for j in range(min(harmonic_orders), max(harmonic_orders) + 1)]
+    ordered += [channel for channel in channels if channel[0] == "family"][:1]
+    # The symmetry depends on the harmonics that exist, not on those that fill gaps.
+    return FieldKind(degree, tuple(ordered), FieldSymmetry(degree, tuple(harmonic_orders)))
 
 
 def mesh_buffers(

@@ -15,8 +15,9 @@ from ..compositor.look_units import cell_size_args
 from ..compositor.paper_grain import surface_paper_grain_args
 from ..compositor.surface_noise import instance_hashes
 from ..compositor.wobble import has_wobble
-from . import lookup_tables, passes
+from . import lookup_tables
 from .frame import Frame
+from .passes import ComputePass
 from .uniforms import surface_cell_uniforms, surface_noise_uniforms, wobble_uniforms
 
 
@@ -31,32 +32,21 @@ def feature_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
 
 
 def render_noise(frame: Frame) -> None:
-    """Render the noise of a picture, its paper grain and wobble into ``frame.textures``."""
-    _render_noise(frame)
-    _render_paper_grain(frame)
-    _render_wobble(frame)
+    """Render the noise of a picture, its paper grain and wobble into ``frame.textures``.
 
-
-def _render_noise(frame: Frame) -> None:
-    """Render the noise of the picture or of the surfaces, as ``frame.textures["noise"]``."""
+    Paper grain that is fixed to the picture depends on the number of lines: `lic_stage.render_fields` looks
+    it up.
+    """
     look = frame.look
     if look.anchor == "surface":
-        settings = noise_args(frame.look) | cell_size_args(frame.look)
-        settings["detail"] = look.detail
+        settings = noise_args(look) | cell_size_args(look) | {"detail": look.detail}
         frame.textures["noise"] = _surface_noise(frame, settings, "noise")
     else:
         frame.textures["noise"] = lookup_tables.picture_noise(frame.resources, *frame.size, look)
-
-
-def _render_paper_grain(frame: Frame) -> None:
-    """Render the paper grain of the surfaces, as ``frame.textures["paper_grain"]``.
-
-    Nothing is rendered if the grain is fixed to the picture: it then depends on the number of lines,
-    and `lic_stage.render_fields` looks it up.
-    """
-    if has_paper_grain(frame.look) and frame.look.anchor == "surface":
-        settings = surface_paper_grain_args(frame.look) | cell_size_args(frame.look)
+    if has_paper_grain(look) and look.anchor == "surface":
+        settings = surface_paper_grain_args(look) | cell_size_args(look)
         frame.textures["paper_grain"] = _surface_noise(frame, settings, "paper_grain")
+    _render_wobble(frame)
 
 
 def _render_wobble(frame: Frame) -> None:
@@ -67,57 +57,55 @@ def _render_wobble(frame: Frame) -> None:
     if not has_wobble(frame.look):
         frame.textures["wobble_angles"] = lookup_tables.palette(frame.resources)
         return
-    angles = frame.resources.image("wobble_angles", *frame.size)
-    frame.textures["wave_table"] = lookup_tables.waves(frame.resources)
+    images = {"wobble_angles": frame.image("wobble_angles")}
+    textures = {"wave_table": lookup_tables.waves(frame.resources)}
     for instance_id, item, box in frame.fields_in_view():
         uniforms = wobble_uniforms(frame.look, item, frame.camera)
-        images = {"wobble_angles": angles}
-        frame.run_on_instance(passes.WOBBLE, instance_id, box, images, uniforms)
-    frame.textures["wobble_angles"] = angles
+        frame.run_on_instance(ComputePass("wobble"), instance_id, box, textures, images, uniforms)
+    frame.textures |= images
 
 
 def _surface_noise(frame: Frame, settings: dict[str, Any], name: str) -> Any:
     """Return noise that moves with the surfaces, as `surface_noise.surface_noise`."""
-    raw_noise = frame.resources.image("raw_noise", *frame.size)
+    raw_noise = frame.image("raw_noise")
     frame.clear(raw_noise)
     shared_uniforms = surface_noise_uniforms(settings)
-    names = [item.mesh.keep_alive[0].name for item in frame.items]
+    names = [item.instance.surface.name for item in frame.items]
     hashes = instance_hashes(names).view(np.int32)
     for instance_id, item, box in frame.fields_in_view():
+        textures = {"feature_curvature": lookup_tables.palette(frame.resources)}
         if settings.get("detail"):
-            frame.textures["feature_curvature"] = frame.prepared["features", instance_id]
-        else:
-            frame.textures["feature_curvature"] = lookup_tables.palette(frame.resources)
+            textures["feature_curvature"] = frame.prepared["features", instance_id]
         uniforms = {
             **shared_uniforms,
             **surface_cell_uniforms(settings, item, frame.camera),
             "instance_hash": int(hashes[instance_id]),
         }
-        images = {"raw_noise": raw_noise}
-        frame.run_on_instance(passes.SURFACE_NOISE, instance_id, box, images, uniforms)
+        images, shader = {"raw_noise": raw_noise}, ComputePass("surface_noise")
+        frame.run_on_instance(shader, instance_id, box, textures, images, uniforms)
     return _high_passed(frame, raw_noise, settings["high_pass"], name)
 
 
 def _high_passed(frame: Frame, raw_noise: Any, high_pass: float, name: str) -> Any:
     """Return centered noise, without its low frequencies if `high_pass` is not 0."""
-    size, blurred = frame.size, raw_noise
+    blurred = raw_noise
     if high_pass:
         radius = box_radius(BLUR_FACTOR * high_pass)
         for index, axis in enumerate(((1, 0), (0, 1)) * 3):
-            next_blurred = frame.resources.image(f"blurred {index % 2}", *size)
-            frame.compute(
-                passes.BOX_BLUR,
-                size,
+            next_blurred = frame.image(f"blurred {index % 2}")
+            frame.run(
+                ComputePass("box_blur"),
+                frame.box,
                 {"source_image": blurred},
                 {"blurred_image": next_blurred},
                 {"blur_axis": axis, "radius": radius},
                 pause=0.5,
             )
             blurred = next_blurred
-    noise = frame.resources.image(name, *size)
-    frame.compute(
-        passes.CENTER_NOISE,
-        size,
+    noise = frame.image(name)
+    frame.run(
+        ComputePass("center_noise"),
+        frame.box,
         {"raw_noise": raw_noise, "blurred_noise": blurred},
         {"noise": noise},
         {"high_passed": int(high_pass > 0)},

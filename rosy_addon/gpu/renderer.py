@@ -27,20 +27,19 @@ from ..projection.project import check_instances, raise_nothing_in_view
 from ..rendering.marks import has_marks, with_marks
 from ..rendering.view_input import Background, ViewInput
 from ..worker.job import Call, Step, Steps
-from . import lookup_tables, passes
-from .background import draw_background
+from . import lookup_tables
+from .background import draw_background, draw_texture
 from .device import Device
-from .even_lines_stage import even_line_lookups, render_even_lines
-from .frame import Frame
+from .frame import Frame, box_size, is_empty, screen_box, union_box
 from .gbuffer_stage import render_gbuffer
-from .lic_stage import largest_magnitude, render_fields
+from .lic_stage import even_line_lookups, largest_magnitude, render_even_lines, render_fields
 from .noise_stage import feature_lookups, render_noise
 from .outline_stage import outline_lookups, render_outline
+from .passes import ComputePass, all_passes
 from .preparation import compile_lookups, prepare_steps
 from .resources import DrawItem, GpuResources
-from .screen_box import box_size, is_empty, screen_box, union_box
 from .tone_stage import render_target_tones
-from .uniforms import NO_CLIP_PLANES, clip_uniforms
+from .uniforms import clip_uniforms
 
 #: How much closer to the eye than the surface its picture is drawn, in normalized depth.
 COMPOSITE_DEPTH_BIAS = 2e-5
@@ -107,7 +106,7 @@ class GpuRenderer:
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """As `ViewportRenderer.prepare_steps`."""
         # Those with switches are compiled when their values are known.
-        shaders = [shader for shader in passes.ALL_PASSES if not shader.switches]
+        shaders = [shader for shader in all_passes() if not shader.switches]
         meshes = self.resources.mesh_lookups(instances, display)
         return prepare_steps([*compile_lookups(self.device, shaders), *meshes])
 
@@ -186,15 +185,20 @@ class GpuRenderer:
         if frame.samples is None:
             return texture, stages
         picture = self.resources.image(("picture", target_key), *frame.size)
-        blend = partial(self._blend, frame, texture, picture)
+        blend = partial(
+            frame.run,
+            ComputePass("blend_samples"),
+            frame.box,
+            {"shaded_picture": texture},
+            {"picture": picture},
+            {"samples_per_side": frame.samples_per_side},
+        )
         return picture, [*stages, (1.0, "averaging samples", blend)]
 
     def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
         """Return the frame of the pixels, and of their samples, if these are several."""
         look = look_in_pixels(view.look, view.sample_camera, [item.instance for item in items])
-        clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
-        lights, reference = view.lights, view.reference
-        frame = Frame(self.resources, items, view.camera, look, lights, reference, clip_planes)
+        frame = Frame(self.resources, items, view, view.camera, look)
         if look.supersampling == 1:
             return frame
         fine_look = supersampled_look(look)
@@ -205,20 +209,12 @@ class GpuRenderer:
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
     ) -> None:
         """As `ViewportRenderer.composite`: the surfaces are drawn with the picture on them."""
-        left, bottom, width, height = self.device.viewport()
-        clip_planes = NO_CLIP_PLANES if view.clip_planes is None else view.clip_planes
-        uniforms = {
-            "depth_bias": COMPOSITE_DEPTH_BIAS,
-            "view_origin": (float(left), float(bottom)),
-            "pixel_scale": (texture.width / width, texture.height / height),
-            "opacity": opacity,
-        }
         batches = [
-            (item.mesh.batch, clip_uniforms(item, view.camera, clip_planes))
+            (item.mesh.batch, clip_uniforms(item, view.camera, view.clip_planes))
             for item in items
-            if item.field is not None
+            if item.kind is not None
         ]
-        self.device.draw_to_view(passes.COMPOSITE, batches, {"picture": texture}, uniforms)
+        draw_texture(self.device, texture, batches, opacity, depth_bias=COMPOSITE_DEPTH_BIAS)
 
     def draw_background(self, background: Background) -> None:
         """As `ViewportRenderer.draw_background`."""
@@ -236,14 +232,6 @@ class GpuRenderer:
         """Return the (H, W, 4) float32 contents of a picture."""
         return self.device.read(texture, width, height)
 
-    def read_gbuffer(self, camera: Camera) -> dict[str, np.ndarray]:
-        """Return the G-buffer of the last picture, by the names of its images."""
-        size = camera.width, camera.height
-        return {
-            name: self.device.read(self.resources.image(name, *size), *size)
-            for name in ("normals", "field_values")
-        }
-
     def _color_range(self, view: ViewInput) -> tuple[float, float] | None:
         """Return `Picture.color_range` of the last picture."""
         look, camera = view.look, view.camera
@@ -259,13 +247,3 @@ class GpuRenderer:
             texture = largest_magnitude(self.resources, field_values, degree, compute)
             tops.add(float(self.read(texture, 1, 1)[0, 0, 0]))
         return common_color_range(tops - {0.0})  # 0: no field of this degree is visible
-
-    def _blend(self, frame: Frame, shaded_picture: Any, picture: Any) -> None:
-        """Draw the picture of pixels that have several samples."""
-        frame.compute(
-            passes.BLEND_SAMPLES,
-            frame.size,
-            {**frame.textures, "shaded_picture": shaded_picture},
-            {"picture": picture},
-            {"samples_per_side": frame.samples_per_side},
-        )

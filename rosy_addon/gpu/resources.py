@@ -12,7 +12,6 @@ import numpy as np
 
 from ..compositor.target_tone import ReferenceRender
 from ..errors import RosyError
-from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.rest_coordinates import matrix_scale
@@ -20,9 +19,10 @@ from ..projection.surface_lines import rest_matrix
 from ..projection.surface_tone import MipMap
 from ..worker.job import Call, run
 from .device import Device
-from .field_kind import FieldKind, field_kinds
 from .mesh_buffers import (
+    FieldKind,
     MeshBuffers,
+    field_kinds,
     mesh_buffers,
     mip_atlas,
     split_matrix,
@@ -51,23 +51,23 @@ class DrawItem:
 
     Attributes
     ----------
+    instance : MeshInstance
     mesh : GpuMesh
-    field : RosyField or None
-        None for a mesh that only occludes.
     model_matrix : (4, 4) float64 ndarray
         From the mesh buffers to world space: a rotation, a uniform scale and a translation.
-    object_scale : float
-        Scale of the matrix of the instance.
     kind : FieldKind or None
-    instance : MeshInstance or None
+        None for a mesh that only occludes.
     """
 
+    instance: MeshInstance
     mesh: GpuMesh
-    field: RosyField | None
     model_matrix: np.ndarray
-    object_scale: float
     kind: FieldKind | None
-    instance: MeshInstance | None = None
+
+    @property
+    def object_scale(self) -> float:
+        """Scale of the matrix of the instance."""
+        return matrix_scale(self.instance.matrix)
 
 
 @dataclass(eq=False)
@@ -162,22 +162,6 @@ class GpuResources:
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
 
-    @property
-    def meshes(self) -> list[GpuMesh]:
-        """The meshes on the device."""
-        return list(self._meshes.values())
-
-    @property
-    def texture_count(self) -> int:
-        """The number of textures on the device."""
-        records = sum(mesh.records_texture is not None for mesh in self.meshes)
-        atlases = sum(mesh.tone_atlas is not None for mesh in self.meshes)
-        records += sum(len(mesh.line_textures) for mesh in self.meshes)
-        outlines = [mesh.outline_textures for mesh in self.meshes if mesh.outline_textures]
-        records += sum(outline.crease_points is not None for outline in outlines)
-        records += sum(outline.triangle_parts is not None for outline in outlines)
-        return records + atlases + len(self._images) + len(self._lookup_textures)
-
     def release(self) -> None:
         """Free all resources."""
         for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
@@ -208,8 +192,7 @@ class GpuResources:
             kind = None if instance.field is None else kinds[instance.field.degree]
             _, model_matrix = split_matrix(instance.matrix)
             model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
-            scale = matrix_scale(instance.matrix)
-            items.append(DrawItem(mesh, instance.field, model_matrix, scale, kind, instance))
+            items.append(DrawItem(instance, mesh, model_matrix, kind))
         oldest_kept = self._upload_count - MESH_LIFETIME_UPLOADS
         for key in [key for key, mesh in self._meshes.items() if mesh.last_used < oldest_kept]:
             del self._meshes[key]
@@ -281,40 +264,34 @@ class GpuResources:
         key = name, width, height, texel_format, layers
         return self._cached(key, lambda: self.device.texture(width, height, texel_format, layers))
 
-    def depth_image(self, width: int, height: int) -> Any:
-        """Return the depth buffer of a size."""
-        key = "depth", width, height
-        return self._cached(key, lambda: self.device.depth_texture(width, height))
-
-    def lookup_texture(self, name: str, key: Any, create: Callable[[], np.ndarray]) -> Any:
-        """Return (H, W, 4) values as a texture. Of each name, the last key is kept."""
-        cached = self._lookup_textures.get(name)
-        if cached is None or cached[0] != key:
-            cached = self._lookup_textures[name] = key, self._texture_of(create())
-        return cached[1]
-
-    def growing_texture(
-        self, name: str, key: Any, size: tuple[int, int], create: Callable[[int, int], np.ndarray]
+    def lookup_texture(
+        self,
+        name: str,
+        key: Any,
+        create: Callable[[], np.ndarray],
+        min_size: tuple[int, int] = (0, 0),
     ) -> Any:
-        """Return a texture of a size or larger.
+        """Return a texture of values. Of each name, the last key is kept.
 
         Parameters
         ----------
         name : str
         key : any
-            The texture is created again if the key has changed.
-        size : (int, int)
-            Width and height in texels.
         create : function
-            From width and height to (H, W, 4) values.
+            Returns (H, W, C) values; the other channels are 0.
+        min_size : (int, int)
+            Width and height in texels. A smaller texture is created again.
         """
-        cached = self._lookup_textures.get(name)
-        if cached is not None:
-            cached_key, (texture, cached_size) = cached
-            if cached_key == key and size[0] <= cached_size[0] and size[1] <= cached_size[1]:
-                return texture
-        texture = self._texture_of(create(*size))
-        self._lookup_textures[name] = key, (texture, size)
+        last_key, texture = self._lookup_textures.get(name, (None, None))
+        is_kept = (
+            texture is not None
+            and last_key == key
+            and texture.width >= min_size[0]
+            and texture.height >= min_size[1]
+        )
+        if not is_kept:
+            texture = self._texture_of(create())
+            self._lookup_textures[name] = key, texture
         return texture
 
     def line_records(
@@ -369,7 +346,9 @@ class GpuResources:
         return cached[1]
 
     def _texture_of(self, values: np.ndarray) -> Any:
-        return self.device.texture(values.shape[1], values.shape[0], "RGBA32F", data=values)
+        height, width, channels = values.shape
+        data = np.pad(values, ((0, 0), (0, 0), (0, 4 - channels))) if channels < 4 else values
+        return self.device.texture(width, height, "RGBA32F", data=data)
 
     def _cached(self, key: tuple, create: Callable[[], Any]) -> Any:
         if key not in self._images:

@@ -7,10 +7,12 @@ from dataclasses import replace
 from ..compositor.look import Look
 from ..compositor.picture import Picture
 from ..errors import DeviceError
+from ..image_io.image_data import ImageData
 from ..rendering.draw import bake_picture
+from ..rendering.picture_images import CONVERSION_START, draw_image, picture_image
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
-from ..worker.job import Call, Steps
+from ..worker.job import Call, Steps, part
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer, check_method
@@ -74,6 +76,16 @@ def picture_steps(
     if device == "cpu":
         return (yield Call(bake_picture, (view, keep_gbuffers, workers)))
     return (yield from GpuRenderer(blender_device()).picture_steps(view))
+
+
+def image_steps(
+    view: ViewInput, device: str, as_float: bool, *, keep_gbuffers: bool = True, workers: int = 0
+) -> Steps[tuple[Picture, ImageData]]:
+    """Draw a picture as part of a job, and convert it; see `picture_steps` and `picture_image`."""
+    if device == "cpu":
+        return (yield Call(draw_image, (view, as_float, keep_gbuffers, workers)))
+    picture = yield from part(picture_steps(view, device), 0.0, CONVERSION_START)
+    return picture, (yield Call(picture_image, (picture, as_float), CONVERSION_START))
 
 
 def automatic_device(look: Look) -> str:

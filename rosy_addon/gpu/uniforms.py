@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +26,7 @@ from ..compositor.hatching import (
     has_breaks,
     has_overshoot,
     has_paper_grain,
+    overshoot_steps,
 )
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
@@ -60,23 +61,26 @@ from .defines import (
     POINT_LIGHT,
     SUN_LIGHT,
 )
-from .field_kind import FieldKind
-from .passes import INK_SETTINGS, LIC_SETTINGS, TONE_SETTINGS
+from .mesh_buffers import FieldKind
 from .resources import DrawItem
 
 #: Planes that clip nothing.
 NO_CLIP_PLANES = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
 
 
+def matrix_rows(name: str, labels: Iterable[Any], rows: np.ndarray) -> dict[str, tuple[float, ...]]:
+    """Return the rows of a matrix as uniforms, each of which has a label."""
+    return {f"{name}_{label}": tuple(row) for label, row in zip(labels, rows, strict=True)}
+
+
 def clip_uniforms(
-    item: DrawItem, camera: Camera, clip_planes: np.ndarray
+    item: DrawItem, camera: Camera, clip_planes: np.ndarray | None
 ) -> dict[str, tuple[float, ...]]:
     """Return the rows of the model-to-clip matrix, and the clip planes in model space."""
     clip = camera.projection @ camera.view @ item.model_matrix
-    uniforms = {f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", clip, strict=True)}
-    object_planes = np.asarray(clip_planes) @ item.model_matrix
-    uniforms.update({f"plane{number}": tuple(row) for number, row in enumerate(object_planes)})
-    return uniforms
+    planes = NO_CLIP_PLANES if clip_planes is None else np.asarray(clip_planes)
+    object_planes = planes @ item.model_matrix
+    return matrix_rows("clip", "xyzw", clip) | matrix_rows("plane", range(6), object_planes)
 
 
 def camera_uniforms(camera: Camera) -> dict[str, Any]:
@@ -97,9 +101,9 @@ def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
 
 
 def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
-    """Return the uniforms of line integral convolution and ink that depend on the look.
+    """Return the uniforms of line integral convolution and ink that are computed from the look.
 
-    Lengths are in pixels of the frame.
+    Lengths are in pixels of the frame. Shaders read settings themselves as well; see `Frame.run`.
     """
     look = look_for_symmetry(look, kind.symmetry)
     kernel = kernel_of(look)
@@ -107,21 +111,19 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
     statistics = look_streak_statistics(look) if is_hatched(look) else None
     return {
-        **setting_values(look, (*LIC_SETTINGS, *INK_SETTINGS)),
+        **covering_uniforms(kind),
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, look),
         "half_length": 0 if has_even_lines(look) else look.length,
         "full_samples": full_sample_count(look),
         "step_length": look.step,
         "crossing_correlation": crossing,
-        "gain": look.gain,
         # The streaks that drift have one channel, unlike their noise.
         "noise_channels": 1 if has_flow(look) else noise_args(look)["channels"],
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(look),
         "magnitude_mode": MAGNITUDE_MODES[look.magnitude],
-        "magnitude_range": look.magnitude_range,
         "colors_values": int(colors_values(look)),
         "paper_color": (*inks.paper, 1.0),
         "ink_count": len(inks.dark),
@@ -131,7 +133,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "softness": softness(look.crispness),
         "streak_std": statistics.std if statistics else 1.0,
         "break_steps": break_steps(look) if has_breaks(look) else 0,
-        "overshoot_steps": max(round(look.overshoot / look.step), 1) if has_overshoot(look) else 0,
+        "overshoot_steps": overshoot_steps(look) if has_overshoot(look) else 0,
         "break_samples": full_sample_count(replace(look, length=break_steps(look))),
         "break_std": statistics.break_std if statistics else 1.0,
         "disc_std": statistics.disc_std if statistics else 1.0,
@@ -146,15 +148,6 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": FADE_PIXELS,
         "crowded_pixels": crowded_pixels(look),
-    }
-
-
-def setting_values(look: Look, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return the values of settings for uniforms of the same names; switches as 0 or 1."""
-    values = {name: getattr(look, name) for name in names}
-    return {
-        name: int(value) if value is True or value is False else value
-        for name, value in values.items()
     }
 
 
@@ -198,23 +191,19 @@ def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None)
     to_reference = np.zeros((4, 4)) if reference is None else reference.reprojection(camera)
     return {
         "pixels_per_unit": camera.pixels_per_unit,
-        **setting_values(look, TONE_SETTINGS),
         "curve_light": int(look.tone == "light"),
         "curve_black": black,
         "curve_scale": scale,
         "curve_power": 1 / look.tone_gamma,
-        **{
-            f"to_reference_{axis}": tuple(to_reference[row])
-            for axis, row in zip("xyw", (0, 1, 3), strict=True)
-        },
+        **matrix_rows("to_reference", "xyw", to_reference[[0, 1, 3]]),
     }
 
 
 def shadow_uniforms(item: DrawItem, light_view: Camera) -> dict[str, Any]:
     """Return the rows of the matrix from a model to the clip space of a light, and of its depth."""
     clip = light_view.projection @ light_view.view @ item.model_matrix
-    uniforms = {f"clip_{axis}": tuple(row) for axis, row in zip("xyzw", clip, strict=True)}
-    return {**uniforms, "depth_row": tuple(-(light_view.view @ item.model_matrix)[2])}
+    depth_row = tuple(-(light_view.view @ item.model_matrix)[2])
+    return {**matrix_rows("clip", "xyzw", clip), "depth_row": depth_row}
 
 
 def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
@@ -224,14 +213,8 @@ def light_view_uniforms(light_view: Camera, camera: Camera) -> dict[str, Any]:
     camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
     camera_to_light = light_view.view @ camera_to_world
     return {
-        **{
-            f"light_view_{axis}": tuple(row)
-            for axis, row in zip("xyz", camera_to_light[:3], strict=True)
-        },
-        **{
-            f"light_projection_{axis}": tuple(row)
-            for axis, row in zip("xy", light_view.projection[:2], strict=True)
-        },
+        **matrix_rows("light_view", "xyz", camera_to_light[:3]),
+        **matrix_rows("light_projection", "xy", light_view.projection[:2]),
         "light_is_perspective": int(light_view.is_perspective),
         "normal_bias": NORMAL_BIAS_PIXELS / light_view.pixels_per_unit,
     }
@@ -247,35 +230,31 @@ def instance_uniforms(
         "first_triangle_id": first_triangle_id,
         "triangle_count": item.mesh.buffers.triangle_count,
         "texels_per_record": item.mesh.buffers.texels_per_record,
-        **{
-            f"model_view_{axis}": tuple(row)
-            for axis, row in zip("xyz", model_to_camera[:3], strict=True)
-        },
+        **matrix_rows("model_view", "xyz", model_to_camera[:3]),
     }
 
 
-def uniform_scale(model_matrix: np.ndarray) -> float:
-    """Return the scale of a similarity matrix."""
-    return float(np.linalg.norm(model_matrix[:3, 0]))
-
-
-def covering_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
+def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     """Return the uniforms that number the sheets of the covering."""
     return {
         "degree": kind.degree,
         "line_count": kind.line_count,
         "sheet_count": kind.sheets_per_turn,
-        "guiding_angle": look.guiding_angle,
     }
 
 
 def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that unfolds the covering."""
     return {
+        **covering_uniforms(kind),
         **screen_direction_uniforms(kind, look, camera),
-        "min_normal_cosine": -2.0 if look.cross_creases else float(np.cos(look.crease_angle)),
-        "foreshorten": int(look.foreshorten),
+        "min_normal_cosine": min_normal_cosine(look),
     }
+
+
+def min_normal_cosine(look: Look) -> float:
+    """Return the cosine of the largest angle between the normals of pixels that continue each other."""
+    return -2.0 if look.cross_creases else float(np.cos(look.crease_angle))
 
 
 def screen_direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
@@ -297,7 +276,7 @@ def even_line_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, 
     spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
     asked_pixels = SPACING_GRAINS * look.grain if look.unit == "pixels" else 0.0
     return {
-        **covering_uniforms(item.kind, look),
+        **covering_uniforms(item.kind),
         **screen_direction_uniforms(item.kind, look, camera),
         "wobble_shift": WOBBLE_SHIFT / WOBBLE_STD,
         "spacing_pixels": spacing * camera.pixels_per_unit,
@@ -316,7 +295,7 @@ def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
     density = settings["density"]
     amplitude = NOISE_STD / np.sqrt(density * (1 - density)) / len(SUBPIXEL_OFFSETS)
     return {
-        **{f"lattice_{axis}": (*row, 0.0) for axis, row in zip("xyz", lattice_axes(), strict=True)},
+        **matrix_rows("lattice", "xyz", np.pad(lattice_axes(), ((0, 0), (0, 1)))),
         "amplitude": amplitude,
         "density": density,
         "density_threshold": round(density * 2**24),

@@ -10,7 +10,7 @@ rendered in slices of time, one slice per redraw.
     references     the reference renders of the tone "picture"
     layers         the meshes of view layers, as they were read last
     flow_clock     the clock by which streaks drift
-    singularity_dots, arrowheads    what is drawn over the pictures
+    marks          dots at singularities and arrowheads, drawn over the pictures
     progressive    previews and final pictures, within a time budget
     session        handlers, timers and drawing; `start` and `stop`
 """

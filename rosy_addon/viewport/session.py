@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 import traceback
+from collections import defaultdict
 from collections.abc import Callable, Hashable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import bpy
@@ -23,22 +25,22 @@ from ..scene.cameras import camera_of_view
 from ..scene.lights import read_lights
 from ..scene.look_properties import look_at_frame, read_look
 from ..scene.read_request import read_request
-from ..scene.scene_reader import SceneInstance, check_sources
+from ..scene.scene_reader import check_sources
 from ..worker.helper import Helper
-from .arrowheads import draw_arrowheads
 from .background import view_background
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates
-from .messages import draw_messages
-from .progressive import ProgressiveRenderer
-from .references import ReferenceImages
-from .singularity_dots import (
+from .marks import (
     SingularityDots,
+    draw_arrowheads,
     draw_dots,
     draw_labels,
     look_up_singularities,
     singularity_dots,
 )
+from .messages import draw_messages
+from .progressive import ProgressiveRenderer
+from .references import ReferenceImages
 from .view3d import (
     clip_planes,
     is_timeline_playing,
@@ -67,19 +69,30 @@ OPACITY, OPACITY_IN_EDIT_MODE = 1.0, 0.7
 #: Most triangles of a view among which hidden places of arrowheads are found exactly. Else they leave gaps.
 MAX_EXACT_TRIANGLES = 200_000
 
-#: Methods of the session that are called by timers.
-TIMER_METHODS = (
-    "_drop_closed_views",
-    "_tag_redraw",
-    "_poll_helper",
-    "_resolve_topologies",
-    "_load_reference_images",
-    "_redraw_sidebars",
-    "_advance_flow",
-)
-
 #: Pointers of a space and of one of its regions.
 ViewPointers = tuple[int, int]
+
+
+@dataclass(eq=False)
+class ViewOverlay:
+    """What is drawn over the picture of a region of a live view.
+
+    Attributes
+    ----------
+    problem : str or None
+        Why it shows no picture, or one by another method.
+    lines : list of str
+        Its text, as it was drawn last.
+    labeled : (list of SingularityDots, float) or None
+        The dots that have labels, and their size.
+    arrowheads : (hashable, ArrowMarks) or None
+        Its arrowheads, after a key of what they depend on.
+    """
+
+    problem: str | None = None
+    lines: list[str] = field(default_factory=list)
+    labeled: tuple[list[SingularityDots], float] | None = None
+    arrowheads: tuple[Hashable, ArrowMarks] | None = None
 
 
 class ViewportSession:
@@ -115,36 +128,29 @@ class ViewportSession:
         self.flow_clock = FlowClock()
         #: Whether a view has shown streaks that drift since the clock was advanced.
         self._has_shown_flow = False
-        #: Why a view shows no picture, or one by another method.
-        self._problems: dict[ViewPointers, str] = {}
-        #: The lines of text in each view.
-        self._lines: dict[ViewPointers, list[str]] = {}
-        self.layers = LayerStates(lambda: self._schedule(0.0, "_resolve_topologies"))
+        self._overlays: defaultdict[ViewPointers, ViewOverlay] = defaultdict(ViewOverlay)
+        self.layers = LayerStates(lambda: self._schedule(0.0, self._resolve_topologies))
         #: Stores the singularities of fields, and the fields at corners for arrowheads.
         self._marks_cache = Cache()
-        #: The dots that have labels in each view, and their size.
-        self._labeled: dict[ViewPointers, tuple[list[SingularityDots], float]] = {}
-        #: The arrowheads of each view, with a key of what they depend on.
-        self._arrowheads: dict[ViewPointers, tuple[Hashable, ArrowMarks]] = {}
-        self._references = ReferenceImages(lambda: self._schedule(0.0, "_load_reference_images"))
+        self._references = ReferenceImages(lambda: self._schedule(0.0, self._load_references))
         self._draw_handlers = [
             bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
             bpy.types.SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
         ]
-        self._app_handlers: list[tuple[list, Callable[..., None]]] = []
         handlers = bpy.app.handlers
-        for handler_list, handler in (
+        self._app_handlers = [
             (handlers.depsgraph_update_post, self._on_update),
             (handlers.frame_change_post, self._on_update),
             (handlers.undo_post, self._on_undo),
             (handlers.redo_post, self._on_undo),
             (handlers.load_pre, self._on_load),
-        ):
+        ]
+        for handler_list, handler in self._app_handlers:
             handler_list.append(handler)
-            self._app_handlers.append((handler_list, handler))
-        # Blender identifies a timer by its function object. Each access to a method makes a new one.
-        self._timers = {name: getattr(self, name) for name in TIMER_METHODS}
-        self._schedule(CLOSED_VIEWS_INTERVAL_SECONDS, "_drop_closed_views")
+        #: The functions that timers call. Blender identifies a timer by its function object, and each access
+        #: to a method makes a new one.
+        self._timers: dict[Callable[[], float | None], Callable[[], float | None]] = {}
+        self._schedule(CLOSED_VIEWS_INTERVAL_SECONDS, self._drop_closed_views)
 
     def _new_progressive(self, device: str) -> ProgressiveRenderer:
         """Return what draws the views, with a device."""
@@ -152,7 +158,7 @@ class ViewportSession:
             select_viewport_renderer(device),
             self._helper,
             self._schedule_redraw,
-            lambda: self._schedule(POLL_SECONDS, "_poll_helper"),
+            lambda: self._schedule(POLL_SECONDS, self._poll_helper),
         )
 
     # --- switching -------------------------------------------------------------------------------
@@ -165,9 +171,8 @@ class ViewportSession:
     def remove(self, space_pointer: int) -> None:
         """Make a view no longer live, given its pointer."""
         self.spaces.discard(space_pointer)
-        for of_views in (self._problems, self._lines, self._labeled, self._arrowheads):
-            for pointers in [pointers for pointers in of_views if pointers[0] == space_pointer]:
-                del of_views[pointers]
+        for pointers in [pointers for pointers in self._overlays if pointers[0] == space_pointer]:
+            del self._overlays[pointers]
         self.progressive.remove_space(space_pointer)
         redraw()
 
@@ -191,7 +196,7 @@ class ViewportSession:
         """Let streaks drift, or stop them."""
         if plays:
             self.flow_clock.play(time.monotonic())
-            self._schedule(0.0, "_advance_flow")
+            self._schedule(0.0, self._advance_flow)
             redraw(self.spaces)
         else:
             self.flow_clock.pause()
@@ -238,14 +243,10 @@ class ViewportSession:
         redraw(self.spaces)
         return None
 
-    def _load_reference_images(self) -> None:
+    def _load_references(self) -> None:
         """Load the pictures that tones come from."""
         self._references.load_pending()
         redraw(self.spaces)
-
-    def _redraw_sidebars(self) -> None:
-        """Show the text of the views in the sidebars too."""
-        redraw_sidebars()
 
     def _advance_flow(self) -> float | None:
         """Advance the clock of the streaks by a frame, and redraw. Pictures are not overtaken.
@@ -267,40 +268,39 @@ class ViewportSession:
             redraw(self.spaces)
         return 1 / rate
 
-    def _schedule(self, seconds: float, name: str) -> None:
-        """Start a timer that calls a method, unless it is running already."""
-        timer = self._timers[name]
+    def _schedule(self, seconds: float, function: Callable[[], float | None]) -> None:
+        """Start a timer that calls a function, unless it is running already."""
+        timer = self._timers.setdefault(function, function)
         if not bpy.app.timers.is_registered(timer):
             bpy.app.timers.register(timer, first_interval=seconds)
 
     def _schedule_redraw(self, seconds: float) -> None:
-        self._schedule(seconds, "_tag_redraw")
+        self._schedule(seconds, self._tag_redraw)
 
     # --- drawing ---------------------------------------------------------------------------------
 
     def _draw(self) -> None:
         context = bpy.context
-        space, region = context.space_data, context.region
-        if space.as_pointer() not in self.spaces:
+        pointers = _pointers(context)
+        if pointers[0] not in self.spaces:
             return
-        pointers = space.as_pointer(), region.as_pointer()
-        self._problems.pop(pointers, None)
-        self._labeled.pop(pointers, None)
+        overlay = self._overlays[pointers]
+        overlay.problem = overlay.labeled = None
         try:
-            if not shows_surfaces(space):
+            if not shows_surfaces(context.space_data):
                 raise RosyError("fields are not drawn in wireframe shading: choose another shading")
-            self._draw_view(context, space, region)
+            self._draw_view(context, overlay)
         except DeviceError as error:
             if self.fallback_reason is None:
                 self._fall_back_to_cpu(error)
             else:
-                self._problems[pointers] = str(error)
+                overlay.problem = str(error)
         except REPORTED_ERRORS as error:
-            self._problems[pointers] = error_text(error)
+            overlay.problem = error_text(error)
         except Exception as error:
             # Blender would print this, and the view would stay plain.
             traceback.print_exc()
-            self._problems[pointers] = error_text(error)
+            overlay.problem = error_text(error)
 
     def _fall_back_to_cpu(self, error: DeviceError) -> None:
         """Continue with the CPU when the graphics card rejects a shader."""
@@ -310,102 +310,77 @@ class ViewportSession:
         self.layers.mark_all_stale()
         self._schedule_redraw(0.0)
 
-    def _draw_view(
-        self,
-        context: bpy.types.Context,
-        space: bpy.types.SpaceView3D,
-        region: bpy.types.Region,
-    ) -> None:
+    def _draw_view(self, context: bpy.types.Context, overlay: ViewOverlay) -> None:
         """Update the picture of a view and composite it."""
         depsgraph = context.evaluated_depsgraph_get()
         look = read_look(context.scene.rosy)
-        instances, view_input = self._read_view(context, depsgraph, space, region, look)
+        view_input = self._read_view(context, depsgraph, look, overlay)
         if view_input is None:
             return
+        still_look = replace(view_input.look, flow_phase=0.0)
+        with_field = [entry for entry in view_input.instances if entry.field is not None]
+        shows_dots = shows_singularities(look)
         view = self.progressive.update(
-            (space.as_pointer(), region.as_pointer()),
-            _picture_key(instances, view_input),
+            _pointers(context),
+            _picture_key(view_input),
             view_input,
-            _picture_key(
-                instances,
-                replace(view_input, look=replace(view_input.look, flow_phase=0.0)),
-            ),
+            _picture_key(replace(view_input, look=still_look)),
             [
                 partial(look_up_singularities, instance, self._marks_cache)
-                for instance in view_input.instances
-                if instance.field is not None and shows_singularities(look)
+                for instance in (with_field if shows_dots else ())
             ],
         )
+        renderer = self.progressive.renderer
         if self.progressive.is_prepared:
             background = view_background(context, depsgraph, view_input.camera, look)
             if background is not None:
-                self.progressive.renderer.draw_background(background)
-        if view.texture is not None:
-            editing = context.mode.startswith("EDIT")
-            opacity = OPACITY_IN_EDIT_MODE if editing else OPACITY
-            self.progressive.renderer.composite(view.texture, view.items, view_input, opacity)
-            self._draw_arrowheads(context, space, region, instances, view_input, look)
-            self._draw_singularities(context, space, region, view_input, look)
+                renderer.draw_background(background)
+        if view.texture is None:
+            return
+        opacity = OPACITY_IN_EDIT_MODE if context.mode.startswith("EDIT") else OPACITY
+        renderer.composite(view.texture, view.items, view_input, opacity)
+        if look.arrows:
+            self._draw_arrowheads(context, view_input, look, overlay)
+        else:
+            overlay.arrowheads = None
+        if shows_dots:
+            found = [
+                singularity_dots(instance, self._marks_cache, view_input.clip_planes)
+                for instance in with_field
+            ]
+            dots = [one for one in found if one is not None]
+            draw_dots(
+                context, dots, look.singularity_size, shows_hidden=look.singularity_dots == "all"
+            )
+            if look.singularity_labels:
+                overlay.labeled = dots, look.singularity_size
+        self._marks_cache.evict_over_limit()
 
     def _draw_arrowheads(
         self,
         context: bpy.types.Context,
-        space: bpy.types.SpaceView3D,
-        region: bpy.types.Region,
-        instances: list[SceneInstance],
         view_input: ViewInput,
         look: Look,
+        overlay: ViewOverlay,
     ) -> None:
-        """Draw arrowheads over the lines of a view, if the look has them."""
-        pointers = space.as_pointer(), region.as_pointer()
-        if not look.arrows:
-            self._arrowheads.pop(pointers, None)
-            return
+        """Draw arrowheads over the lines of a view."""
         look = replace(look, flow_phase=0.0)
         view = replace(view_input, look=look, lights=(), reference=None)
-        key = _picture_key(instances, view)
-        if pointers not in self._arrowheads or self._arrowheads[pointers][0] != key:
+        key = _picture_key(view)
+        if overlay.arrowheads is None or overlay.arrowheads[0] != key:
             triangles = sum(len(instance.surface.triangles) for instance in view.instances)
             is_exact = triangles <= MAX_EXACT_TRIANGLES
-            self._arrowheads[pointers] = (
-                key,
-                view_arrows(view, self._marks_cache, is_exact=is_exact),
-            )
-            self._marks_cache.evict_over_limit()
-        draw_arrowheads(context, self._arrowheads[pointers][1])
-
-    def _draw_singularities(
-        self,
-        context: bpy.types.Context,
-        space: bpy.types.SpaceView3D,
-        region: bpy.types.Region,
-        view_input: ViewInput,
-        look: Look,
-    ) -> None:
-        """Draw dots at the singularities of a view, if the look shows them."""
-        if not shows_singularities(look):
-            return
-        found = [
-            singularity_dots(instance, self._marks_cache, view_input.clip_planes)
-            for instance in view_input.instances
-            if instance.field is not None
-        ]
-        dots = [one for one in found if one is not None]
-        self._marks_cache.evict_over_limit()
-        shows_hidden = look.singularity_dots == "all"
-        draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden)
-        if look.singularity_labels:
-            self._labeled[space.as_pointer(), region.as_pointer()] = dots, look.singularity_size
+            overlay.arrowheads = key, view_arrows(view, self._marks_cache, is_exact=is_exact)
+        draw_arrowheads(context, overlay.arrowheads[1])
 
     def _read_view(
         self,
         context: bpy.types.Context,
         depsgraph: bpy.types.Depsgraph,
-        space: bpy.types.SpaceView3D,
-        region: bpy.types.Region,
         look: Look,
-    ) -> tuple[list[SceneInstance], ViewInput | None]:
-        """Read what a view shows; no input if there is nothing to draw yet.
+        overlay: ViewOverlay,
+    ) -> ViewInput | None:
+        """Read what a view shows; None if there is nothing to draw yet.
 
         Raises
         ------
@@ -415,32 +390,30 @@ class ViewportSession:
         """
         # Dots and arrowheads are drawn over the picture.
         look = replace(look, singularity_dots="none", arrows=0.0)
-        look, message = look_in_view(look, self.progressive.renderer)
-        if message is not None:
-            self._problems[space.as_pointer(), region.as_pointer()] = message
+        look, overlay.problem = look_in_view(look, self.progressive.renderer)
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
         if layer.is_starting:
             self._schedule_redraw(0.0)
-            return [], None
-        camera = camera_of_view(region, context.region_data)
+            return None
+        camera = camera_of_view(context.region, context.region_data)
         visible = [
             entry
             for entry in layer.instances
-            if is_visible(entry.visibility_object, depsgraph, space)
+            if is_visible(entry.visibility_object, depsgraph, context.space_data)
         ]
         with_field = [entry for entry in visible if entry.instance.field is not None]
         if not with_field:
             if layer.reader.errors or layer.reader.has_unresolved:
-                return visible, None
+                return None
             raise RosyError(
                 "no object with a field is visible here: make a field, or show its object"
             )
         check_sources(with_field, read_request(context.scene, look))
         reference = self._references.current(context.scene, depsgraph, look)
         if look.tone == "picture" and reference is None:
-            return visible, None  # not loaded yet
-        return visible, ViewInput(
+            return None  # not loaded yet
+        return ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
             look=self._drifted(look, context.scene),
@@ -459,16 +432,17 @@ class ViewportSession:
     def _draw_text(self) -> None:
         """Show what is being done, and why a field is not drawn."""
         context = bpy.context
-        pointers = context.space_data.as_pointer(), context.region.as_pointer()
+        pointers = _pointers(context)
         if pointers[0] not in self.spaces:
             return
-        if pointers in self._labeled:
-            draw_labels(context, *self._labeled[pointers])
+        overlay = self._overlays[pointers]
+        if overlay.labeled is not None:
+            draw_labels(context, *overlay.labeled)
         lines = self._lines_of_view(pointers, self.layers.get(context.scene, context.view_layer))
         draw_messages(lines, context)
-        if lines != self._lines.get(pointers, []):
-            self._lines[pointers] = lines
-            self._schedule(0.0, "_redraw_sidebars")
+        if lines != overlay.lines:
+            overlay.lines = lines
+            self._schedule(0.0, redraw_sidebars)
 
     def _lines_of_view(self, pointers: ViewPointers, layer: LayerState | None) -> list[str]:
         """Return the lines of text in a view."""
@@ -480,8 +454,9 @@ class ViewportSession:
         view = self.progressive.views.get(pointers)
         if view is not None and view.progress is not None:
             lines.append(f"{view.progress.label} ...")
-        if pointers in self._problems:
-            lines.append(self._problems[pointers])
+        problem = self._overlays[pointers].problem
+        if problem is not None:
+            lines.append(problem)
         errors = [error_text(error) for error in layer.reader.errors.values()] if layer else []
         lines += errors[:MAX_OBJECT_ERRORS]
         if len(errors) > MAX_OBJECT_ERRORS:
@@ -493,21 +468,22 @@ class ViewportSession:
     def messages(self, area: bpy.types.Area) -> list[str]:
         """Return the text in the views of an area, as they were drawn last."""
         space_pointer = area.spaces.active.as_pointer()
-        return list(
-            dict.fromkeys(
-                line
-                for region in area.regions
-                for line in self._lines.get((space_pointer, region.as_pointer()), [])
-            )
-        )
+        views = ((space_pointer, region.as_pointer()) for region in area.regions)
+        lines = (self._overlays[view].lines for view in views if view in self._overlays)
+        return list(dict.fromkeys(chain.from_iterable(lines)))
 
 
-def _picture_key(instances: list[SceneInstance], view_input: ViewInput) -> Hashable:
+def _pointers(context: bpy.types.Context) -> ViewPointers:
+    """Return the pointers of the view that is drawn."""
+    return context.space_data.as_pointer(), context.region.as_pointer()
+
+
+def _picture_key(view_input: ViewInput) -> Hashable:
     """Return a key that changes whenever the picture of a view would change."""
     camera = view_input.camera
     planes = view_input.clip_planes
     return (
-        tuple(entry.instance for entry in instances),
+        view_input.instances,
         camera.view.tobytes(),
         camera.projection.tobytes(),
         (camera.width, camera.height),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import pickle
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import fields
 from multiprocessing.connection import Connection
 from typing import Any
@@ -49,7 +49,9 @@ class Channel:
         self._last_number = 0
         #: What this process keeps for the other one, by number.
         self._kept: dict[int, Any] = {}
-        self._incoming = _Incoming()
+        #: The message that is being received, and the same once it is complete.
+        self._parts = _message_parts(connection)
+        self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
 
     def poll(self, timeout: float = 0.0) -> bool:
         """Return whether there is something to receive, an end of the connection included."""
@@ -64,11 +66,11 @@ class Channel:
             If the other process has ended.
         """
         deadline = time.monotonic() + seconds
-        while not self._incoming.is_complete and self.connection.poll():
-            self._incoming.receive_part(self.connection)
+        while self._message is None and self.connection.poll():
+            self._receive_part()
             if time.monotonic() > deadline:
                 break
-        return self._incoming.is_complete
+        return self._message is not None
 
     def send(self, message: Any) -> None:
         """Send an object. What the last message had and this one has not is no longer kept.
@@ -99,64 +101,49 @@ class Channel:
         EOFError, OSError
             If the other process has ended.
         """
-        while not self._incoming.is_complete:
-            self._incoming.receive_part(self.connection)
-        message, self._incoming = self._incoming, _Incoming()
-        for number in message.forgotten:
+        while self._message is None:
+            self._receive_part()
+        (forgotten, stream, buffers), self._message = self._message, None
+        for number in forgotten:
             del self._kept[number]
-        return _Unpickler(message.stream, message.buffers, self._kept, self._package).load()
+        return _Unpickler(stream, buffers, self._kept, self._package).load()
+
+    def _receive_part(self) -> None:
+        """Wait for the next part of a message."""
+        try:
+            next(self._parts)
+        except StopIteration as end:
+            self._message, self._parts = end.value, _message_parts(self.connection)
 
     def close(self) -> None:
         """Close this end. The other process ends."""
         self.connection.close()
 
 
-class _Incoming:
-    """A message that is being received, in parts of up to `CHUNK_BYTES`.
+def _message_parts(
+    connection: Connection,
+) -> Generator[None, None, tuple[list[int], bytes, list[np.ndarray]]]:
+    """Receive a message, and wait for its parts of up to `CHUNK_BYTES` one by one.
 
-    Attributes
-    ----------
+    Returns
+    -------
     forgotten : list of int
         Numbers of what is no longer kept.
-    stream : bytes or None
+    stream : bytes
         The pickle.
     buffers : list of (n,) uint8 ndarray
         Its arrays.
     """
-
-    def __init__(self) -> None:
-        self.forgotten: list[int] = []
-        self.stream: bytes | None = None
-        self.buffers: list[np.ndarray] = []
-        self._sizes: list[int] | None = None
-        self._position = 0
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether all parts are here."""
-        return self.stream is not None and not self._sizes
-
-    def receive_part(self, connection: Connection) -> None:
-        """Wait for the next part."""
-        if self._sizes is None:
-            self.forgotten, self._sizes = connection.recv()
-        elif self.stream is None:
-            self.stream = connection.recv_bytes()
-            self._skip_empty()
-        else:
-            if not self._position:
-                self.buffers.append(np.empty(self._sizes[0], dtype=np.uint8))
-            self._position += connection.recv_bytes_into(self.buffers[-1], self._position)
-            if self._position == self._sizes[0]:
-                self._position = 0
-                del self._sizes[0]
-                self._skip_empty()
-
-    def _skip_empty(self) -> None:
-        """Add arrays without elements, of which nothing is sent."""
-        while self._sizes and not self._sizes[0]:
-            self.buffers.append(np.empty(0, dtype=np.uint8))
-            del self._sizes[0]
+    forgotten, sizes = connection.recv()
+    yield
+    stream = connection.recv_bytes()
+    buffers = [np.empty(size, dtype=np.uint8) for size in sizes]
+    for buffer in buffers:
+        position = 0
+        while position < len(buffer):
+            yield
+            position += connection.recv_bytes_into(buffer, position)
+    return forgotten, stream, buffers
 
 
 class _Pickler(pickle.Pickler):

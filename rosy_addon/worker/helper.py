@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -53,15 +54,22 @@ class Helper:
     ----------
     is_usable : bool
         Whether a process may be started. It is False once that has failed.
+    fraction : float
+        How far the last call has come.
+    label : str
+        What is being done.
     """
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
         self.is_usable = True
+        self.fraction, self.label = 0.0, "starting"
         self._user: object | None = None
         self._environment = dict(environment or {})
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._is_ready, self._start_time = False, 0.0
+        #: A call that is not sent yet.
+        self._call: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
 
     def start(self) -> None:
         """Start the process if it does not run, without waiting until it is ready.
@@ -85,7 +93,7 @@ class Helper:
         self._channel = Channel(connection, STARTED_PACKAGE)
         self._is_ready, self._start_time = False, time.monotonic()
 
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Handle:
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> None:
         """Let the process call a function of this package.
 
         Parameters
@@ -94,13 +102,41 @@ class Helper:
             Of a module that needs no Blender.
         *arguments
             Anything that can be pickled.
+        """
+        self.start()
+        self.fraction, self.label = 0.0, "starting"
+        self._call = function, arguments
+
+    def poll(self) -> Callable[[], Any] | None:
+        """Hear what the process says, without waiting.
 
         Returns
         -------
-        Handle
+        callable or None
+            Once the call is done: returns what the function has returned, or raises what it has raised.
+
+        Raises
+        ------
+        HelperLostError
+            If the process has ended. The call may be submitted again.
         """
-        self.start()
-        return Handle(self, (function, arguments))
+        channel = self._channel
+        if channel is None:
+            raise self._lost()
+        try:
+            if self._call is not None:
+                if not self._is_prepared():
+                    return None
+                channel.send(self._call)
+                self._call = None
+            while channel.has_received(RECEIVE_SECONDS):
+                kind, *content = channel.receive()
+                if kind != "progress":
+                    return partial(_outcome, kind, *content)
+                self.fraction, self.label = content
+        except (EOFError, OSError):
+            raise self._lost() from None
+        return None
 
     def take(self, user: object) -> bool:
         """Reserve the process for one of several users, and return whether nobody else has it."""
@@ -156,70 +192,11 @@ class Helper:
         return HelperLostError(f"the helper process {what}{status}", has_started)
 
 
-class Handle:
-    """A call that a helper works on.
-
-    Attributes
-    ----------
-    fraction : float
-        How far it has come.
-    label : str
-        What is being done.
-    is_done : bool
-    """
-
-    def __init__(self, helper: Helper, call: tuple[Callable[..., Any], tuple[Any, ...]]) -> None:
-        self.fraction, self.label, self.is_done = 0.0, "starting", False
-        self._helper = helper
-        self._call: tuple[Callable[..., Any], tuple[Any, ...]] | None = call
-        self._result: Any = None
-        self._error: BaseException | None = None
-
-    def poll(self) -> bool:
-        """Hear what the helper says, without waiting. Return whether the call is done.
-
-        Raises
-        ------
-        HelperLostError
-            If the helper has ended. The call may be submitted again.
-        """
-        helper = self._helper
-        channel = helper._channel
-        if self.is_done:
-            return True
-        if channel is None:
-            raise helper._lost()
-        try:
-            if self._call is not None:
-                if not helper._is_prepared():
-                    return False
-                channel.send(self._call)
-                self._call = None
-            while not self.is_done and channel.has_received(RECEIVE_SECONDS):
-                kind, *content = channel.receive()
-                if kind == "progress":
-                    self.fraction, self.label = content
-                    continue
-                self.is_done = True
-                if kind == "result":
-                    (self._result,) = content
-                else:
-                    self._error, text = content
-                    self._error.__cause__ = _RemoteTracebackError(f"\n{text}")
-        except (EOFError, OSError):
-            raise helper._lost() from None
-        return self.is_done
-
-    def result(self) -> Any:
-        """Return what the function has returned, or raise what it has raised, once the call is done."""
-        if self._error is not None:
-            raise self._error
-        return self._result
-
-    def cancel(self) -> None:
-        """End the helper at once, if the call is not done."""
-        if not self.is_done:
-            self._helper.close()
+def _outcome(kind: str, answer: Any, traceback: str = "") -> Any:
+    """Return a result, or raise an error that has this traceback in the helper."""
+    if kind == "error":
+        raise answer from _RemoteTracebackError(f"\n{traceback}")
+    return answer
 
 
 #: The helper of Blender's windows; see `ui.helper_start`.

@@ -63,20 +63,17 @@ Steps = Generator[Call | Step, Any, Result]
 
 def run(steps: Steps[Result]) -> Result:
     """Run a job to its end in this process, and return its result."""
-    answer, error = None, None
-    while True:
-        try:
-            step = steps.send(answer) if error is None else steps.throw(error)
-        except StopIteration as end:
-            return end.value
-        answer, error = None, None
-        try:
-            if isinstance(step, Call):
-                answer = step()
+    try:
+        step = next(steps)
+        while True:
+            try:
+                answer = step() if isinstance(step, Call) else report(*step)
+            except Exception as error:
+                step = steps.throw(error)
             else:
-                report(*step)
-        except Exception as raised:
-            error = raised
+                step = steps.send(answer)
+    except StopIteration as end:
+        return end.value
 
 
 def part(
@@ -96,23 +93,21 @@ def part(
     def scaled(fraction: float) -> float:
         return start + (stop - start) * fraction
 
-    answer, error = None, None
     try:
+        step = next(steps)
         while True:
-            try:
-                step = steps.send(answer) if error is None else steps.throw(error)
-            except StopIteration as end:
-                return end.value
-            answer, error = None, None
-            step_label = step.label if label is None else label
+            step = step._replace(label=label or step.label)
             try:
                 if isinstance(step, Call):
-                    ends = scaled(step.start), scaled(step.stop)
-                    answer = yield Call(step.function, step.arguments, *ends, step_label)
+                    answer = yield step._replace(start=scaled(step.start), stop=scaled(step.stop))
                 else:
-                    yield Step(scaled(step.fraction), step_label)
-            except Exception as raised:
-                error = raised
+                    answer = yield step._replace(fraction=scaled(step.fraction))
+            except Exception as error:
+                step = steps.throw(error)
+            else:
+                step = steps.send(answer)
+    except StopIteration as end:
+        return end.value
     finally:
         steps.close()
 

@@ -10,7 +10,7 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from ..progress import current_report, listening
-from .helper import Handle, Helper, HelperLostError
+from .helper import Helper, HelperLostError
 
 #: Environment of the helpers. Each has one core.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -91,7 +91,7 @@ class _SharedCalls:
         self._results: list[Any] = [None] * len(arguments)
         #: Numbers of the calls that nobody makes yet, and of those that helpers make.
         self._waiting = deque(range(len(arguments)))
-        self._given: dict[Helper, tuple[int, Handle]] = {}
+        self._given: dict[Helper, int] = {}
         self._free = list(helpers)
         self._report = current_report()
 
@@ -108,8 +108,8 @@ class _SharedCalls:
                     wait([helper.connection for helper in self._given], WAIT_SECONDS)
                     self._hear(1.0, "waiting for other processes")
         except BaseException:
-            for _, handle in self._given.values():
-                handle.cancel()
+            for helper in self._given:
+                helper.close()
             raise
         return self._results
 
@@ -121,20 +121,21 @@ class _SharedCalls:
 
     def _attend_to_helpers(self) -> None:
         """Take what helpers have done, and give them what waits. The calls of lost ones wait again."""
-        for helper, (number, handle) in list(self._given.items()):
+        for helper, number in list(self._given.items()):
             try:
-                if handle.poll():
-                    self._results[number] = handle.result()
+                outcome = helper.poll()
+                if outcome is not None:
                     self._free.append(helper)
                     del self._given[helper]
+                    self._results[number] = outcome()
             except HelperLostError:
                 self._waiting.appendleft(number)
                 del self._given[helper]
         while self._waiting and self._free:
             helper = self._free.pop()
             with suppress(HelperLostError):
-                handle = helper.submit(self._function, *self._arguments[self._waiting[0]])
-                self._given[helper] = self._waiting.popleft(), handle
+                helper.submit(self._function, *self._arguments[self._waiting[0]])
+                self._given[helper] = self._waiting.popleft()
 
 
 #: The helpers of this process.

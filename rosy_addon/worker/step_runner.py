@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, NoReturn
 
 from ..errors import RosyError
-from .helper import Handle, Helper, HelperLostError
+from .helper import Helper, HelperLostError
 from .job import Call, Step, Steps
 
 
@@ -25,6 +25,8 @@ class StepRunner:
 
     Attributes
     ----------
+    step : Step or None
+        How far the steps have come; None before the first one.
     helper_seconds : float
         Seconds of work of the helper so far.
     is_done : bool
@@ -34,23 +36,14 @@ class StepRunner:
     """
 
     def __init__(self, steps: Steps[Any], helper: Helper) -> None:
+        self.step: Step | None = None
         self.helper_seconds, self.is_done, self.is_in_place = 0.0, False, False
         self._steps, self._helper = steps, helper
-        self._step: Step | None = None
-        #: A call that the steps wait for, the helper's handle of it, and what returns or raises its result.
+        #: A call that the steps wait for, and what returns or raises its result.
         self._call: Call | None = None
-        self._handle: Handle | None = None
         self._outcome: Callable[[], Any] | None = None
-        self._call_time, self._is_repeated = 0.0, False
-
-    @property
-    def step(self) -> Step | None:
-        """How far the steps have come; None before the first one."""
-        call, handle = self._call, self._handle
-        if call is None or handle is None:
-            return self._step
-        fraction = call.start + (call.stop - call.start) * handle.fraction
-        return Step(fraction, handle.label if call.label is None else call.label)
+        #: Whether the helper makes the call, since when (seconds, monotonic), and whether it does once more.
+        self._is_submitted, self._call_time, self._is_repeated = False, 0.0, False
 
     @property
     def has_answer(self) -> bool:
@@ -62,17 +55,20 @@ class StepRunner:
         if self._call is None or self._outcome is not None:
             return True
         try:
-            if self._handle is None:
+            if not self._is_submitted:
                 if not self._helper.take(self):
                     return False
-                self._handle = self._helper.submit(self._call.function, *self._call.arguments)
-                self._call_time = time.monotonic()
-            if not self._handle.poll():
+                self._helper.submit(self._call.function, *self._call.arguments)
+                self._is_submitted, self._call_time = True, time.monotonic()
+            self._outcome = self._helper.poll()
+            call, helper = self._call, self._helper
+            fraction = call.start + (call.stop - call.start) * helper.fraction
+            self.step = Step(fraction, helper.label if call.label is None else call.label)
+            if self._outcome is None:
                 return False
-            self._outcome = self._handle.result
         except HelperLostError as lost:
             if lost.has_started and not self._is_repeated:
-                self._handle, self._is_repeated = None, True
+                self._is_submitted, self._is_repeated = False, True
                 return False
             if lost.has_started:
                 problem = (
@@ -95,8 +91,8 @@ class StepRunner:
         StopIteration
             With the result, if the steps are done.
         """
-        outcome, self._call, self._handle, self._outcome = self._outcome, None, None, None
-        self.is_in_place = self._is_repeated = False
+        outcome, self._call, self._outcome = self._outcome, None, None
+        self.is_in_place = self._is_submitted = self._is_repeated = False
         try:
             step = next(self._steps) if outcome is None else self._continued(outcome)
         except BaseException:
@@ -104,10 +100,10 @@ class StepRunner:
             raise
         if isinstance(step, Call):
             self._call = step
-            self._step = Step(step.start, step.label or "starting")
+            self.step = Step(step.start, step.label or "starting")
         else:
-            self._step = step
-        return self._step
+            self.step = step
+        return self.step
 
     def _continued(self, outcome: Callable[[], Any]) -> Call | Step:
         """Send the steps the result or the error of their call."""
@@ -119,10 +115,10 @@ class StepRunner:
 
     def close(self) -> None:
         """Stop, and end the helper if it works for these steps."""
-        if self._handle is not None:
-            self._handle.cancel()
+        if self._is_submitted and self._outcome is None:
+            self._helper.close()
         self._helper.release(self)
-        self._call = self._handle = self._outcome = None
+        self._call = self._outcome = None
         self._steps.close()
 
 

@@ -46,7 +46,7 @@ def rosy():
 def card(rosy):
     errors = module_of(PACKAGE, "errors")
     try:
-        device = module_of(PACKAGE, "gpu.device").BlenderDevice()
+        device = module_of(PACKAGE, "gpu.device").Device()
     except errors.RosyError as error:
         pytest.skip(str(error))
     return rosy.GpuRenderer(device)
@@ -171,8 +171,7 @@ def test_a_rejected_shader_is_an_error_of_one_line(rosy, card, capfd):
     class Broken(passes.ComputePass):
         source = "void main() { nonsense }"
 
-    broken = Broken("broken", (), (("picture", "RGBA32F"),), (("side", "int"),))
     image = card.device.texture(8, 8, "RGBA32F")
-    with pytest.raises(errors.RosyError, match="'broken'"):
-        card.device.compute(broken, (8, 8), {}, {"picture": image}, {"side": 1})
+    with pytest.raises(errors.RosyError, match="'clear'"):
+        card.device.compute(Broken("clear"), (8, 8), {}, {"cleared": image}, {"box_origin": (0, 0)})
     capfd.readouterr()

@@ -1163,15 +1163,19 @@ def nothing_leaks():
     # On software OpenGL, textures are in the memory of the process, where a leak is visible.
     renderers = []
 
+    def count_held(renderer):
+        held = renderer.resources
+        return len(held._meshes) + len(held._images) + len(held._lookup_textures)
+
     def count():
         gc.collect()
-        return sum(renderer.resources.texture_count for renderer in renderers), resident_memory()
+        return sum(map(count_held, renderers)), resident_memory()
 
     def toggle():
         switch("ON")
         renderers[:] = [*renderers[-9:], session_module()._session.progressive.renderer]
         view()[1].tag_redraw()
-        yield from wait_until(lambda: renderers[-1].resources.texture_count > 8)
+        yield from wait_until(lambda: count_held(renderers[-1]) > 8)
         switch("OFF")
         yield 0.02
 

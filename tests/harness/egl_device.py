@@ -1,11 +1,11 @@
 """`EglDevice`: runs the shaders without Blender, on OpenGL with an EGL context.
 
-It has the same interface as `rosy_addon.gpu.device.BlenderDevice`.
+It has the same interface as `rosy_addon.gpu.device.Device`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import moderngl
@@ -26,7 +26,7 @@ class EglDevice:
 
     def __init__(self) -> None:
         self.context = moderngl.create_standalone_context(backend="egl", require=430)
-        self._programs: dict[Hashable, Any] = {}
+        self._programs: dict[ComputePass | RasterPass, Any] = {}
         self.max_texture_size: int = self.context.info["GL_MAX_TEXTURE_SIZE"]
 
     @property
@@ -36,11 +36,11 @@ class EglDevice:
 
     def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
         """As `Device.is_compiled`."""
-        return shader.key in self._programs
+        return shader in self._programs
 
     def compile(self, shader: ComputePass | RasterPass) -> None:
         """As `Device.compile`."""
-        self._programs[shader.key] = self._compile(shader)
+        self._programs[shader] = self._compile(shader)
 
     def texture(
         self,
@@ -51,6 +51,8 @@ class EglDevice:
         data: np.ndarray | None = None,
     ) -> Any:
         """As `Device.texture`."""
+        if texel_format == "DEPTH_COMPONENT32F":
+            return self.context.depth_texture((width, height))
         components, dtype = FORMATS[texel_format]
         if data is not None:
             data = np.ascontiguousarray(data, dtype=dtype)
@@ -58,10 +60,6 @@ class EglDevice:
             size = width, height, layers
             return self.context.texture_array(size, components, data, dtype=dtype)
         return self.context.texture((width, height), components, data, dtype=dtype)
-
-    def depth_texture(self, width: int, height: int) -> Any:
-        """As `Device.depth_texture`."""
-        return self.context.depth_texture((width, height))
 
     def batch(self, vertices: np.ndarray) -> Any:
         """As `Device.batch`."""
@@ -87,11 +85,10 @@ class EglDevice:
         self,
         shader: RasterPass,
         batches: Sequence[tuple[Any, NamedValues]],
-        target: tuple[Any, Any],
-        uniforms: NamedValues,
+        color: Any,
+        depth: Any,
     ) -> None:
         """As `Device.draw`."""
-        color, depth = target
         framebuffer = self.context.framebuffer([color], depth)
         framebuffer.use()
         framebuffer.clear(depth=1.0)
@@ -99,7 +96,7 @@ class EglDevice:
         for culled in ("back", "front"):
             self.context.cull_face = culled
             for batch, item_uniforms in batches:
-                program = self._bind(shader, {}, {**uniforms, **item_uniforms})
+                program = self._bind(shader, {}, item_uniforms)
                 self.context.vertex_array(program, [(batch, "4f", "vertex_data")]).render()
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
@@ -113,11 +110,9 @@ class EglDevice:
     def _bind(
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> Any:
-        if isinstance(shader, ComputePass):
-            shader = shader.variant(uniforms)
-        if shader.key not in self._programs:
-            self._programs[shader.key] = self._compile(shader)
-        program = self._programs[shader.key]
+        if shader not in self._programs:
+            self._programs[shader] = self._compile(shader)
+        program = self._programs[shader]
         for slot, name in enumerate(shader.textures):
             textures[_base_name(name)].use(slot)
             if _base_name(name) in program:

@@ -128,7 +128,7 @@ def draw_pair(
     items = card.upload(instances, look.display)
     texture = rosy.run(card.texture_steps(items, view))
     card_picture = card.read(texture, width, height)
-    images = card.read_gbuffer(view.camera)
+    images = read_gbuffer(card, width, height)
     gbuffer = rosy.project(instances, view.camera, look.display, samples=supersampling)
     is_center = None
     if supersampling > 1:
@@ -148,6 +148,14 @@ def draw_pair(
         numpy_picture,
         is_center,
     )
+
+
+def read_gbuffer(card: Any, width: int, height: int) -> dict[str, np.ndarray]:
+    """Return the G-buffer of the last picture of a card, by the names of its images."""
+    return {
+        name: card.read(card.resources.image(name, width, height), width, height)
+        for name in ("normals", "field_values")
+    }
 
 
 def draw_on_card(
@@ -183,7 +191,7 @@ def agreement(
     gbuffer : GBuffer
         The G-buffer of numpy.
     images : dict of str to (H, W, 4) ndarray
-        The G-buffer of the card; see `GpuRenderer.read_gbuffer`.
+        The G-buffer of the card; see `read_gbuffer`.
     is_center : (P,) bool ndarray, optional
         As of `Pair`.
     """

@@ -1,6 +1,12 @@
 // Directions with the gradients of their angles on screen, by differences over connected neighbors.
 // Streamlines use them at positions away from the center of a pixel.
 
+#include "line_neighbor.glsl"
+
+uniform ivec2 box_origin;
+layout(rgba16f) uniform writeonly image2DArray angle_gradients;
+#pragma constant(line_count, sheet_count)
+
 // The sine of the angle from a direction to that of the same sheet at a neighbor.
 float angle_difference(ivec2 pixel, int line, ivec2 offset, vec2 direction, float phase)
 {

@@ -1,5 +1,8 @@
 // One color behind everything in the 3D view.
 
+uniform vec4 background_color;
+out vec4 view_color;
+
 void main()
 {
   // Linear: Blender's frame buffer encodes the display color.

@@ -1,6 +1,12 @@
 // The picture: the mean of the colors of the surfaces that the samples of a pixel show, weighted by alpha.
 // Pixels without any are transparent black.
 
+#include "sample_entry.glsl"
+
+uniform sampler2D shaded_picture;
+uniform int samples_per_side;
+layout(rgba32f) uniform writeonly image2D picture;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

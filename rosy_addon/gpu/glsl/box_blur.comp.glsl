@@ -1,5 +1,10 @@
 // Mean along rows or columns. Pixels outside the image count as 0.
 
+uniform sampler2D source_image;
+uniform int radius;
+uniform ivec2 blur_axis;
+layout(rgba32f) uniform writeonly image2D blurred_image;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

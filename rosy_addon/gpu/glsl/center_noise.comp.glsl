@@ -1,5 +1,9 @@
 // Noise around its mean, with the low frequencies subtracted.
 
+uniform sampler2D raw_noise, blurred_noise;
+uniform int high_passed;
+layout(rgba32f) uniform writeonly image2D noise;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

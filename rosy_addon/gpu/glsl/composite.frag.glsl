@@ -1,5 +1,12 @@
 // The color of the picture at a fragment, for drawing over the 3D view.
 
+uniform sampler2D picture;
+uniform float opacity;
+uniform vec2 view_origin, pixel_scale;
+in vec4 clip_distances;
+in vec2 more_clip_distances;
+out vec4 view_color;
+
 vec4 sample_picture(vec2 position)
 {
   ivec2 max_texel = textureSize(picture, 0) - 1;

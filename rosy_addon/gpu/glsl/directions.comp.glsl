@@ -1,6 +1,19 @@
 // The cells of the covering, and the direction of each line on screen: `pixel_neighbors` and
 // `covering` in one pass. A cell holds its phase with the neighbor mask, and the noise.
 
+#include "surface_continuity.glsl"
+#include "screen_direction.glsl"
+
+uniform sampler2D normals, field_values, depth_slopes, noise, wobble_angles;
+uniform float guiding_angle, min_normal_cosine, wobble_strength;
+uniform int degree, line_count, sheet_count, foreshorten;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera;
+layout(rg32f) uniform writeonly image2D cells;
+layout(rgba16f) uniform writeonly image2DArray directions;
+#pragma constant(degree, line_count, sheet_count, harmonic_count, first_harmonic, foreshorten)
+
 // Whether the surface continues from a pixel to a neighbor, as in `pixel_neighbors`.
 bool is_continuous(ivec2 pixel, ivec2 offset, vec4 value, vec4 normal, vec4 slope)
 {

@@ -2,6 +2,18 @@
 // middle of the nearest line, the distance between lines in pixels, and the width of the lines that
 // grow between them. Lines that replace crowded ones have the distance and the width of these.
 
+#include "triangle_record.glsl"
+#include "screen_direction.glsl"
+#include "line_member.glsl"
+
+uniform sampler2D line_records, normals, field_values, wobble_angles;
+uniform float guiding_angle, wobble_strength, wobble_shift, spacing_pixels, asked_pixels;
+uniform int line_count, node_count, first_layer;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera;
+layout(rgba16f) uniform writeonly image2DArray line_image;
+
 vec4 line_texel(int index)
 {
   return texelFetch(line_records, ivec2(index & ((1 << ROW_BITS) - 1), index >> ROW_BITS), 0);

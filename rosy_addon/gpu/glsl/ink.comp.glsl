@@ -1,6 +1,28 @@
 // Hatching: the ink that each line through a pixel leaves on the paper, from its streaks or as evenly spaced
 // lines, and the outline.
 
+#include "magnitude.glsl"
+#include "line_angle.glsl"
+#include "line_family.glsl"
+#include "line_member.glsl"
+#include "pixel_tone.glsl"
+#include "gray.glsl"
+#include "mapped_color.glsl"
+#include "inks.glsl"
+#include "ink_even_lines.glsl"
+#include "line_neighbor.glsl"
+
+uniform sampler2D field_values, outline_coverage;
+uniform sampler2DArray line_means;
+uniform float breaks, outline, min_transmittance, streak_std, break_std, disc_std;
+uniform float paper_grain_depth;
+uniform int clear_paper, magnitude_mode, flow_mode, colors_values, break_steps, overshoot_steps;
+uniform ivec2 box_origin;
+uniform vec4 flow_weights;
+layout(rgba32f) uniform writeonly image2D picture;
+#pragma constant(flow_mode, magnitude_mode, colors_values, noise_channels, family_count)
+#pragma constant(is_light_ink, is_antialiased, even_lines, ink_count)
+
 // The derivatives of the streaks of a line (x) and of its breaks (y), to the left and per pixel, as `fast_lic`.
 vec2 streak_slopes(ivec2 pixel, int line, float phase)
 {

@@ -1,5 +1,10 @@
 // Evenly spaced lines in place of streaks, as `even_lines`. Included by ink.comp.glsl.
 
+uniform sampler2DArray line_image;
+uniform float min_edge_width;
+uniform int line_count;
+uniform vec2 fade_pixels;
+
 // The coverage of an interval of the length `edge` by lines with the distance 1, as
 // `even_lines._box_filtered`.
 float box_filtered(float position, float width, float edge)

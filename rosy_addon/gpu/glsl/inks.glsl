@@ -1,5 +1,13 @@
 // Hatching: which lines are drawn at a tone, and in which ink. Included by ink.comp.glsl.
 
+uniform sampler2D cells, ink_thresholds, disc_offsets, ink_table, paper_grain;
+uniform sampler2DArray line_image;
+uniform float layering, ink_mid_tone, softness, onset_range, onset_lead;
+uniform int line_count, sheet_count, layers, ink_count, is_light_ink, is_antialiased;
+uniform int paper_grain_shift, paper_grain_channels, even_lines;
+uniform vec2 crowded_pixels;
+uniform vec4 paper_color;
+
 // How many lines are closer to the guiding angle than this one, as `hatching._line_ranks`. `first` is
 // the angle from the guiding angle to line 0.
 float line_rank(int line, float first)

@@ -1,6 +1,24 @@
 // The picture: line integral convolution along each line through a pixel, in both directions. The mean of
 // the images of all lines gets the contrast of one of them. Then color and light are applied.
 
+#include "magnitude.glsl"
+#include "line_angle.glsl"
+#include "pixel_tone.glsl"
+#include "gray.glsl"
+#include "lic_trace.glsl"
+#include "lic_lines.glsl"
+#include "line_family.glsl"
+#include "mapped_color.glsl"
+
+uniform sampler2D field_values, palette;
+uniform float crossing_correlation, gain, hue_sharpness;
+uniform int colors_values;
+uniform ivec2 box_origin;
+layout(rgba32f) uniform writeonly image2D picture;
+#pragma constant(degree, line_count, sheet_count, kernel, flow_mode, magnitude_mode)
+#pragma constant(noise_channels, is_antialiased, colors_values, family_count, break_steps)
+#pragma constant(overshoot_steps, even_lines)
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

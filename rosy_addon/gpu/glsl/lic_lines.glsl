@@ -1,5 +1,10 @@
 // The filtered noise of the lines through a pixel. Included by lic.comp.glsl and streaks.comp.glsl.
 
+uniform float full_samples, break_samples;
+uniform int line_count, sheet_count, magnitude_mode, flow_mode, half_length, break_steps;
+uniform int overshoot_steps, even_lines;
+uniform vec4 flow_shifts;
+
 // How far the noise is filtered at a pixel: over how many steps in each direction, and what has drifted.
 struct Reach {
   int overshoot_count;

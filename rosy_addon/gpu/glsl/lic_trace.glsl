@@ -1,6 +1,13 @@
 // Streamlines on the covering and their filtered noise. Included by lic.comp.glsl
 // and streaks.comp.glsl.
 
+uniform sampler2D cells, tones;
+uniform sampler2DArray angle_gradients, noise_gradients;
+uniform float grain, step_length;
+uniform int line_count, sheet_count, flow_mode, kernel, noise_channels, is_antialiased;
+uniform int break_steps;
+uniform vec4 flow_weights;
+
 // Sums over the samples of a streamline: of the weighted noise, of the weights and of their squares.
 // Of kernels that move, the weighted noise is around 0 and in all components. `full_square_sum` is what
 // `square_sum` would be if the streamline did not end early.

@@ -1,6 +1,14 @@
 // Add the diffuse light of one light source (Lambert), as `shading.diffuse`. `light_vector` is the
 // position of a point light or the direction to a sun. A headlight is at the eye.
 
+uniform sampler2D normals, shadow_visibility, previous_lighting;
+uniform int is_perspective, light_kind, is_shadowed, is_first;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera, light_vector, light_color;
+layout(rgba32f) uniform writeonly image2D lighting;
+#pragma constant(light_kind, is_shadowed, is_first)
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

@@ -1,3 +1,7 @@
+uniform sampler2D wobble_angles;
+uniform float guiding_angle, wobble_strength;
+uniform int degree;
+
 // The angle from the guiding angle to line 0 of a pixel, in the view plane, with wobble. `z` is its
 // representation.
 float line_angle_of(ivec2 pixel, vec2 z)

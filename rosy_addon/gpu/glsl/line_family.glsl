@@ -1,3 +1,7 @@
+uniform sampler2DArray field_channels;
+uniform float guiding_angle;
+uniform int degree, sheet_count, family_count, family_channel;
+
 // The families of the lines of a pixel: the stored angle, and their number; 1 at a pixel without families.
 struct Families {
   float angle;

@@ -1,3 +1,5 @@
+uniform int degree, sheet_count;
+
 // The member on a line. For odd N, every other line is the opposite half of a member.
 int line_member(int line)
 {

@@ -1,3 +1,7 @@
+uniform sampler2D cells;
+uniform sampler2DArray directions;
+uniform int line_count, sheet_count;
+
 // The sheet of a neighbor that continues that of a line; -1 where the surface does not continue.
 int neighbor_sheet(ivec2 pixel, int line, ivec2 offset, float phase)
 {

@@ -1,3 +1,6 @@
+uniform sampler2D max_magnitude;
+uniform float magnitude_range;
+
 // The magnitude of a representation relative to the largest one or to the range of the look, at most 1.
 float magnitude_share(vec2 z)
 {

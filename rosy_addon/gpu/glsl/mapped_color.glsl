@@ -1,3 +1,5 @@
+uniform sampler2D color_map;
+
 // A color of the map, at a position from 0 to 1: a display value.
 vec3 mapped_color(float value)
 {

@@ -1,6 +1,10 @@
 // The largest magnitude in each block of pixels. The first run reads the field, each later run the
 // result of the previous one.
 
+uniform sampler2D source_values;
+uniform int degree, is_first;
+layout(rgba32f) uniform writeonly image2D tiles;
+
 void main()
 {
   ivec2 tile = ivec2(gl_GlobalInvocationID.xy);

@@ -1,6 +1,11 @@
 // The derivatives of the noise on screen, by differences over connected neighbors: along x and y for each channel,
 // two channels in a layer.
 
+uniform sampler2D cells;
+uniform int noise_layers;
+uniform ivec2 box_origin;
+layout(rgba16f) uniform writeonly image2DArray noise_gradients;
+
 vec3 noise_at(ivec2 pixel, ivec2 offset, vec4 cell)
 {
   int bit = offset.x + 3 * offset.y + 4;

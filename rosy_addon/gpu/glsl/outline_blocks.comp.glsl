@@ -1,5 +1,10 @@
 // What each pixel of the finished picture contains of edges: 0, or EDGE_BIT with the bits of borders.
 
+uniform sampler2D outline_edges;
+uniform int supersampling;
+uniform ivec2 box_origin;
+layout(r32f) uniform writeonly image2D outline_blocks;
+
 void main()
 {
   ivec2 block = ivec2(gl_GlobalInvocationID.xy) + box_origin;

@@ -1,5 +1,10 @@
 // The share of each pixel that outlines along silhouettes and creases cover.
 
+uniform sampler2D outline_widths, field_values, depth_slopes;
+uniform float outline;
+uniform ivec2 box_origin;
+layout(r32f) uniform writeonly image2D outline_coverage;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

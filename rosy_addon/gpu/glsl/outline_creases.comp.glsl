@@ -1,6 +1,12 @@
 // Mark the pixels next to the visible edges of creases: as `crease_pixels`. Each thread takes every
 // CREASE_SLICES-th crossing of one edge.
 
+uniform sampler2D crease_points, field_values, depth_slopes;
+uniform float instance_id;
+uniform int is_perspective, crease_count;
+uniform vec4 clip_x, clip_y, clip_w, model_view_z;
+layout(r32f) uniform writeonly image2D crease_marks;
+
 vec3 crease_end(int index)
 {
   return texelFetch(crease_points, ivec2(index & ((1 << ROW_BITS) - 1), index >> ROW_BITS), 0).xyz;

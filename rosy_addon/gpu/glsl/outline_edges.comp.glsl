@@ -2,6 +2,14 @@
 // `outline`. It is 0 at other pixels, and where a surface in front begins: the outline is then drawn
 // on that surface.
 
+#include "surface_continuity.glsl"
+
+uniform sampler2D visibility, normals, field_values, depth_slopes, crease_marks, triangle_parts;
+uniform float instance_id, outline, min_normal_cosine;
+uniform int first_triangle_id, has_creases, has_parts;
+uniform ivec2 box_origin;
+layout(rg32f) uniform writeonly image2D outline_edges;
+
 int part_of(ivec2 pixel)
 {
   int triangle = floatBitsToInt(texelFetch(visibility, pixel, 0).x) - first_triangle_id;

@@ -1,6 +1,13 @@
 // The share of the surface that a pixel sees that outlines cover: the mean of the samples that show it. They are
 // in the pixel, and some in those around it.
 
+#include "sample_entry.glsl"
+
+uniform sampler2D sample_coverage;
+uniform int samples_per_side;
+uniform ivec2 box_origin;
+layout(r32f) uniform writeonly image2D outline_coverage;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

@@ -2,6 +2,12 @@
 // FULL_MARK_LENGTH lies inside of a window around each of its pixels, so it is found from there. The
 // rows of the window are bit fields.
 
+uniform sampler2D outline_edges, outline_blocks;
+uniform float outline;
+uniform int supersampling;
+uniform ivec2 box_origin;
+layout(r32f) uniform writeonly image2D outline_widths;
+
 #define MARK_REACH (FULL_MARK_LENGTH - 1)
 #define WINDOW_SIDE (2 * MARK_REACH + 1)
 

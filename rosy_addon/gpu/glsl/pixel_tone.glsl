@@ -1,3 +1,5 @@
+uniform sampler2D tones;
+
 // The target tone of a pixel.
 float tone_at(ivec2 pixel)
 {

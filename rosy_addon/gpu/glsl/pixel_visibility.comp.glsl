@@ -1,6 +1,11 @@
 // The triangle that each pixel sees at its center. Where there is none, that of the nearest of its samples that
 // sees one, as `rasterizer.SampledTriangles`. Ids from occluder_id on are of triangles that only occlude.
 
+uniform sampler2D center_visibility, sample_visibility;
+uniform int samples_per_side, occluder_id;
+uniform ivec2 box_origin;
+layout(r32f) uniform writeonly image2D visibility;
+
 bool is_drawn(float id)
 {
   int bits = floatBitsToInt(id);

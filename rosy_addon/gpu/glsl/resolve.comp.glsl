@@ -1,6 +1,17 @@
 // Interpolate the record of the visible triangle into the G-buffer, for one instance: as `project` and
 // `pixel_neighbors`, in the same order.
 
+#include "triangle_record.glsl"
+
+uniform float pixels_per_unit, instance_id, model_scale;
+uniform int channel_count;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera;
+layout(rgba32f) uniform writeonly image2D normals, field_values, depth_slopes;
+layout(rgba32f) uniform writeonly image2DArray field_channels;
+#pragma constant(channel_count)
+
 vec3 normal_to_camera(vec3 vector)
 {
   return vec3(dot(model_view_x.xyz, vector), dot(model_view_y.xyz, vector),

@@ -1,6 +1,16 @@
 // The pixel whose surface each sample of one instance shows, as `pixel_coverage`: the one that it is in, as a
 // rule, and at silhouettes and creases one beside it. One more than the number of the neighbor.
 
+#include "triangle_record.glsl"
+
+uniform sampler2D sample_visibility, field_values, depth_slopes;
+uniform float instance_id;
+uniform int samples_per_side;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera;
+layout(r32f) uniform writeonly image2D sample_entries;
+
 // What is compared: the position in pixels, the depth of depth_slopes, and the normal of the triangle.
 struct Point {
   vec2 position;

@@ -1,3 +1,5 @@
+uniform sampler2D sample_entries;
+
 // The pixel whose surface a sample shows, as an offset from the pixel that the sample is in. False if it shows no
 // surface with a field.
 bool entry_of_sample(ivec2 sample_, out ivec2 offset)

@@ -1,5 +1,9 @@
 // Directions on screen, for passes over the pixels of a field.
 
+uniform sampler2DArray field_channels;
+uniform int is_perspective, harmonic_count, first_harmonic;
+uniform vec4 camera_to_pixels;
+
 // A tangent of the view plane, transported to the surface and projected to the screen, in pixels.
 vec2 screen_direction(vec3 tangent, vec3 toward_eye, vec3 normal, vec2 ray)
 {

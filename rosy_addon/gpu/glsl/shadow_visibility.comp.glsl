@@ -1,6 +1,15 @@
 // The share of a light that reaches a pixel, by percentage-closer filtering of a shadow map, as
 // `shadow_maps`. The results of the views of one light are multiplied.
 
+uniform sampler2D normals, shadow_map, previous_visibility;
+uniform float normal_bias;
+uniform int is_perspective, light_is_perspective, is_first;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera, light_view_x, light_view_y, light_view_z, light_projection_x;
+uniform vec4 light_projection_y;
+layout(rgba16f) uniform writeonly image2D shadow_visibility;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

@@ -1,6 +1,12 @@
 // Streaks averaged with those before and behind them, as of antialiased pictures in `fast_lic`: neighbors on one
 // line have streamlines of their own, which differ a little.
 
+#include "line_neighbor.glsl"
+
+uniform sampler2DArray line_means;
+uniform ivec2 box_origin;
+layout(rgba16f) uniform writeonly image2DArray smooth_means;
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

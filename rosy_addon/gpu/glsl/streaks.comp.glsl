@@ -1,6 +1,19 @@
 // The streaks of hatching, one thread for each line through a pixel: their filtered noise, that of their
 // breaks, and the tone along the line.
 
+#include "magnitude.glsl"
+#include "line_angle.glsl"
+#include "pixel_tone.glsl"
+#include "gray.glsl"
+#include "lic_trace.glsl"
+#include "lic_lines.glsl"
+
+uniform sampler2D field_values;
+uniform ivec2 box_origin;
+layout(rgba16f) uniform writeonly image2DArray line_means;
+#pragma constant(degree, line_count, sheet_count, kernel, flow_mode, magnitude_mode)
+#pragma constant(noise_channels, is_antialiased, even_lines)
+
 void main()
 {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy) + box_origin;

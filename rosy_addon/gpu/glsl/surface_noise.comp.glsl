@@ -1,5 +1,15 @@
 // Noise that moves with the surface, before the high pass: `surface_noise.surface_noise`.
 
+#include "triangle_record.glsl"
+
+uniform sampler2D feature_curvature;
+uniform float pixel_size, cell_size, min_cell_scale, feature_grains, max_bend, amplitude, density;
+uniform int density_threshold, noise_channels, seed, instance_hash;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera, lattice_x, lattice_y, lattice_z;
+layout(rgba32f) uniform writeonly image2D raw_noise;
+
 // The random bit of a cell, as `image_noise.hash_bits`.
 float random_bit(ivec3 cell, int octave, int channel)
 {

@@ -1,5 +1,17 @@
 // The target tone of the pixels of one instance: `target_tone`.
 
+#include "triangle_record.glsl"
+
+uniform sampler2D normals, lighting, tone_image;
+uniform float pixels_per_unit, shading, curve_black, curve_scale, curve_power, values_bottom;
+uniform float values_scale;
+uniform int tone_lit, tone_source, colors_values, curve_light, image_level, values_texel;
+uniform ivec2 box_origin, image_size;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera, to_reference_x, to_reference_y, to_reference_w;
+layout(rgba32f) uniform writeonly image2D tones;
+#pragma constant(tone_source, curve_light, tone_lit, colors_values)
+
 // Bilinear sample of a level of the tone image. The smaller levels of the atlas are on the right of
 // level 0, on top of each other.
 float sample_image(vec2 position, int level)
@@ -33,7 +45,6 @@ vec3 apply_curve(vec3 tone)
   return curve_power == 1.0 ? stretched : pow(stretched, vec3(curve_power));
 }
 
-#if HAS_VALUES
 // Where the number of the surface is in the color map, from 0 to 1; -1 if there is none.
 float map_position(int triangle, vec2 ray)
 {
@@ -48,7 +59,6 @@ float map_position(int triangle, vec2 ray)
   float number = numbers.x + weights.y * (numbers.y - numbers.x) + weights.z * (numbers.z - numbers.x);
   return clamp((number - values_bottom) * values_scale, 0.0, 1.0);
 }
-#endif
 
 void main()
 {
@@ -62,10 +72,10 @@ void main()
     return;
   }
   float position_in_map = 1.0;
-#if HAS_VALUES
-  position_in_map =
-      map_position(triangle, pixel_ray(pixel, vec2(frame), clip_to_camera, lens_shift));
-#endif
+  if (colors_values != 0) {
+    position_in_map =
+        map_position(triangle, pixel_ray(pixel, vec2(frame), clip_to_camera, lens_shift));
+  }
   vec3 light = 1.0 - shading + shading * texelFetch(lighting, pixel, 0).xyz;
   if (tone_source == TONE_LIGHT) {
     imageStore(tones, pixel, vec4(curve_light != 0 ? apply_curve(light) : light, position_in_map));

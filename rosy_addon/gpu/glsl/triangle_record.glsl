@@ -1,5 +1,9 @@
 // The triangles of one instance, and their records (`mesh_buffers`).
 
+uniform sampler2D visibility, triangle_records;
+uniform int is_perspective, first_triangle_id, triangle_count, texels_per_record;
+uniform vec4 model_view_x, model_view_y, model_view_z;
+
 // The triangle of the instance that a pixel sees; outside of [0, triangle_count) if it sees another one.
 int visible_triangle(ivec2 pixel)
 {

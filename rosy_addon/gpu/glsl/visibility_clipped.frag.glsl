@@ -1,5 +1,11 @@
 // As visibility.frag, without the fragments that the clip planes cut away.
 
+uniform int first_triangle_id;
+in float triangle_id;
+in vec4 clip_distances;
+in vec2 more_clip_distances;
+out vec4 visibility;
+
 void main()
 {
   if (any(lessThan(clip_distances, vec4(0.0))) || any(lessThan(more_clip_distances, vec2(0.0)))) {

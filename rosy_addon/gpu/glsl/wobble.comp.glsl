@@ -1,5 +1,15 @@
 // The wobble angle at the pixels of one instance: `wobble.wobble_angle`.
 
+#include "triangle_record.glsl"
+
+uniform sampler2D wave_table;
+uniform float pixel_size, cell_size, min_cell_scale;
+uniform int on_surface;
+uniform ivec2 box_origin;
+uniform vec2 lens_shift;
+uniform vec4 clip_to_camera;
+layout(rgba32f) uniform writeonly image2D wobble_angles;
+
 // The sum of the waves of two octaves at a position. `level` is the logarithm (base 2) of the
 // wavelength.
 float sum_of_waves(vec3 position, float level)

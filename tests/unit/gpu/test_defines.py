@@ -38,7 +38,6 @@ def literals_of(code):
 @pytest.mark.parametrize("name", SOURCES)
 def test_every_constant_is_defined(name):
     local = set(re.findall(r"#define\s+(\w+)", "".join(SOURCES.values())))
-    local |= {name for name, _ in passes.TONE.constants}
     assert constants_of(SOURCES[name]) <= local | set(DEFINED)
 
 
@@ -49,9 +48,7 @@ def test_every_define_is_used():
 @pytest.mark.parametrize("name", SOURCES)
 def test_shaders_have_no_literal_where_there_is_a_define(name):
     shared = {
-        *defines.FLOAT_CONSTANTS.values(),
-        *(value for vector in defines.VECTOR_CONSTANTS.values() for value in vector),
-        *defines.INT_CONSTANTS.values(),
+        *(value for values in defines.CONSTANTS.values() for value in np.ravel(values).tolist()),
         *defines.UNSIGNED_CONSTANTS.values(),
     }
     assert not literals_of(SOURCES[name]) & ({float(value) for value in shared} - COMMON)
@@ -66,14 +63,16 @@ def test_shaders_read_records_by_named_texels():
     assert last == mesh_buffers.VALUE_TEXEL + 2
 
 
-@pytest.mark.parametrize("name", defines.FLOAT_CONSTANTS)
+@pytest.mark.parametrize(
+    "name", [name for name, value in defines.CONSTANTS.items() if isinstance(value, float)]
+)
 def test_literals_round_to_the_same_number(name):
     text = DEFINED[name].strip("()")
     assert "." in text or "e" in text, "GLSL would read an integer"
-    assert np.float32(text) == np.float32(defines.FLOAT_CONSTANTS[name])
+    assert np.float32(text) == np.float32(defines.CONSTANTS[name])
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_sources_begin_with_the_defines(shader):
     is_compute = isinstance(shader, passes.ComputePass)
     source = shader.source if is_compute else shader.fragment_source

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from awkward import moebius
 from conftest import long, mainly
-from harness.gpu_parity import draw_pair, rooms
+from harness.gpu_parity import draw_pair, read_gbuffer, rooms
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from lenses import shifted
@@ -32,12 +32,11 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.gpu import lic_stage, mesh_buffers, passes, preparation, resources, uniforms
 from rosy_addon.gpu.device import UNIFORM_WORDS, _pack_uniforms, _std140_order
-from rosy_addon.gpu.field_kind import field_kinds
-from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, split_matrix
+from rosy_addon.gpu.frame import is_empty, screen_box, union_box
+from rosy_addon.gpu.mesh_buffers import ROW_TEXELS, field_channels, field_kinds, split_matrix
 from rosy_addon.gpu.mesh_buffers import mesh_buffers as build_mesh_buffers
 from rosy_addon.gpu.preparation import prepare_steps
 from rosy_addon.gpu.renderer import GpuRenderer
-from rosy_addon.gpu.screen_box import is_empty, screen_box, union_box
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import Camera, look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -290,7 +289,7 @@ def sign_changing_tensors(surface):
 # --- uniforms and sources ------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_uniforms_are_aligned_as_in_std140(shader):
     """Each is at a multiple of its own size, without gaps, in whole rows of 16 bytes."""
     aligned = _std140_order(shader.uniforms)
@@ -324,7 +323,8 @@ def names_in(source):
 
 def own_source(shader):
     """Return the source of a pass without the file that is common to all."""
-    return "".join(passes.read_source(name) for name in shader.files if name != "common.glsl")
+    kinds = ("comp",) if isinstance(shader, passes.ComputePass) else ("vert", "frag")
+    return passes.read_source(*(f"{shader.name}.{kind}.glsl" for kind in kinds)).code
 
 
 def base_names(names):
@@ -332,7 +332,13 @@ def base_names(names):
     return {name.removesuffix("[]") for name in names}
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
+def test_all_declarations_are_read(shader):
+    left = r"^\s*(?:uniform|in|out|layout|#include|#pragma)\b.*"
+    assert not re.findall(left, own_source(shader), flags=re.M)
+
+
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_sources_use_all_listed_names(shader):
     words = names_in(own_source(shader))
     listed = base_names(shader.textures) | {name for name, _ in shader.uniforms}
@@ -343,11 +349,11 @@ def test_sources_use_all_listed_names(shader):
     assert listed <= words, f"not used: {sorted(listed - words)}"
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_sources_use_no_other_names_of_passes(shader):
     """A pass that uses a uniform, texture or image of another pass has to list it, too."""
     known = set()
-    for other in passes.ALL_PASSES:
+    for other in passes.all_passes():
         known |= base_names(other.textures) | {name for name, _ in other.uniforms}
         if isinstance(other, passes.ComputePass):
             known |= base_names(name for name, _ in other.images)
@@ -369,13 +375,13 @@ def test_sources_use_no_other_names_of_passes(shader):
     assert used <= listed, f"not listed: {sorted(used - listed)}"
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_no_member_of_a_struct_is_called_length(shader):
     """With Vulkan, the compiler takes it for the length of an array."""
     assert not re.search(r"\.length\b", without_comments(own_source(shader)))
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_arrays_are_read_and_written_as_arrays(shader):
     code = without_comments(own_source(shader))
     names = list(shader.textures)
@@ -390,12 +396,12 @@ def test_arrays_are_read_and_written_as_arrays(shader):
 
 def test_common_code_uses_no_uniforms():
     """The common code is part of every pass: it gets uniforms only as parameters of functions."""
-    known = {name for shader in passes.ALL_PASSES for name, _ in shader.uniforms}
-    known |= {name for shader in passes.ALL_PASSES for name in base_names(shader.textures)}
-    assert not names_in(passes.read_source("common.glsl")) & known
+    known = {name for shader in passes.all_passes() for name, _ in shader.uniforms}
+    known |= {name for shader in passes.all_passes() for name in base_names(shader.textures)}
+    assert not names_in(passes.read_source("common.glsl").code) & known
 
 
-@pytest.mark.parametrize("shader", passes.ALL_PASSES, ids=lambda shader: shader.name)
+@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
 def test_no_variable_has_the_name_of_a_uniform(shader):
     """In Blender uniforms are macros without scope: no variable or member may have their names."""
     source = without_comments(own_source(shader))
@@ -413,9 +419,8 @@ def draw_item(surface, matrix=None):
     matrix = np.eye(4) if matrix is None else matrix
     buffers = build_mesh_buffers(surface, np.eye(3), None, "smooth")
     mesh = resources.GpuMesh(buffers, None, None, ())
-    return resources.DrawItem(
-        mesh, None, matrix @ mesh_buffers.translation_matrix(buffers.center), 1.0, None
-    )
+    model_matrix = matrix @ mesh_buffers.translation_matrix(buffers.center)
+    return resources.DrawItem(MeshInstance(surface, matrix, None), mesh, model_matrix, None)
 
 
 def camera_at(eye=(0, -5, 0), size=(64, 48), perspective=True, clip=(0.1, 100.0)):
@@ -1395,7 +1400,7 @@ def test_even_lines_stay_on_the_card(device):
     for distance in (4.0, 4.0, 4.5, 5.0, 6.0, 7.0):
         items = card.upload([instance], "smooth")
         render_texture(card, items, view(distance=distance), EVEN_LINES)
-    (mesh,) = card.resources.meshes
+    (mesh,) = card.resources._meshes.values()
     assert len(mesh.line_textures) == 2 * 3
     textures = list(mesh.line_textures.values())
     render_texture(card, items, view(distance=7.0, azimuth=1.0), EVEN_LINES)
@@ -1486,7 +1491,7 @@ def test_clip_planes(card):
     items = card.upload([ball(4, placed(rotation(0, 0, 1)))], "smooth")
     unclipped = card.read(render_texture(card, items, camera, LOOK), *SIZE).copy()
     clipped = card.read(render_texture(card, items, camera, LOOK, clip_planes=planes), *SIZE)
-    gbuffer = card.read_gbuffer(camera)
+    gbuffer = read_gbuffer(card, *SIZE)
     visible = gbuffer["field_values"][..., 3] > 0
     assert 0.2 < visible.sum() / (unclipped[..., 3] > 0).sum() < 1.0
     assert (clipped[..., 3] > 0).sum() == visible.sum()
@@ -1543,9 +1548,10 @@ def test_meshes_stay_on_the_card(device):
     assert sheared.mesh is not first.mesh
     for _ in range(resources.MESH_LIFETIME_UPLOADS + 1):
         card.upload([moved], "smooth")
-    assert [mesh.buffers for mesh in card.resources.meshes] == [first.mesh.buffers]
+    assert [mesh.buffers for mesh in card.resources._meshes.values()] == [first.mesh.buffers]
     card.release()
-    assert not card.resources.texture_count
+    held = card.resources
+    assert not (held._meshes or held._images or held._lookup_textures)
 
 
 def test_nothing_is_compiled_or_sent_after_the_preparation(device):
@@ -1553,8 +1559,8 @@ def test_nothing_is_compiled_or_sent_after_the_preparation(device):
     instance = ball(4)
     labels = [step.label for step in card.prepare_steps([instance], "smooth")]
     assert any("preparing the mesh" in label for label in labels)
-    (mesh,) = card.resources.meshes
-    prepared = {shader.key for shader in passes.ALL_PASSES if not shader.switches}
+    (mesh,) = card.resources._meshes.values()
+    prepared = {shader for shader in passes.all_passes() if not shader.switches}
     assert set(device._programs) >= prepared
     items = card.upload([instance], "smooth")
     render_texture(card, items, view(), LOOK)

@@ -14,7 +14,7 @@ from conftest import ROOT
 
 from rosy_addon.errors import RosyError
 from rosy_addon.worker import start as module
-from rosy_addon.worker.helper import Handle, Helper, HelperLostError
+from rosy_addon.worker.helper import Helper, HelperLostError
 
 sys.path.append(str(Path(__file__).parent))
 import calls
@@ -27,12 +27,13 @@ def helper():
     helper.close()
 
 
-def waited(handle: Handle, seconds: float = 20.0):
+def waited(helper: Helper, function, *arguments, seconds: float = 20.0):
     deadline = time.monotonic() + seconds
-    while not handle.poll():
+    helper.submit(function, *arguments)
+    while (outcome := helper.poll()) is None:
         assert time.monotonic() < deadline
         time.sleep(0.005)
-    return handle.result()
+    return outcome()
 
 
 def is_running(pid: int) -> bool:
@@ -51,57 +52,57 @@ def has_ended(pid: int, seconds: float) -> bool:
 
 
 def test_it_returns_results_and_stays_for_the_next_call(helper):
-    assert waited(helper.submit(max, 3, 4)) == 4
+    assert waited(helper, max, 3, 4) == 4
     pid = helper.pid
-    assert waited(helper.submit(sorted, [3, 1])) == [1, 3]
+    assert waited(helper, sorted, [3, 1]) == [1, 3]
     assert helper.pid == pid
 
 
 def test_progress_arrives(helper):
-    handle, seen = helper.submit(calls.count, 60), []
-    while not handle.poll():
-        seen.append((handle.fraction, handle.label))
+    helper.submit(calls.count, 60)
+    seen = []
+    while (outcome := helper.poll()) is None:
+        seen.append((helper.fraction, helper.label))
         time.sleep(0.005)
     fractions = [fraction for fraction, _ in seen]
     assert fractions == sorted(fractions) and len(set(fractions)) > 5
     assert any(label.startswith("step ") for _, label in seen)
-    assert handle.result() == 60
+    assert outcome() == 60
 
 
 def test_errors_are_those_of_the_function_with_its_traceback(helper):
-    handle = helper.submit(calls.fail, "no faces")
     with pytest.raises(RosyError, match="no faces") as caught:
-        waited(handle)
+        waited(helper, calls.fail, "no faces")
     assert "calls.py" in str(caught.value.__cause__)
 
 
 def test_results_that_cannot_be_sent_are_an_error(helper):
     with pytest.raises(RuntimeError, match="pickle"):
-        waited(helper.submit(calls.answer_with_a_function))
+        waited(helper, calls.answer_with_a_function)
 
 
 def test_cancelling_ends_the_process_at_once(helper):
-    handle = helper.submit(calls.count, 10_000)
-    while handle.fraction == 0:
-        handle.poll()
+    helper.submit(calls.count, 10_000)
+    while helper.fraction == 0:
+        helper.poll()
     pid, start = helper.pid, time.monotonic()
-    handle.cancel()
+    helper.close()
     assert not is_running(pid) and time.monotonic() - start < 0.2
-    assert waited(helper.submit(max, 3, 4)) == 4
+    assert waited(helper, max, 3, 4) == 4
 
 
 def test_a_process_that_ends_is_lost(helper):
     with pytest.raises(HelperLostError, match="has ended") as caught:
-        waited(helper.submit(calls.end))
+        waited(helper, calls.end)
     assert caught.value.has_started
-    assert waited(helper.submit(max, 3, 4)) == 4
+    assert waited(helper, max, 3, 4) == 4
 
 
 @pytest.mark.parametrize("program", ["/no/such/program", "/bin/false"])
 def test_processes_that_cannot_be_started_are_lost(program, monkeypatch):
     monkeypatch.setattr(module.sys, "executable", program)
     with pytest.raises(HelperLostError, match="can") as caught:
-        waited(Helper().submit(max, 3, 4))
+        waited(Helper(), max, 3, 4)
     assert not caught.value.has_started
 
 
@@ -116,9 +117,9 @@ sys.path[:0] = [{str(ROOT)!r}, {str(Path(__file__).parent)!r}]
 import calls
 from rosy_addon.worker.helper import Helper
 helper = Helper()
-handle = helper.submit(calls.count, 1 if not {is_busy} else 100_000, 0.01)
-while not handle.is_done and handle.fraction == 0:
-    handle.poll()
+helper.submit(calls.count, 1 if not {is_busy} else 100_000, 0.01)
+while helper.poll() is None and helper.fraction == 0:
+    pass
 print(helper.pid, flush=True)
 time.sleep(100)
 """

@@ -1,10 +1,11 @@
-"""Dots at singularities in a 3D view, and labels with their indices."""
+"""Marks in a 3D view: dots at singularities, with labels of their indices, and arrowheads over the lines."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import blf
 import bpy
@@ -14,6 +15,9 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ..annotation import arrow_marks
+from ..annotation.arrow_marks import ArrowMarks
+from ..annotation.draw_arrows import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
 from ..annotation.singularity_marks import (
     COLOR_BY_SIGN,
@@ -29,7 +33,6 @@ from ..gpu.preparation import Preparation
 from ..projection.gbuffer import MeshInstance
 from ..projection.visible_vertices import is_cut_away
 from ..worker.job import Call
-from .pixel_frames import pixel_frames
 
 #: Number of sides of the polygon that approximates a disc.
 DISC_SEGMENTS = 20
@@ -42,6 +45,51 @@ LABEL_SIZE = 4 / 3
 
 #: Seconds for each triangle of a mesh that finding its singularities takes.
 SINGULARITY_SECONDS = 1.2e-6
+
+#: How far arrowheads are in front of their places, and their outlines behind them, in lengths. Those beside their
+#: places are nearer still, by so many times the distance, so that slanted surfaces do not hide them.
+NEARNESS, OUTLINE_DISTANCE, SLOPE = 1.5, 0.5, 2.5
+
+#: Points of the arc around a corner of an outline.
+ARC_POINTS = 4
+
+
+class PixelFrames(NamedTuple):
+    """The steps of a pixel at K points of a view.
+
+    Attributes
+    ----------
+    right, up : (K, 3) float64 ndarray
+        World space, parallel to the view.
+    nearer : (K, 3) float64 ndarray
+        As far along the axis of the view, toward the eye. The point stays where it is in the view.
+    """
+
+    right: np.ndarray
+    up: np.ndarray
+    nearer: np.ndarray
+
+
+def pixel_frames(context: bpy.types.Context, points: np.ndarray) -> PixelFrames:
+    """Return the steps of a pixel at (K, 3) points in world space, in the region that is drawn."""
+    view, window = context.region_data, context.region
+    view_to_world = np.array(view.view_matrix.inverted())
+    right, up, back, eye = view_to_world[:3].T
+    depth, toward_eye = np.ones(len(points)), np.broadcast_to(back, points.shape)
+    if view.is_perspective:
+        depth = (eye - points) @ back
+        toward_eye = (eye - points) / depth[:, None]
+    pixel = (depth * (2 / (view.window_matrix[0][0] * window.width)))[:, None]
+    return PixelFrames(pixel * right, pixel * up, pixel * toward_eye)
+
+
+def _draw_triangles(vertices: np.ndarray, code: str, opacity: float) -> None:
+    """Draw triangles with (n, 3) corners in world space in a color."""
+    if not len(vertices):  # Blender makes no batch without vertices
+        return
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    shader.uniform_float("color", (*from_hex(code).tolist(), opacity))
+    batch_for_shader(shader, "TRIS", {"pos": vertices}).draw(shader)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,23 +185,18 @@ def draw_dots(
 def _draw_all(
     context: bpy.types.Context, objects: Sequence[SingularityDots], size: float, opacity: float
 ) -> None:
-    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    outline = from_hex(OUTLINE_COLOR)
     for dots in objects:
         radii = dot_diameters(dots.index, size) / 2
         for sign, code in COLOR_BY_SIGN.items():
             chosen = np.sign(dots.index) == sign
-            if not chosen.any():  # Blender makes no batch without vertices
-                continue
             points, radius = dots.points[chosen], radii[chosen]
             # The outline first, slightly behind the dot.
             for part_radius, depth_offset, color in (
-                (radius + OUTLINE * size, 2 * radius, outline),
-                (radius, 3 * radius, from_hex(code)),
+                (radius + OUTLINE * size, 2 * radius, OUTLINE_COLOR),
+                (radius, 3 * radius, code),
             ):
                 vertices = _disc_triangles(context, points, part_radius, depth_offset)
-                shader.uniform_float("color", (*color.tolist(), opacity))
-                batch_for_shader(shader, "TRIS", {"pos": vertices}).draw(shader)
+                _draw_triangles(vertices, color, opacity)
 
 
 def _disc_triangles(
@@ -232,3 +275,64 @@ def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
     view_direction.normalize()
     start = point + NEAR_SURFACE * context.region_data.view_distance * view_direction
     return context.scene.ray_cast(context.view_layer.depsgraph, start, view_direction)[0]
+
+
+def draw_arrowheads(context: bpy.types.Context, marks: ArrowMarks) -> None:
+    """Draw arrowheads in a view, behind what is in front of them.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+    marks : ArrowMarks
+        Of this view.
+    """
+    gpu.state.depth_test_set("LESS_EQUAL")
+    for grown, code, nearness in (
+        (marks.outline, arrow_marks.OUTLINE_COLOR, NEARNESS - OUTLINE_DISTANCE),
+        (0.0, arrow_marks.FILL_COLOR, NEARNESS),
+    ):
+        _draw_triangles(_head_triangles(context, marks, grown, nearness * marks.size), code, 1.0)
+    gpu.state.depth_test_set("NONE")
+
+
+def _head_triangles(
+    context: bpy.types.Context, marks: ArrowMarks, grown: float, nearness: float
+) -> np.ndarray:
+    """Return the (n, 3) float32 corners of the triangles of arrowheads, facing the camera.
+
+    Their outlines are moved outward, and they are moved toward the camera, both in pixels.
+    """
+    corners = _outline_triangles(head_outline(marks.size), grown)
+    forward, left = marks.direction, marks.direction[:, ::-1] * (-1, 1)
+    offset = (marks.position - marks.place)[:, None] + (
+        corners[:, :1] * forward[:, None] + corners[:, 1:] * left[:, None]
+    )
+    frames = pixel_frames(context, marks.anchor)
+    nearness = nearness + SLOPE * np.hypot(*(marks.position - marks.place).T)[:, None]
+    vertices = (marks.anchor + nearness * frames.nearer)[:, None] + (
+        offset[..., :1] * frames.right[:, None] + offset[..., 1:] * frames.up[:, None]
+    )
+    return vertices.reshape(-1, 3).astype(np.float32)
+
+
+def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
+    """Return the (n, 2) corners of triangles that fill an arrowhead whose outline is moved outward.
+
+    Its corners are round; see `head_outline`.
+    """
+    tip, barb, notch = outline
+    # The sides run counter-clockwise from the tip, so their right sides are outside.
+    side, back = (
+        np.arctan2(-step[0], step[1]) % (2 * np.pi) for step in (barb - tip, notch - barb)
+    )
+    half = [tip + grown * _unit_vectors(0.0, side), barb + grown * _unit_vectors(side, back)]
+    half = np.concatenate([*half, [notch + (grown / np.cos(back), 0.0)]])
+    points = np.concatenate([half, (half * (1, -1))[-2:0:-1]])
+    center = np.zeros_like(points)
+    return np.stack([center, points, np.roll(points, -1, axis=0)], axis=1).reshape(-1, 2)
+
+
+def _unit_vectors(first: float, last: float) -> np.ndarray:
+    """Return (`ARC_POINTS`, 2) unit vectors at angles from the first to the last, in radians."""
+    angles = np.linspace(first, last, ARC_POINTS)
+    return np.stack([np.cos(angles), np.sin(angles)], axis=1)

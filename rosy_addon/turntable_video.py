@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,7 @@ from .projection.camera import orbit_camera
 from .projection.gbuffer import MeshInstance
 from .rendering.draw import bake_picture, draw_picture
 from .rendering.view_input import ViewInput
-from .worker.job import Call, Steps, part, run
+from .worker.job import Call, Steps, call_steps, part, run
 from .worker.start import GuardedFolder
 
 #: Suffixes of videos that can be written.
@@ -147,21 +149,15 @@ def turntable(
     if encode is None and not is_gif(path):
         raise RosyError(f"{path}: {NO_ENCODER}")
 
-    def announced() -> Iterator[ViewInput]:
-        for number, view in enumerate(views, 1):
-            if on_picture is not None:
-                on_picture(number)
-            yield view
+    numbers = itertools.count(1)
 
-    def draw_steps(view: ViewInput) -> Steps[Any]:
-        picture = yield Call(draw, (view,))
-        return video_frame(picture.rgba, is_gif(path))
+    def draw_numbered(view: ViewInput) -> Any:
+        if on_picture is not None:
+            on_picture(next(numbers))
+        return video_frame(draw(view).rgba, is_gif(path))
 
-    def encode_steps(*arguments: Any) -> Steps[None]:
-        assert encode is not None
-        yield Call(encode, arguments)
-
-    write_bytes(path, run(video_steps(draw_steps, announced(), count, path, fps, encode_steps)))
+    draw_steps, encode_steps = partial(call_steps, draw_numbered), partial(call_steps, encode)
+    write_bytes(path, run(video_steps(draw_steps, views, count, path, fps, encode_steps)))
     return path
 
 

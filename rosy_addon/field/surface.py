@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -330,21 +329,23 @@ def _relative_to_first_corner(
     return points - np.repeat(points[face_start[:-1]], np.diff(face_start), axis=0)
 
 
-def face_blocks(face_start: np.ndarray) -> Iterator[tuple[slice, slice, np.ndarray]]:
+def face_blocks(face_start: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
     """Split the faces into consecutive blocks, to bound memory.
 
-    Yields
-    ------
+    Returns
+    -------
     faces, corners : slice
         The faces of the block and their corners.
     starts : (faces + 1,) ndarray
         `face_start` of the block, counted from its first corner.
     """
     count = len(face_start) - 1
+    blocks = []
     for first in range(0, count, BLOCK_ELEMENTS):
         faces = slice(first, min(first + BLOCK_ELEMENTS, count))
         starts = face_start[faces.start : faces.stop + 1]
-        yield faces, slice(int(starts[0]), int(starts[-1])), starts - starts[0]
+        blocks.append((faces, slice(int(starts[0]), int(starts[-1])), starts - starts[0]))
+    return blocks
 
 
 @dataclass(frozen=True, eq=False)

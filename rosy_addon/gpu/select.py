@@ -12,7 +12,7 @@ from ..rendering.draw import bake_picture
 from ..rendering.picture_images import CONVERSION_START, draw_image, picture_image
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput
-from ..worker.job import Call, Steps, part
+from ..worker.job import Call, Steps, call_steps, part
 from .cpu_viewport import CpuViewportRenderer
 from .device import blender_device
 from .renderer import GpuRenderer, check_method
@@ -74,8 +74,8 @@ def picture_steps(
     Picture
     """
     if device == "cpu":
-        return (yield Call(bake_picture, (view, keep_gbuffers, workers)))
-    return (yield from GpuRenderer(blender_device()).picture_steps(view))
+        return call_steps(bake_picture, view, keep_gbuffers, workers)
+    return GpuRenderer(blender_device()).picture_steps(view)
 
 
 def image_steps(

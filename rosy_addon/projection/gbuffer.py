@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -188,11 +187,11 @@ class GBuffer:
 
     def instance_blocks(
         self,
-    ) -> Iterator[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
-        """Yield the visible mesh instances in their order, with their pixels.
+    ) -> list[tuple[int, list[slice | np.ndarray], tuple[float, float]]]:
+        """Return the visible mesh instances in their order, with their pixels.
 
-        Yields
-        ------
+        Returns
+        -------
         instance_id : int
         blocks : list of slice or of (n,) intp ndarray
             Blocks of its pixels; see `pixel_blocks`.
@@ -201,10 +200,12 @@ class GBuffer:
         """
         counts = np.bincount(self.instance_id)
         ends = np.cumsum(counts) / len(self.pixel)
+        instances = []
         for instance_id in np.flatnonzero(counts).tolist():
             blocks: list[slice | np.ndarray] = [*pixel_blocks(counts[instance_id])]
             if counts[instance_id] < len(self.pixel):
                 pixels = np.flatnonzero(self.instance_id == instance_id)
                 blocks = [pixels[block] for block in blocks]
             start = ends[instance_id - 1] if instance_id else 0.0
-            yield instance_id, blocks, (start, ends[instance_id])
+            instances.append((instance_id, blocks, (start, ends[instance_id])))
+        return instances

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..surface_texture.direction_maps import corner_tangents
-from ..worker.job import Call, Steps, job
+from ..worker.job import Steps, call_steps, job
 from .field_attributes import VECTOR_TYPE, check_attribute_type, get_or_create_attribute
 from .meshes import mesh_surface
 from .read_field import read_mesh_field
@@ -43,7 +43,7 @@ def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") ->
     _check_storable(mesh, name)
     surface = mesh_surface(mesh)
     field = read_mesh_field(mesh, surface=surface)
-    return (yield Call(corner_tangents, (surface, field, guiding_angle)))
+    return call_steps(corner_tangents, surface, field, guiding_angle)
 
 
 def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "") -> None:

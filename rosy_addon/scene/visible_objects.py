@@ -31,11 +31,7 @@ def field_objects(
     RosyError
         If there is no object with one of the names, or it has no field, is hidden or switched off.
     """
-    candidates = {
-        obj.name: obj
-        for obj in _visible_objects(view_layer)
-        if has_field(obj) and is_field_enabled(obj)
-    }
+    candidates = {obj.name: obj for obj in _visible_objects(view_layer) if _draws_field(obj)}
     if names is None:
         return [candidates[name] for name in sorted(candidates)]
     return [_find_field_object(name, candidates) for name in dict.fromkeys(names)]
@@ -48,26 +44,31 @@ Instances = Iterator[tuple[bpy.types.DepsgraphObjectInstance, bool]]
 def rendered_instances(
     depsgraph: bpy.types.Depsgraph, targets: Collection[bpy.types.Object]
 ) -> Instances:
-    """Yield the instances of meshes that are visible in renders.
+    """Return the instances of meshes that are visible in renders.
 
     `targets` are the original objects whose fields are drawn. The others only occlude.
     """
     visible_objects = set(_visible_objects(depsgraph.view_layer))
     with_field = set(targets)
-    for instance in depsgraph.object_instances:
-        if _is_rendered(instance, visible_objects):
-            yield instance, instance.object.original in with_field
+    return (
+        (instance, instance.object.original in with_field)
+        for instance in depsgraph.object_instances
+        if _is_rendered(instance, visible_objects)
+    )
 
 
 def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) -> Instances:
-    """Yield the instances of meshes with a field that are visible in 3D views, or of all meshes."""
-    for instance in depsgraph.object_instances:
-        obj, owner = instance.object, instance.object.original
-        if obj.type != "MESH" or not instance.show_self:
-            continue
-        draws_field = has_field(owner) and is_field_enabled(owner)
-        if draws_field or (include_occluders and not owner.get(OWNED_TAG)):
-            yield instance, draws_field
+    """Return the instances of meshes with a field that are visible in 3D views, or of all meshes."""
+    meshes = (
+        (instance, _draws_field(instance.object.original))
+        for instance in depsgraph.object_instances
+        if instance.object.type == "MESH" and instance.show_self
+    )
+    return (
+        (instance, draws_field)
+        for instance, draws_field in meshes
+        if draws_field or (include_occluders and not instance.object.original.get(OWNED_TAG))
+    )
 
 
 def _is_rendered(
@@ -88,9 +89,9 @@ def _is_rendered(
     return obj.original in visible_objects
 
 
-def is_field_enabled(obj: bpy.types.Object) -> bool:
-    """Whether drawing an object's field is switched on."""
-    return obj.rosy.include if has_rosy_properties() else True
+def _draws_field(obj: bpy.types.Object) -> bool:
+    """Whether an object has a field whose drawing is switched on."""
+    return has_field(obj) and (not has_rosy_properties() or obj.rosy.include)
 
 
 def _visible_objects(view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:

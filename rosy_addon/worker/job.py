@@ -76,6 +76,11 @@ def run(steps: Steps[Result]) -> Result:
         return end.value
 
 
+def call_steps(function: Callable[..., Result], *arguments: Any) -> Steps[Result]:
+    """Make one call as a job, and return its result."""
+    return (yield Call(function, arguments))
+
+
 def part(
     steps: Steps[Result], start: float, stop: float, label: str | None = None
 ) -> Steps[Result]:

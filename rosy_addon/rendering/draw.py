@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -68,13 +67,10 @@ def draw_picture(
 
 
 def bake_picture(view: ViewInput, keep_gbuffers: bool = True, workers: int = 0) -> Picture:
-    """Draw a picture as `draw_picture`, with the cache of bakes in the process that calls it.
-
-    The picture has no layers, which are large, and not needed where it goes.
-    """
+    """Draw a picture as `draw_picture`, with the cache of bakes in the process that calls it."""
     picture = draw_picture(view, BAKE_CACHE, keep_gbuffers=keep_gbuffers, workers=workers)
     BAKE_CACHE.evict_over_limit()
-    return replace(picture, layers=())
+    return picture
 
 
 def _draw_fields(

@@ -218,8 +218,7 @@ class GuidedSystem:
 
     def _corners_of_faces(self, face: np.ndarray) -> np.ndarray:
         """(k,) intp: the corners of the triangles of (m,) faces, in ascending order."""
-        is_chosen = mask(self.surface.face_count, face)
-        return np.flatnonzero(is_chosen[self.averages.corner_face])
+        return np.flatnonzero(mask(self.surface.face_count, face)[self.averages.corner_face])
 
     def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
         """(k,) intp: the nodes of (m,) faces, in ascending order."""
@@ -229,8 +228,8 @@ class GuidedSystem:
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
         """(k,) intp: the corners of triangles at (m,) nodes, in ascending order."""
-        is_chosen = mask(len(self.laplacian), node)
-        return np.flatnonzero(is_chosen[self.averages.connection.corner_node])
+        corner_node = self.averages.connection.corner_node
+        return np.flatnonzero(mask(len(self.laplacian), node)[corner_node])
 
     def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
         """Grow a set of nodes ring by ring, until it has at least a number of nodes or is closed.

@@ -103,9 +103,10 @@ def validated_field(
     with progress(0.4, 0.6):
         vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
     if domain == "vertex":
-        x, y = face_frames(surface.in_rest_shape())
+        rest = surface.in_rest_shape()
+        x, y = face_frames(rest)
         z = to_representation(vectors, *tangent_frame(normal), degree)
-        face_z = _vertex_averages(surface.in_rest_shape(), normal, x)(z, degree)
+        face_z = _vertex_averages(rest, normal, x)(z, degree)
         vectors = from_representation(face_z, x, y, degree)
     return RosyField(degree, vectors)
 

@@ -1,1 +1,1 @@
-"""Measurements and devices that tests and benchmarks share."""
+"""Measurements, planar pictures and devices that tests, benchmarks and figures share."""

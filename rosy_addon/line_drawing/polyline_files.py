@@ -12,7 +12,7 @@ from ..errors import RosyError
 from ..field.blocks import row_blocks
 from ..progress import progress, report
 from ..projection.camera import Camera
-from .stroke_set import POINT_COLUMNS, Strokes
+from .stroke_set import Strokes
 from .svg import Pen, simplify_mask
 from .visibility import pixel_size
 
@@ -91,10 +91,9 @@ def simplify_strokes(strokes: Strokes, camera: Camera) -> Strokes:
         [strokes.points / min_pixel_length[:, None], WIDTH_WEIGHT_PX * strokes.width]
     )
     kept = simplify_mask(features, strokes.start, SIMPLIFY_TOLERANCE_PX)
+    count = np.add.reduceat(kept, strokes.start[:-1])
     return replace(
-        strokes,
-        start=np.concatenate([[0], np.cumsum(np.add.reduceat(kept, strokes.start[:-1]))]),
-        **{name: getattr(strokes, name)[kept] for name in POINT_COLUMNS},
+        strokes.take_points(np.flatnonzero(kept)), start=np.concatenate([[0], np.cumsum(count)])
     )
 
 

@@ -116,7 +116,6 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
     camera : Camera
     pixels : float
         Spacing for a surface that faces the camera.
-
     """
     to_eye = camera.view_directions(mesh.points)
     cosine = np.abs(dot(mesh.corner_normal, to_eye))

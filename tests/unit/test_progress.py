@@ -151,7 +151,7 @@ LONG = {
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
     "picture": (picture, (Look(),), 0.9),
     "members": (picture, (Look(method="members"),), 0.9),
-    "strokes": (draw_instances, ([INSTANCE], CAMERA), 0.9),
+    "strokes": (draw_instances, ([INSTANCE], CAMERA, StrokeStyle()), 0.9),
     "all strokes": (
         draw_instances,
         ([INSTANCE], CAMERA, StrokeStyle(arrows=30.0, overshoot=4.0, outline=True)),

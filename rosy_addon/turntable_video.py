@@ -156,7 +156,11 @@ def turntable(
             on_picture(next(numbers))
         return video_frame(draw(view).rgba, is_gif(path))
 
-    draw_steps, encode_steps = partial(call_steps, draw_numbered), partial(call_steps, encode)
+    def encode_steps(*arguments: Any) -> Steps[None]:
+        assert encode is not None
+        return call_steps(encode, *arguments)
+
+    draw_steps = partial(call_steps, draw_numbered)
     write_bytes(path, run(video_steps(draw_steps, views, count, path, fps, encode_steps)))
     return path
 

@@ -115,7 +115,7 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
         grid_index += column[first:stop] - (left_column - 1)
         grid = _pixel_grid(gbuffer, slice(first, stop), grid_index, (band_rows + 1, width))
         grid_masks = np.zeros((band_rows + 1, width), dtype=np.uint16)
-        for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
+        for dx, dy in grid.steps:
             # The cells that have a neighbor at (dx, dy), and these neighbors.
             left, right = max(-dx, 0), max(dx, 0)
             source = slice(0, band_rows + 1 - dy), slice(left, width - right)
@@ -139,8 +139,9 @@ class _PixelGrid(NamedTuple):
     depth : (h, w) float32 ndarray
         A quantity that is linear on screen for planes: z if orthographic, -1 / z if perspective.
         NaN at empty pixels.
-    slope_x, slope_y : (h, w) float32 ndarray
-        Change of `depth` to the next column and to the next row, on the tangent plane.
+    steps : dict of (int, int) to (h, w) float32 ndarray
+        Change of `depth` on the tangent plane to the neighbor at (dx, dy): of those on one side, as the
+        others have the opposite changes.
     tolerance : (h, w) float32 ndarray
         Permitted deviation of `depth` from the prediction, one pixel away.
     normal : 3 (h, w) float32 ndarrays
@@ -152,8 +153,7 @@ class _PixelGrid(NamedTuple):
     """
 
     depth: np.ndarray
-    slope_x: np.ndarray
-    slope_y: np.ndarray
+    steps: dict[tuple[int, int], np.ndarray]
     tolerance: np.ndarray
     normal: tuple[np.ndarray, ...]
     instance_id: np.ndarray | None
@@ -171,10 +171,10 @@ def _pixel_grid(
         return grid
 
     depth, slope_x, slope_y, tolerance = depth_slopes(gbuffer, pixels)
+    x, y = scatter(slope_x), scatter(slope_y)
     return _PixelGrid(
         depth=scatter(depth, np.nan),
-        slope_x=scatter(slope_x),
-        slope_y=scatter(slope_y),
+        steps={(1, 0): x, (-1, 1): y - x, (0, 1): y, (1, 1): y + x},
         tolerance=scatter(tolerance),
         normal=tuple(scatter(component) for component in gbuffer.normal[pixels].T),
         instance_id=scatter(gbuffer.instance_id[pixels]) if len(gbuffer.instances) > 1 else None,
@@ -258,9 +258,7 @@ def _is_continuous(
     (h', w') bool ndarray
     """
     jump = grid.depth[target] - grid.depth[source]
-    source_prediction, target_prediction = (
-        step[0] * grid.slope_x[cells] + step[1] * grid.slope_y[cells] for cells in (source, target)
-    )
+    source_prediction, target_prediction = grid.steps[step][source], grid.steps[step][target]
     tolerance = np.minimum(grid.tolerance[source], grid.tolerance[target])
     if all(step):
         tolerance *= np.float32(np.sqrt(2))

@@ -455,14 +455,13 @@ def _fill_instances(gbuffer: GBuffer, display: str, cache: Cache | None) -> dict
             corner_field = cached_corner_field(instance, display, cache)
         corner_field = corner_field.rotated(gbuffer.camera.view[:3, :3])
         geometric_normals[instance_id] = corner_field.geometric_normal
-        for number, block in enumerate(blocks):
-            report(
-                middle + (stop - middle) * number / len(blocks),
-                "rotating the field into the view plane",
-            )
+        label = "rotating the field into the view plane"
+        report(middle, label)
+        for number, block in enumerate(blocks, 1):
             _fill_pixels(
                 gbuffer, block, gbuffer.triangle[block], corner_field, instance.field.degree
             )
+            report(middle + (stop - middle) * number / len(blocks), label)
     return geometric_normals
 
 

@@ -28,9 +28,9 @@ def run_stages(monkeypatch):
     def watch(module, name):
         real = getattr(module, name)
 
-        def watched(*arguments):
+        def watched(*arguments, **options):
             names.append(name)
-            return real(*arguments)
+            return real(*arguments, **options)
 
         monkeypatch.setattr(module, name, watched)
 

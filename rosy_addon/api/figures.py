@@ -260,9 +260,9 @@ def load_drawing() -> ModuleType:
         from ..external import matplotlib_figure
     except ModuleNotFoundError as error:
         if error.name is not None and error.name.startswith("matplotlib"):
-            raise RosyError(
-                "figures are drawn by matplotlib: pip install rosyfields[figures]"
-            ) from None
+            from ..external import MATPLOTLIB_MISSING
+
+            raise RosyError(MATPLOTLIB_MISSING) from None
         raise RosyError("figures need the Python package rosyfields, with matplotlib") from None
     return matplotlib_figure
 

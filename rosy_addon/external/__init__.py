@@ -6,3 +6,6 @@ Each module says so if something is missing; for `matplotlib_figure`, which impo
     matplotlib_figure  matplotlib: figures
     simulation_files   pyvista and meshio: meshes with arrays in the files of simulations
 """
+
+#: What is wrong where matplotlib cannot be imported.
+MATPLOTLIB_MISSING = "figures are drawn by matplotlib: pip install rosyfields[figures]"

@@ -265,6 +265,8 @@ def _trace_instance(
         # extended are tapered after the extension.
         ends &= ~strokes.free_end_mask
         strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
+    if not style.overshoot:
+        strokes = replace(strokes, free_ends=None)
     return strokes
 
 

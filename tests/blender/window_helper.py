@@ -80,6 +80,12 @@ def helper_id():
     return None if process is None else process.pid
 
 
+def helper_cpu_seconds():
+    """Return for how long the helper process has had a core."""
+    fields = Path(f"/proc/{helper_id()}/stat").read_text().rpartition(")")[2].split()
+    return sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
+
+
 def start_bake():
     with in_view():
         assert bpy.ops.rosy.bake("INVOKE_DEFAULT", True) == {"RUNNING_MODAL"}
@@ -149,12 +155,12 @@ def another_look_is_quick():
     seconds = []
     for gain in (1.0, 1.3):
         bpy.context.scene.rosy.look.gain = gain
-        start = time.monotonic()
+        start = helper_cpu_seconds()
         start_bake()
         yield from wait_for_job()
-        seconds.append(time.monotonic() - start)
+        seconds.append(helper_cpu_seconds() - start)
     preferences().workers = 0
-    note("bakes with two looks", *seconds)
+    note("bakes with two looks, by the processor", *seconds)
     assert seconds[1] < 0.8 * seconds[0], seconds
 
 

@@ -98,14 +98,19 @@ def start_bake(**settings):
     yield from start_job(bpy.ops.rosy.bake, **settings)
 
 
+#: Modules with handlers for longer than a job: they remember live views, and note what makes pictures out
+#: of date.
+LASTING_HANDLERS = (".ui.live_views", ".scene.staleness")
+
+
 def check_idle():
-    """Check that no job runs, and that no handler is left but those that remember live views."""
+    """Check that no job runs, and that no handler is left but those of live views and panels."""
     assert status().current is None
     for name in dir(bpy.app.handlers):
         handlers = getattr(bpy.app.handlers, name)
         for handler in handlers if isinstance(handlers, list) else ():
             module = getattr(handler, "__module__", "")
-            assert "rosy" not in module or module.endswith(".ui.live_views"), name
+            assert "rosy" not in module or module.endswith(LASTING_HANDLERS), name
 
 
 def check_interruption(interrupt, start=start_bake, *, unchanged=True, screenshot=None):

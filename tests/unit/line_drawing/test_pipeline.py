@@ -235,17 +235,17 @@ def test_seeding_ends_where_all_strokes_are_short():
 @pytest.mark.slow
 def test_errors(error_of):
     assert "no object has a field" in error_of(
-        draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA
+        draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA, StrokeStyle()
     )
     behind = MeshInstance(SPHERE.surface, moved(y=-50.0), SPHERE.field)
-    assert "no stroke is visible" in error_of(draw_instances, [behind], CAMERA)
+    assert "no stroke is visible" in error_of(draw_instances, [behind], CAMERA, StrokeStyle())
     unseen = draw_instances(
         [behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False
     )
     assert 20 < len(unseen.strokes) < 2000
     assert "no stroke fits" in error_of(draw_instances, [SPHERE], CAMERA, StrokeStyle(spacing=500))
     away = MeshInstance(SPHERE.surface, moved(x=9.0), SPHERE.field)
-    assert "no stroke is visible" in error_of(draw_instances, [away], CAMERA)
+    assert "no stroke is visible" in error_of(draw_instances, [away], CAMERA, StrokeStyle())
     assert "setting 'spacing' is 0, expected a number from 0.5" in error_of(StrokeStyle, spacing=0)
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
     assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")

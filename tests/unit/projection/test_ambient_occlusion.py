@@ -90,7 +90,7 @@ def test_a_plane_below_a_sphere():
     """A ball of radius r hides cos(a) (r / l)^2, at distance l and angle a (Nusselt)."""
     ground, ball = plane(20, 20, 6.0), icosphere(4)
     instances = [instance_at(ground), instance_at(ball, 0, 0, 1.6)]
-    actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 300, 400))
+    actual = values_at_vertices(ground, ambient_occlusion(instances, 0, 300))
     distance = np.sqrt(ground.vertices[:, 0] ** 2 + ground.vertices[:, 1] ** 2 + 1.6**2)
     expected = 1 - 1.6 / distance**3
     assert expected.min() < 0.65

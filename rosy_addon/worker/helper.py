@@ -102,10 +102,19 @@ class Helper:
             Of a module that needs no Blender.
         *arguments
             Anything that can be pickled.
+
+        Raises
+        ------
+        HelperLostError
+            If the process has ended, or cannot be started.
         """
         self.start()
         self.fraction, self.label = 0.0, "starting"
         self._call = function, arguments
+        try:
+            self._send_call()
+        except (EOFError, OSError):
+            raise self._lost() from None
 
     def poll(self) -> Callable[[], Any] | None:
         """Hear what the process says, without waiting.
@@ -124,11 +133,8 @@ class Helper:
         if channel is None:
             raise self._lost()
         try:
-            if self._call is not None:
-                if not self._is_prepared():
-                    return None
-                channel.send(self._call)
-                self._call = None
+            if not self._send_call():
+                return None
             while channel.has_received(RECEIVE_SECONDS):
                 kind, *content = channel.receive()
                 if kind != "progress":
@@ -174,14 +180,17 @@ class Helper:
         """Of the process, if it runs."""
         return None if self._process is None else self._process.pid
 
-    def _is_prepared(self) -> bool:
-        """Return whether the process is ready for a call."""
+    def _send_call(self) -> bool:
+        """Send the call once the process is ready. Return whether it has been sent."""
         if not self._is_ready and self._channel.poll():
             self._channel.receive()
             self._is_ready = True
         if not self._is_ready and time.monotonic() - self._start_time > START_SECONDS:
             raise EOFError
-        return self._is_ready
+        if self._is_ready and self._call is not None:
+            self._channel.send(self._call)
+            self._call = None
+        return self._call is None
 
     def _lost(self) -> HelperLostError:
         """End what is left of the process, and return what is wrong."""

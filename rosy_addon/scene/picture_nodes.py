@@ -15,7 +15,7 @@ from ..rendering.picture_images import NEUTRAL_GRAY
 from .compat import is_editable
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
-from .owned_data import KEY_TAG, OWNED_TAG, delete_owned, is_rosy_modifier, removable_modifiers
+from .owned_data import KEY_TAG, OWNED_TAG, is_rosy_modifier, removable_modifiers
 from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.
@@ -231,14 +231,9 @@ def set_picture_modifier(
 
 
 def remove_picture_modifiers(obj: bpy.types.Object) -> None:
-    """Remove RoSy's modifiers and their node groups from an object."""
-    existing = removable_modifiers(obj)
-    node_groups = {modifier.node_group for modifier in existing}
-    for modifier in existing:
+    """Remove RoSy's modifiers from an object. Their node groups may have no use then."""
+    for modifier in removable_modifiers(obj):
         obj.modifiers.remove(modifier)
-    for node_group in node_groups:
-        if not node_group.users:
-            delete_owned(node_group)
 
 
 def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:

@@ -24,7 +24,19 @@ SMALL_WORDS = {
 }
 VISIBLE_GROUPS = {"RosyLook", "RosyStrokes", "RosyScene", "RosyMesh", "RosyObject"}
 
-ID_TYPES = ("Scene", "Mesh", "Object", "WindowManager", "World", "Material", "Image", "Camera")
+ID_TYPES = (
+    *(
+        "Scene",
+        "Mesh",
+        "Object",
+        "NodeTree",
+        "WindowManager",
+        "World",
+        "Material",
+        "Image",
+        "Camera",
+    ),
+)
 
 
 def snapshot():

@@ -204,8 +204,7 @@ class _Edges:
         self.line_width = np.zeros(count, dtype=np.float32)
         #: (P,) bits `PART_BORDER` and `EMPTY_BORDER`.
         self._border = np.zeros(count, dtype=np.uint8)
-        instance_ids = np.flatnonzero(np.bincount(gbuffer.instance_id)) if gbuffer.instances else ()
-        for instance_id in instance_ids:
+        for instance_id in np.flatnonzero(np.bincount(gbuffer.instance_id)):
             with progress(0.6, 0.7, STEP_LABEL):
                 self._find_creases_and_parts(int(instance_id), cache, margin * (self._stride + 1))
         with progress(0.7, 0.9, STEP_LABEL):

@@ -402,7 +402,7 @@ class SceneReader:
         self._has_read_any = True
         try:
             with evaluated_mesh(obj) as mesh:
-                mesh_data = self._read_mesh(mesh, obj, owner, draws_field)
+                mesh_data = self._read_mesh(mesh, owner, draws_field)
                 is_waiting = mesh is not None and mesh_data is None
                 if self.mesh_states is not None and not is_waiting:
                     state_request = request if draws_field else None
@@ -416,18 +416,14 @@ class SceneReader:
         return mesh_data
 
     def _read_mesh(
-        self,
-        mesh: bpy.types.Mesh | None,
-        obj: bpy.types.Object,
-        owner: bpy.types.Object,
-        draws_field: bool,
+        self, mesh: bpy.types.Mesh | None, owner: bpy.types.Object, draws_field: bool
     ) -> _MeshData | None:
         """Read an evaluated mesh; None if there are no faces, or it is unresolved."""
         if mesh is None:
             return None
         if draws_field:
             return self._read_field_mesh(mesh, owner)
-        label = f"object '{obj.name}'"
+        label = f"object '{owner.name}'"
         return mesh_surface(mesh, label, occluder_only=True, cache=self.cache), None, None, None
 
     def _read_field_mesh(self, mesh: bpy.types.Mesh, owner: bpy.types.Object) -> _MeshData | None:

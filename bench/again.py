@@ -37,8 +37,8 @@ def measure(runs: int) -> Iterator[Case]:
     except ImportError:
         print("changes of a look: left out, there is no bpy here", file=sys.stderr)
         return
-    from rosy_addon.bake import bake
-    from rosy_addon.cache import BAKE_CACHE
+    from rosy_addon.core.cache import BAKE_CACHE
+    from rosy_addon.jobs.bake import bake
 
     for triangles in (12_000, 200_000):
         scene = ball_scene(bpy, triangles)

@@ -31,9 +31,9 @@ def measure(runs: int) -> Iterator[Case]:
     except ImportError:
         print("animation: skipped, because bpy is not installed", file=sys.stderr)
         return
-    from rosy_addon.animation import bake_animation
-    from rosy_addon.bake import bake
-    from rosy_addon.cache import BAKE_CACHE
+    from rosy_addon.core.cache import BAKE_CACHE
+    from rosy_addon.jobs.animation import bake_animation
+    from rosy_addon.jobs.bake import bake
     from rosy_addon.scene.pictures import OutputSettings
 
     with tempfile.TemporaryDirectory() as folder:

@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 from harness.planar import lic, planar_pixel_field
 
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField
+from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.projection.camera import Camera, look_at, perspective_camera

@@ -18,12 +18,12 @@ import numpy as np
 from harness.planar import lic
 from scipy import ndimage
 
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.flow import flow_at
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
+from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.projection.camera import orbit_camera

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import lru_cache
 
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.look import is_hatched
+from rosy_addon.core.cache import Cache
 from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput

@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from harness.planar import lic
 
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
+from rosy_addon.core.cache import Cache
 from rosy_addon.projection.corner_field import field_at_corners
 from rosy_addon.projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from rosy_addon.projection.project import project

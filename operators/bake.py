@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.bake import BakeResult, bake
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.core.errors import RosyError
+from ..rosy_addon.jobs.bake import BakeResult, bake
 from ..rosy_addon.projection.camera import Camera
 from ..rosy_addon.scene.cameras import CameraSource, camera_of_view, render_camera, scene_cameras
 from ..rosy_addon.ui.preferences import worker_count

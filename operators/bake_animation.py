@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import bpy
 
-from ..rosy_addon.animation import SequenceResult, bake_animation
-from ..rosy_addon.errors import RosyError, counted
+from ..rosy_addon.core.errors import RosyError, counted
+from ..rosy_addon.jobs.animation import SequenceResult, bake_animation
 from ..rosy_addon.scene.cameras import scene_cameras
 from ..rosy_addon.scene.pictures import output_folder, read_output_settings
 from ..rosy_addon.ui.preferences import worker_count

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, RosyError, as_sentence, error_text
+from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, as_sentence, error_text
 from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.visible_objects import field_objects

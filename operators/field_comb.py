@@ -7,9 +7,9 @@ from contextlib import suppress
 import bpy
 import numpy as np
 
-from ..rosy_addon.comb_field import CombStroke
-from ..rosy_addon.errors import REPORTED_ERRORS, RosyError
+from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError
 from ..rosy_addon.field.guide_brush import EFFECTS, GuideBrush
+from ..rosy_addon.jobs.comb_field import CombStroke
 from ..rosy_addon.ui import comb_brush, overlay
 from ..rosy_addon.ui.properties import BRUSH_STRENGTH
 from ..rosy_addon.ui.sidebar import use_property_columns

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..rosy_addon.errors import counted
+from ..rosy_addon.core.errors import counted
 from ..rosy_addon.field.analysis import format_degrees
 from ..rosy_addon.scene.field_difference import (
     DIFFERENCE_ATTRIBUTE,

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import bpy
 
-from ..rosy_addon.errors import RosyError, counted
+from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert
 from ..rosy_addon.field.curvature import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField

@@ -7,10 +7,10 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.core.errors import RosyError
+from ..rosy_addon.core.file_io import check_writable, write_bytes
 from ..rosy_addon.field.field_io import field_file
 from ..rosy_addon.field.rosy_field import RosyField
-from ..rosy_addon.file_io import check_writable, write_bytes
 from ..rosy_addon.scene.combed_guides import read_combed_guides
 from ..rosy_addon.scene.field_attributes import field_degree
 from ..rosy_addon.scene.meshes import mesh_label, mesh_surface

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..rosy_addon.errors import NoFeaturesError, RosyError, counted
+from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
 from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE

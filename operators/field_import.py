@@ -8,7 +8,7 @@ from functools import partial
 import bpy
 from bpy_extras.io_utils import ImportHelper
 
-from ..rosy_addon.errors import counted
+from ..rosy_addon.core.errors import counted
 from ..rosy_addon.field.directional_field import field_directions
 from ..rosy_addon.field.field_io import READ_SUFFIXES, LoadedField, load_field
 from ..rosy_addon.field.rosy_field import MAX_DEGREE

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS
+from ..rosy_addon.core.errors import REPORTED_ERRORS
 from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
 from ..rosy_addon.scene.meshes import mesh_surface
 from ..rosy_addon.scene.read_field import read_mesh_field

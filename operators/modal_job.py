@@ -13,7 +13,7 @@ from typing import Any
 
 import bpy
 
-from ..rosy_addon.errors import REPORTED_ERRORS, as_sentence
+from ..rosy_addon.core.errors import REPORTED_ERRORS, as_sentence
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.ui import job_status
 from ..rosy_addon.ui.preferences import uses_helper

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import counted
+from ..rosy_addon.core.errors import counted
 from ..rosy_addon.scene.bake_records import has_pictures, remove_bakes
 from ..rosy_addon.scene.pictures import show_bake
 from ..rosy_addon.ui.main_panel import SHADING_WITHOUT_MATERIALS

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..rosy_addon.errors import RosyError
+from ..rosy_addon.core.errors import RosyError
 from ..rosy_addon.preset_files.store import (
     MAX_DESCRIPTION_LENGTH,
     MAX_NAME_LENGTH,

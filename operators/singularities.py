@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.errors import counted
+from ..rosy_addon.core.errors import counted
 from ..rosy_addon.field.singularities import format_index
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.scene.singularity_points import (

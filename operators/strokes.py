@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.draw_strokes import StrokeResult, draw_strokes
-from ..rosy_addon.errors import counted
+from ..rosy_addon.core.errors import counted
+from ..rosy_addon.jobs.draw_strokes import StrokeResult, draw_strokes
 from ..rosy_addon.line_drawing.polyline_files import DRAWING_SUFFIXES
 from ..rosy_addon.scene.cameras import CameraSource, render_camera
 from ..rosy_addon.scene.stroke_objects import (

@@ -9,10 +9,10 @@ from pathlib import Path
 import bpy
 from bpy_extras.io_utils import ExportHelper
 
-from ..rosy_addon.file_io import check_writable
+from ..rosy_addon.core.file_io import check_writable
+from ..rosy_addon.jobs.render_turntable import render_turntable
 from ..rosy_addon.projection.camera import check_size
-from ..rosy_addon.render_turntable import render_turntable
-from ..rosy_addon.turntable_video import check_video_path
+from ..rosy_addon.rendering.turntable import check_video_path
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.worker.job import Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects, sync_suffix

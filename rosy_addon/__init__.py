@@ -2,6 +2,7 @@
 
 A package imports only from those above it::
 
+    core                  errors, progress, settings, files, memory: what all others import
     field                 surfaces and fields: formats, generation, analysis, editing
     projection            cameras, rasterizer, G-buffer and shadow maps
     compositor            pictures from G-buffers
@@ -11,16 +12,13 @@ A package imports only from those above it::
     rendering, image_io   pictures of views, drawn with numpy; image files
     gpu, preset_files     the renderer on the graphics card; stored looks and stroke settings
     scene                 reading and writing Blender data
+    jobs                  baking, strokes, animations: read the scene, draw, apply
     viewport              the live preview in the 3D view
     ui                    properties, panels, preferences and overlay
     api                   the functions for scripts and notebooks
     cli                   the command line
 
-The modules outside the packages are of two kinds. The base modules, such as `errors`, `progress`,
-`cache` and `settings`, are imported by many packages. The main jobs are run by operators and by the
-command line: `bake`, `animation`, `draw_strokes` and `turntable_video`.
-
-``field``, ``projection``, ``compositor``, ``line_drawing``, ``surface_texture``, ``worker``, ``rendering``,
+``core``, ``field``, ``projection``, ``compositor``, ``line_drawing``, ``surface_texture``, ``worker``, ``rendering``,
 ``image_io`` and ``preset_files`` do not import bpy and need only numpy. The public names are those of `api`. They are
 loaded when they are first used.
 """

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
+from ..core.progress import progress, report
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot
-from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_neighbors import screen_jacobians

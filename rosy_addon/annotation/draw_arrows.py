@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..color import from_hex, to_linear
+from ..core.color import from_hex, to_linear
+from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import report
 from .arrow_marks import FILL_COLOR, NOTCH, OUTLINE_COLOR, WIDTH, ArrowMarks
 from .painting import draw_over
 

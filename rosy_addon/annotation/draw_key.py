@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..color import from_hex, to_linear
+from ..core.color import from_hex, to_linear
 from ..field.blocks import concatenated_ranges
 from .draw_marks import draw_dot
 from .key_contents import ColorScale

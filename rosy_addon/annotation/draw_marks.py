@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..color import from_hex, to_linear
-from ..progress import report
+from ..core.color import from_hex, to_linear
+from ..core.progress import report
 from .index_labels import HALO, HALO_COLOR, LABEL_COLOR, Label, placed_labels, stroke_width
 from .painting import draw_over, window
 from .singularity_marks import (

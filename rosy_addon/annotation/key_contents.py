@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..color import map_colors
+from ..core.color import map_colors
 from .singularity_marks import SingularityMarks
 
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
+from ..core.progress import progress
 from ..field.singularities import find_singularities
-from ..progress import progress
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import part_of

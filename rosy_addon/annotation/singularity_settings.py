@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..settings import choice, number, switch
+from ..core.settings import choice, number, switch
 
 
 def shows_singularities(settings: Any) -> bool:

@@ -11,9 +11,9 @@ from itertools import product
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
+from ..core.progress import report
 from ..field.surface import Surface
-from ..progress import report
 from ..projection.progressive_samples import rest_areas, surface_samples
 
 #: Levels in which the distance halves, and the number of the finest level. It has about 7000 places.

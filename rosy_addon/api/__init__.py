@@ -15,8 +15,8 @@ Angles are in radians, except those of a view, which are in degrees.
 The names that are imported here are public; `rosy_addon.__all__` lists them.
 """
 
-from ..errors import RosyError as RosyError
-from ..errors import RosyWarning as RosyWarning
+from ..core.errors import RosyError as RosyError
+from ..core.errors import RosyWarning as RosyWarning
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .drawings import Drawing as Drawing

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.analysis import (
     DEFAULT_REACH,
     SingularityMatching,

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compositor.shading import lights_of
-from ..errors import RosyError
-from ..file_io import write_bytes
+from ..core.errors import RosyError
+from ..core.file_io import write_bytes
+from ..core.settings import settings_of
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
 from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
@@ -21,7 +22,6 @@ from ..line_drawing.svg import Pen, svg_text
 from ..projection.camera import Camera, check_size, orbit_camera
 from ..projection.up_axis import UP_AXIS_MATRIX
 from ..rendering.mesh_view import check_light
-from ..settings import settings_of
 from .field import Field
 from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, upright_instance
 from .surface import Surface

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RosyError, RosyWarning
+from ..core.errors import RosyError, RosyWarning
 from ..field.analysis import angle_errors, dirichlet_energy, error_statistics
 from ..field.array_field import SurfaceArrays, array_field
 from ..field.convert import Conversion, convert

@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from ..annotation.round_numbers import round_below
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
-from ..cache import Cache
-from ..color import color_stops, map_colors
 from ..compositor.color_values import value_ends, value_ranges
 from ..compositor.look import Look, colors_magnitude, colors_values
 from ..compositor.look_units import scaled_look
-from ..errors import RosyError, counted
+from ..core.cache import Cache
+from ..core.color import color_stops, map_colors
+from ..core.errors import RosyError, counted
+from ..core.file_io import write_bytes
 from ..field.analysis import DEFAULT_REACH, format_degrees
-from ..file_io import write_bytes
 from ..image_io.png import to_srgb_uint8
 from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cache import Cache
 from ..compositor.flow import flow_at
 from ..compositor.look import Look
-from ..errors import RosyError, counted
+from ..core.cache import Cache
+from ..core.errors import RosyError, counted
 from ..field.carry import vectors_on_rest_shape
 from ..field.frames import normalize
 from ..field.interpolation import interpolate_fields
@@ -26,8 +26,8 @@ from ..field.surface import face_area_vectors, have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
+from ..rendering.turntable import Encoder, turntable
 from ..rendering.view_input import ViewInput
-from ..turntable_video import Encoder, turntable
 from .field import Field, warn
 from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, default_encoder, picture_look
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import RosyError, counted
+from ..core.errors import RosyError, counted
 from ..field.formats.sings import read_sings
 from ..field.generate import GeneratorSettings, generate
 from ..field.surface import orientation_warning

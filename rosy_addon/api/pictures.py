@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .. import turntable_video
-from ..cache import Cache
-from ..color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..compositor.look import Look
-from ..errors import RosyError
+from ..core.cache import Cache
+from ..core.color import LUMINANCE_WEIGHTS, luminance, to_linear
+from ..core.errors import RosyError
 from ..image_io.png import png_bytes, read_png, to_srgb_uint8, write_png
 from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..projection.ambient_occlusion import DIRECTION_COUNT
@@ -25,9 +24,10 @@ from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
 from ..projection.camera import check_size
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
+from ..rendering import turntable as turntable_video
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
-from ..turntable_video import Encoder
+from ..rendering.turntable import Encoder
 from .field import Field, check_same_surface
 from .generators import form, uv_map
 from .surface import Surface
@@ -272,7 +272,7 @@ def turntable(
     view : (float, float)
         Azimuth of the first picture, and elevation, in degrees.
     encode : function, optional
-        Encodes an ``.mp4``: see `turntable_video.Encoder`. By default ffmpeg, where it is installed.
+        Encodes an ``.mp4``: see `rendering.turntable.Encoder`. By default ffmpeg, where it is installed.
     on_picture : function, optional
         Called with the number of each picture, from 1, before it is drawn.
 

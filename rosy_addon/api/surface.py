@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import RosyError, RosyWarning, counted
+from ..core.errors import RosyError, RosyWarning, counted
 from ..field.formats.obj import read_uv
 from ..field.formats.ply import read_vertex_values
 from ..field.formats.polygons import offsets_from_sizes

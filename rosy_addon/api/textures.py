@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..color import to_linear
 from ..compositor.look import Look, is_hatched
 from ..compositor.shading import Light
-from ..errors import RosyError
+from ..core.color import to_linear
+from ..core.errors import RosyError
 from ..field.frames import unit_direction
 from ..preset_files.store import default_user_folder, load_preset
 from ..projection.gbuffer import MeshInstance

@@ -8,12 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from ..errors import RosyError, counted
-from ..file_io import check_folder, check_readable
-from ..frame_workers import parse_frames, run_local
+from ..core.errors import RosyError, counted
+from ..core.file_io import check_folder, check_readable
+from ..core.progress import listening
 from ..gpu.select import RENDER_DEVICES
 from ..preset_files.store import SHIPPED_FOLDER, find_preset_file
-from ..progress import listening
+from ..worker.frame_workers import parse_frames, run_local
 from .options import Options, add_subcommand, parse_size, user_presets_folder
 from .scene import open_scene, print_warnings, requested_cameras, requested_objects
 from .streams import print_line
@@ -122,8 +122,8 @@ def _check_bake_options(options: Options) -> None:
 
 def _bake(options: Options, scene: Any, settings: Any) -> list[Any]:
     """Draw the current frame or several in this process, and return what was made for each camera."""
-    from ..animation import bake_animation
-    from ..bake import bake
+    from ..jobs.animation import bake_animation
+    from ..jobs.bake import bake
     from ..scene.look_properties import read_look
 
     has_look_options = bool(options.preset or options.set)

@@ -12,7 +12,7 @@ from .. import api
 from ..api.figures import LINES, check_figure_path, load_drawing
 from ..api.pictures import picture_look
 from ..api.surface import simulation_suffixes
-from ..errors import RosyError, counted
+from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES

@@ -10,7 +10,7 @@ import numpy as np
 from .. import api
 from ..api.generators import generated, uv_map
 from ..api.surface import simulation_suffixes
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.guide_strokes import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings

@@ -15,12 +15,12 @@ import numpy as np
 
 from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
-from ..errors import RosyError
-from ..file_io import check_writable
+from ..core.errors import RosyError
+from ..core.file_io import check_writable
+from ..core.settings import settings_of, stored_key
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from ..projection.up_axis import UP_AXIS_MATRIX
-from ..settings import settings_of, stored_key
 from .streams import print_line
 
 

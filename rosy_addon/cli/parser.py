@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import REPORTED_ERRORS, error_text
-from ..turntable_video import Encoder
+from ..core.errors import REPORTED_ERRORS, error_text
+from ..rendering.turntable import Encoder
 from .bake import add_bake_command
 from .field import add_compare_command, add_field_command, add_info_command
 from .options import CommandParser, Options

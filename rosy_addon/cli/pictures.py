@@ -9,9 +9,9 @@ from typing import Any
 from .. import api
 from ..api.pictures import find_ffmpeg
 from ..api.textures import UDIM_TOKEN, texture_look
-from ..errors import RosyError
+from ..core.errors import RosyError
+from ..rendering.turntable import NO_ENCODER, Encoder, check_video_path
 from ..surface_texture.draw import CONTENTS, MAX_MARGIN, MAX_SIZE, MIN_SIZE
-from ..turntable_video import NO_ENCODER, Encoder, check_video_path
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import (
     CommandParser,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..preset_files.store import (
     merge_preset_files,
     read_preset,

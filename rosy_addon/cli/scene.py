@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from .options import Options
 from .streams import print_error
 

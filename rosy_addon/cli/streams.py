@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from ..errors import RosyWarning, escape_unsafe
+from ..core.errors import RosyWarning, escape_unsafe
 
 #: Where commands print, if that is not `sys.stdout`.
 _own_output: TextIO | None = None

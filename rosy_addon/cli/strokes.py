@@ -13,14 +13,14 @@ from typing import Any
 
 from ..api.drawings import draw_strokes
 from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
-from ..errors import RosyError
-from ..frame_workers import parse_frames
+from ..core.errors import RosyError
+from ..core.settings import Choice, Number, Setting, Switch, settings_of
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..projection.camera import check_size
 from ..rendering.mesh_view import check_light
-from ..settings import Choice, Number, Setting, Switch, settings_of
+from ..worker.frame_workers import parse_frames
 from .mesh_field import add_mesh_options, load_mesh_and_field
 from .options import CommandParser, Options, add_subcommand, float_between
 from .scene import find_camera, open_scene, print_warnings, requested_objects
@@ -126,7 +126,7 @@ def _draw_frame_strokes(options: Options, scene: Any, path: Path) -> None:
     """Draw the strokes of the current frame, as the operator does."""
     import bpy
 
-    from ..draw_strokes import draw_strokes
+    from ..jobs.draw_strokes import draw_strokes
     from ..scene.cameras import frame_camera
     from ..scene.stroke_objects import read_pen, read_stroke_style, target_objects
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.surface_sampling import surface_values
 from .look import Look, colors_values

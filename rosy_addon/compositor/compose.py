@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache
-from ..color import map_colors, to_linear
-from ..progress import progress, report
+from ..core.cache import Cache
+from ..core.color import map_colors, to_linear
+from ..core.progress import progress, report
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges

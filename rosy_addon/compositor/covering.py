@@ -26,9 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..deterministic_trig import cos_sin, vector_angle
+from ..core.deterministic_trig import cos_sin, vector_angle
+from ..core.progress import report
 from ..field.directional_field import evaluate_harmonics
-from ..progress import report
 from .flow import forward_share
 from .look import Look
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized

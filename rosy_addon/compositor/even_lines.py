@@ -19,10 +19,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..cache import Cache
-from ..deterministic_trig import vector_angle
+from ..core.cache import Cache
+from ..core.deterministic_trig import vector_angle
+from ..core.progress import progress
 from ..field.frames import transform_components
-from ..progress import progress
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.project import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines

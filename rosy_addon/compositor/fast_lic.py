@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .covering import (

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..color import map_colors, to_linear
+from ..core.color import map_colors, to_linear
 from .even_lines import EvenLines, uneven_width
 from .family_hues import line_families
 from .image_noise import NOISE_MEAN

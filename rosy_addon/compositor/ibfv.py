@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .covering import SINK_CELL, Covering, build_covering, member_lines, unpack_neighbor_mask

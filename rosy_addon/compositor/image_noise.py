@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .filter_kernel import Kernel
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks

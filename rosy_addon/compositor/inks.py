@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..color import LUMINANCE_WEIGHTS, from_hex, to_linear
+from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
 from .look import Look, colors_magnitude, is_hatched
 
 #: Maximum number of inks.

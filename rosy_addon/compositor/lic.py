@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..memory import raise_mmap_threshold
-from ..progress import progress
+from ..core.memory import raise_mmap_threshold
+from ..core.progress import progress
 from .fast_lic import fast_lic
 from .flow import noise_channel_count
 from .ibfv import streak_waves, wave_images

@@ -11,8 +11,8 @@ from ..annotation.singularity_settings import (
     singularity_labels_switch,
     singularity_size_number,
 )
-from ..errors import RosyError
-from ..settings import (
+from ..core.errors import RosyError
+from ..core.settings import (
     Choice,
     Stage,
     always,
@@ -91,7 +91,7 @@ class Look:
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
     this package, and declare and use the uniform of that name in the shader. All else is derived
-    from the field; see `rosy_addon.settings`.
+    from the field; see `rosy_addon.core.settings`.
 
     Raises
     ------

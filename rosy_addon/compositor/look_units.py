@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..core.settings import pixel_lengths, settings_of, switch
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..settings import pixel_lengths, settings_of, switch
 from .look import Look
 
 #: Lengths in Blender units follow the camera in steps of 1 / 32 octave, so that tables made for a

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress
+from ..core.progress import progress
 from .lic_images import LicImages
 from .look import Look
 from .per_pixel_lic import (

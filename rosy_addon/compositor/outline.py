@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
+from ..core.progress import progress, report
 from ..field.frames import dot
 from ..field.surface import connected_components
-from ..progress import progress, report
 from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh

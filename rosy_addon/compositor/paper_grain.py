@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
 from .look import Look
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle

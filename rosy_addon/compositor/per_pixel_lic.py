@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .filter_kernel import WEIGHT_SLOPES, kernel_of, kernel_weights

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
 
 #: Side of a tile in pixels.
 TILE_PIXELS = 256

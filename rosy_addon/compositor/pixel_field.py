@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
-from ..progress import progress, report
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
 from ..projection.pixel_blocks import BLOCK_PIXELS

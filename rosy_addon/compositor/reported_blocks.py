@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..progress import report
+from ..core.progress import report
 from ..projection.pixel_blocks import pixel_blocks
 
 

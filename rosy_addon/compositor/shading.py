@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
 from ..field.frames import dot, normalize
 from ..projection.gbuffer import GBuffer
 from ..projection.shadow_maps import light_cameras, shadow_visibility

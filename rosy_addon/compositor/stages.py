@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..cache import Cache
-from ..progress import progress
+from ..core.cache import Cache
+from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.surface_sampling import feature_curvatures
 from .even_lines import EvenLines, even_lines

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache
-from ..progress import progress, report
+from ..core.cache import Cache
+from ..core.progress import progress, report
 from .filter_kernel import Kernel, kernel_of
 from .image_noise import image_noise
 from .look import Look

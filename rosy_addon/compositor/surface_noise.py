@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..progress import progress
+from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_coordinates
 from .image_noise import (

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..cache import Cache
-from ..errors import RosyError
+from ..core.cache import Cache
+from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer
 from ..projection.surface_sampling import surface_tones

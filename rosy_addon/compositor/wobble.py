@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..deterministic_trig import cos_sin, unit_phasor
-from ..progress import progress
+from ..core.deterministic_trig import cos_sin, unit_phasor
+from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.rest_coordinates import rest_coordinates
 from .look import Look, is_hatched

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from ..errors import RosyError
-from ..turntable_video import Encoder
+from ..core.errors import RosyError
+from ..rendering.turntable import Encoder
 from ..worker.program import run_program
 
 

@@ -33,7 +33,7 @@ from ..annotation.singularity_marks import (
     OUTLINE_COLOR,
     SingularityMarks,
 )
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.singularities import format_index
 
 #: Sizes of text in points: titles, everything else.

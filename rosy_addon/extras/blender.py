@@ -26,8 +26,8 @@ from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
 from ..cli.options import Options, user_presets_folder
-from ..errors import RosyError
-from ..turntable_video import Encoder
+from ..core.errors import RosyError
+from ..rendering.turntable import Encoder
 from ..worker.program import run_program
 from ..worker.start import Guarded
 

@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ..errors import RosyError
-from ..frame_workers import error_line, format_frames
+from ..core.errors import RosyError
+from ..worker.frame_workers import error_line, format_frames
 
 #: Frames of one task. Several, because starting Blender takes as long as several frames.
 FRAMES_PER_TASK = 8

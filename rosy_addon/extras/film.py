@@ -16,15 +16,15 @@ from ..api.surface import MeshArrays
 from ..cli.options import Options, add_subcommand, int_between
 from ..cli.pictures import add_motion_options, video_encoder
 from ..cli.streams import print_line
-from ..errors import RosyError
+from ..core.errors import RosyError
+from ..core.file_io import check_readable
 from ..external.simulation_files import SUFFIXES, Step, in_order, list_steps
 from ..field.array_field import SurfaceArrays, array_field
 from ..field.field_io import READ_SUFFIXES
 from ..field.formats.polygons import Polygons
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from ..file_io import check_readable
-from ..turntable_video import check_video_path
+from ..rendering.turntable import check_video_path
 
 
 def add_film_command(subparsers: Any) -> None:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from .blocks import row_blocks
 from .directional_field import field_directions
 from .frames import coordinates, dot, normalize

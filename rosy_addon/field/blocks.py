@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 
 #: Rows of an array (faces, corners, edges) in a block. One takes hundredths of a second.
 ROWS_PER_BLOCK = 1 << 16

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 from .blocks import concatenated_ranges
 from .frames import dot
 from .surface import Surface

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress
+from ..core.errors import RosyError
+from ..core.progress import progress
 from .conjugate_gradient import RELATIVE_TOLERANCE
 from .guided_system import (
     EXACT_FIRMNESS,

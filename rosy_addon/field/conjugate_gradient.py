@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .sparse_multigrid import CSRMatrix, hierarchy, w_cycle
 
 #: Residual norm relative to that of the right-hand side at which the iteration stops, by default.

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 from .frames import dot
 from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface, build_edges, connected_components, next_corners

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .connection import build_connection, laplacian
 from .curvature import face_magnitude

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .blocks import mask
 from .frames import angle_between, dot, normalize
 from .surface import Edges, Surface, build_edges, connected_components, face_area_vectors

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
 from .representation import face_frames, from_representation

@@ -24,7 +24,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
 from .frames import coordinates
 from .representation import face_frames, matching_angles, signed_power, to_representation

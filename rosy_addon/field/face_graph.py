@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .frames import dot

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..progress import progress
+from ..core.progress import progress
 from .connection import build_connection
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from ..errors import RosyError, counted
-from ..file_io import check_parsing_memory, check_writable, write_blocks
-from ..progress import progress, report
+from ..core.errors import RosyError, counted
+from ..core.file_io import check_parsing_memory, check_writable, write_blocks
+from ..core.progress import progress, report
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
 from .formats.plain import directions_text, npy_blocks, read_npy, read_text

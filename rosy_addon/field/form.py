@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .creases import weighted_median
 from .feature_curvature import NoisyCurvature, noisy_curvature, of_unit_extent
 from .guided_system import guided_field

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import NoFeaturesError, RosyError
-from ..memory import check_memory
-from ..progress import progress, report
+from ..core.errors import NoFeaturesError, RosyError
+from ..core.memory import check_memory
+from ..core.progress import progress, report
 from .cheapest_singularities import cheapest_singularities
 from .curvature import TINY, curvature_field
 from .form import form

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from .frames import dot, normalize
 from .guided_system import GuidedSystem
 from .representation import to_representation

@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress
+from ..core.progress import progress
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import FaceGraph
 from .representation import complex_bincount, unit_complex

@@ -14,9 +14,9 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import RosyError
-from ..memory import raise_mmap_threshold
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.memory import raise_mmap_threshold
+from ..core.progress import progress, report
 from .blocks import mask
 from .conjugate_gradient import RELATIVE_TOLERANCE, conjugate_gradient
 from .connection import build_connection, laplacian

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from .blocks import mask
 from .closest_point import closest_triangles
 from .frames import dot, normalize

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from .directional_field import closest_rosy, field_directions
 from .frames import coordinates
 from .representation import face_frames, face_representation, from_representation

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import RosyError
-from ..file_io import check_parsing_memory
-from ..progress import progress
+from ..core.errors import RosyError
+from ..core.file_io import check_parsing_memory
+from ..core.progress import progress
 from .formats.obj import read_obj
 from .formats.off import read_off
 from .formats.ply import read_ply

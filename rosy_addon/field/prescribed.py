@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import RosyError
-from ..memory import raise_mmap_threshold
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.memory import raise_mmap_threshold
+from ..core.progress import progress, report
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .guided_rotation import guided_rotation

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 
 #: Largest degree N that is supported. The directions of a field are hard to distinguish above about
 #: 6 (Figure 10 of the paper).

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import counted
-from ..progress import progress, report
+from ..core.errors import counted
+from ..core.progress import progress, report
 from .blocks import mask
 from .frames import dot
 from .representation import face_frames, matching_angles, to_representation

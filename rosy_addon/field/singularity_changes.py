@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField

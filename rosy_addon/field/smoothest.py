@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import RosyError
-from ..memory import raise_mmap_threshold
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.memory import raise_mmap_threshold
+from ..core.progress import progress, report
 from .connection import Connection, build_connection, laplacian
 from .representation import complex_bincount, face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree

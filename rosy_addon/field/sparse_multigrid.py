@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .blocks import concatenated_ranges
 
 #: Relative increase of the diagonal of a matrix that is singular, and smallest value on a diagonal,

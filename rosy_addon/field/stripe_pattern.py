@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .blocks import mask, row_blocks
 from .connection import sums_in_umbrellas, umbrella_order
 from .representation import unit_complex

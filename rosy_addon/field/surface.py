@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..cache import content_hash
-from ..errors import RosyError, counted
-from ..progress import progress, report
+from ..core.cache import content_hash
+from ..core.errors import RosyError, counted
+from ..core.progress import progress, report
 from .blocks import mask, row_blocks
 from .frames import dot, normalize
 from .triangulate import triangulate

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 from .connection import BLOCK_TRIANGLES, Connection, laplacian
 from .frames import dot
 from .representation import complex_bincount

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from .blocks import row_blocks
 from .closest_point import closest_triangles
 from .frames import dot, normalize, transport

@@ -6,7 +6,7 @@ import heapq
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6

@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import RosyError, counted
-from ..progress import progress, report
+from ..core.errors import RosyError, counted
+from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (

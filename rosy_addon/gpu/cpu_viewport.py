@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import NothingInViewError
+from ..core.errors import NothingInViewError
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..rendering.draw import bake_picture

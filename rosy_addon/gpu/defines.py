@@ -12,7 +12,6 @@ from types import ModuleType
 
 import numpy as np
 
-from ..color import REC709_LUMINANCE
 from ..compositor import (
     compose,
     covering,
@@ -34,6 +33,7 @@ from ..compositor.image_noise import (
     SEED_FACTOR,
 )
 from ..compositor.undirected import SAMPLE_COUNT as DISC_SAMPLE_COUNT
+from ..core.color import REC709_LUMINANCE
 from ..projection import crease_pixels, pixel_coverage, pixel_neighbors, shadow_maps
 from ..projection.rest_coordinates import BARYCENTRIC_RANGE
 from ..projection.surface_sampling import MIN_FACING_COSINE

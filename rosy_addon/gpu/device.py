@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DeviceError
+from ..core.errors import DeviceError
 from .passes import WORKGROUP_SIZE, ComputePass, RasterPass, Uniforms
 
 NamedValues = Mapping[str, Any]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..color import color_stops
 from ..compositor.even_lines import has_even_lines, look_width_table
 from ..compositor.family_hues import PALETTE
 from ..compositor.hatching import has_paper_grain
@@ -20,6 +19,7 @@ from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
 from ..compositor.wobble import wave_table
+from ..core.color import color_stops
 from .mesh_buffers import FieldKind
 from .resources import GpuResources
 

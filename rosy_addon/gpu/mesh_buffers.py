@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..compositor.color_values import ValueRange, value_range
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
 from ..field.rosy_field import RosyField

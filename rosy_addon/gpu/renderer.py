@@ -20,7 +20,7 @@ from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
-from ..errors import DeviceError, RosyError
+from ..core.errors import DeviceError, RosyError
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view

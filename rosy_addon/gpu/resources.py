@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..compositor.target_tone import ReferenceRender
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.surface import Surface
 from ..projection.gbuffer import MeshInstance
 from ..projection.rest_coordinates import matrix_scale

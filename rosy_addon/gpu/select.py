@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ..compositor.look import Look
 from ..compositor.picture import Picture
-from ..errors import DeviceError
+from ..core.errors import DeviceError
 from ..image_io.image_data import ImageData
 from ..rendering.draw import bake_picture
 from ..rendering.picture_images import CONVERSION_START, draw_image, picture_image

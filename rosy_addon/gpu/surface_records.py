@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..cache import BAKE_CACHE
+from ..core.cache import BAKE_CACHE
 from ..field.feature_curvature import feature_curvature
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 
 #: Numbers of levels of red, green and blue in the palette of color pictures, 252 colors in all.
 PALETTE_LEVELS = (6, 7, 6)

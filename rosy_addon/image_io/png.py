@@ -8,11 +8,11 @@ import zlib
 
 import numpy as np
 
-from ..color import to_display, to_linear
-from ..errors import RosyError
-from ..file_io import read_bytes, write_bytes
-from ..memory import check_memory
-from ..progress import report
+from ..core.color import to_display, to_linear
+from ..core.errors import RosyError
+from ..core.file_io import read_bytes, write_bytes
+from ..core.memory import check_memory
+from ..core.progress import report
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _BIT_DEPTH, _RGBA_COLOR_TYPE, _PERCEPTUAL_INTENT = 8, 6, 0

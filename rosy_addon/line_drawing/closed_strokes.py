@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.frames import dot, normalize
-from ..progress import progress, report
 from .spacing import CornerSpacing
 from .stroke_set import Strokes
 from .surface_particles import SurfaceParticles, advance

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.blocks import blocks_by_count, concatenated_ranges
 from ..field.frames import normalize
-from ..progress import progress, report
 from .stroke_set import Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import BAKE_CACHE
+from ..core.cache import BAKE_CACHE
+from ..core.progress import progress, report
 from ..field.frames import dot
-from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX

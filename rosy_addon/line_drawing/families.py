@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.frames import dot, normalize
 from ..field.surface import connected_components
-from ..progress import progress, report
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, nearest_member, shared_edges, unit
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
-from ..progress import report
 from .point_grid import PointGrid
 from .stroke_set import Strokes
 

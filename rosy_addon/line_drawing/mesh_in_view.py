@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
-from ..progress import report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .stroke_set import Strokes

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import concatenated_ranges
 from ..field.frames import normalize
-from ..progress import report
 from ..projection.camera import Camera
 from .stroke_set import Strokes, arc_lengths
 from .tangent_mesh import TangentMesh

@@ -10,11 +10,11 @@ import numpy as np
 
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
-from ..cache import Cache
-from ..errors import RosyError
+from ..core.cache import Cache
+from ..core.errors import RosyError
+from ..core.memory import check_memory
+from ..core.progress import progress, report
 from ..field.directional_field import field_symmetry
-from ..memory import check_memory
-from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads

@@ -21,9 +21,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
-from ..progress import report
 from .growing_strokes import NO_TIPS, GrowingStrokes, Tips
 from .lateral_neighbors import LateralNeighbors, SeparationRules, find_lateral_neighbors
 from .path_samples import PathSamples, SampledPath

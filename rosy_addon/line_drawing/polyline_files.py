@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from ..field.blocks import row_blocks
-from ..progress import progress, report
 from ..projection.camera import Camera
 from .stroke_set import Strokes
 from .svg import Pen, simplify_mask

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.frames import transport
 from .column_table import ColumnTable
 from .point_grid import PointGrid

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
-from ..progress import report
 from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
 from .point_grid import LEVEL_RATIO, PointGrid, grid_levels
 from .samples import SAMPLE_STEP, StrokeSamples

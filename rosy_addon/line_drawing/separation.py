@@ -17,9 +17,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize, transport
-from ..progress import progress, report
 from .lateral_neighbors import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .point_grid import PointGrid
 from .stroke_set import Strokes

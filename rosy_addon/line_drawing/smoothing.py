@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.frames import dot
-from ..progress import report
 from ..projection.camera import Camera
 from .stroke_set import Strokes
 from .visibility import SAMPLE_STEP_PX, pixel_size, project_to_pixels

@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..color import REC709_LUMINANCE
+from ..core.color import REC709_LUMINANCE
 from ..field.curvature import face_magnitude
 from ..field.frames import dot, normalize
 from ..field.surface import Surface, sum_per_fan

@@ -9,14 +9,14 @@ from ..annotation.singularity_settings import (
     singularity_labels_switch,
     singularity_size_number,
 )
-from ..settings import check_settings, choice, number, switch
+from ..core.settings import check_settings, choice, number, switch
 
 
 @dataclass(frozen=True)
 class StrokeStyle:
     """The settings of strokes, as shown in the panel and accepted on the command line.
 
-    To add a setting, add a field here. `rosy_addon.settings` says what is derived from a field.
+    To add a setting, add a field here. `rosy_addon.core.settings` says what is derived from a field.
 
     Raises
     ------

@@ -17,8 +17,8 @@ from ..annotation.singularity_marks import (
     OUTLINE_COLOR,
     SingularityMarks,
 )
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from ..projection.camera import Camera
 from .outline import OUTLINE_KINDS
 from .stroke_set import Strokes

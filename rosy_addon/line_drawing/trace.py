@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import RosyError
-from ..progress import progress, report
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from .closed_strokes import close_loops
 from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot, normalize
-from ..progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.rasterizer import rasterize

@@ -6,9 +6,9 @@ from functools import cache
 
 import numpy as np
 
-from ..color import from_hex, to_linear
 from ..compositor.compose import compose
 from ..compositor.look import Look, is_hatched
+from ..core.color import from_hex, to_linear
 from ..field.curvature import curvature_field
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, build_surface

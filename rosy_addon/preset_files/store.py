@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..compositor.look import Look
-from ..errors import RosyError
-from ..file_io import make_folder, os_error_text, read_bytes, write_bytes
+from ..core.errors import RosyError
+from ..core.file_io import make_folder, os_error_text, read_bytes, write_bytes
+from ..core.settings import settings_of
 from ..image_io.png import write_png
-from ..settings import settings_of
 from .preview import draw_preview
 
 #: Key of the preset with the default look.

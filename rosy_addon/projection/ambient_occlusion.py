@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
+from ..core.progress import progress
 from ..field.frames import dot, normalize
 from ..field.surface import sum_per_fan
-from ..progress import progress
 from .gbuffer import MeshInstance
 from .shadow_maps import (
     NORMAL_BIAS_PIXELS,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.frames import normalize
 
 #: Largest width or height of a picture, in pixels.

@@ -21,12 +21,12 @@ from functools import partial
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
+from ..core.progress import report
 from ..field.frames import dot_components, transform_components
 from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from ..progress import report
 from .face_values import TangentValues, face_values
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order
 from .gbuffer import MeshInstance

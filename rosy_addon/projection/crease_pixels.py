@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import report
 from .camera import Camera
 from .gbuffer import GBuffer
 from .pixel_neighbors import depth_slopes

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import Cache, content_hash
+from ..core.cache import Cache, content_hash
+from ..core.progress import progress, report
 from ..field.creases import find_creases
 from ..field.surface import Surface, connected_components
-from ..progress import progress, report
 from .face_values import similarity_scale
 
 

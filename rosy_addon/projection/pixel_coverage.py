@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..progress import report
+from ..core.progress import report
 from .camera import Camera, pixel_rays, z_at_depth
 from .gbuffer import GBuffer, PixelCoverage, PixelSamples
 from .pixel_blocks import pixel_blocks

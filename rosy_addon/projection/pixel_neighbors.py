@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.frames import dot_components, transport_components, view_frame
-from ..progress import report
 from .gbuffer import GBuffer
 from .pixel_blocks import BLOCK_PIXELS, pixel_blocks
 

@@ -14,12 +14,12 @@ from functools import partial
 
 import numpy as np
 
-from ..cache import Cache
-from ..errors import NothingInViewError, RosyError, counted
+from ..core.cache import Cache
+from ..core.errors import NothingInViewError, RosyError, counted
+from ..core.memory import raise_mmap_threshold
+from ..core.progress import progress, report
 from ..field.frames import dot_components, transform_components, transport_components
 from ..field.representation import signed_power
-from ..memory import raise_mmap_threshold
-from ..progress import progress, report
 from .camera import Camera, pixel_rays, z_at_depth
 from .corner_field import CornerField, cached_corner_field
 from .field_channel import REPRESENTATION, FieldChannel, rotation_order

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import progress, report
 
 #: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
 BLOCK_SIZE = 1 << 14

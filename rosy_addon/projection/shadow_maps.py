@@ -13,8 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.frames import normalize
-from ..progress import progress, report
 from .camera import Camera, look_at, orthographic_camera, perspective_camera
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import pixel_blocks

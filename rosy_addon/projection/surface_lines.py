@@ -11,7 +11,9 @@ from functools import partial
 
 import numpy as np
 
-from ..cache import Cache, content_hash
+from ..core.cache import Cache, content_hash
+from ..core.memory import check_memory
+from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot_components, transform_components
@@ -19,8 +21,6 @@ from ..field.representation import signed_power
 from ..field.rosy_field import RosyField
 from ..field.stripe_pattern import CornerDirections, StripePattern, stripe_pattern
 from ..field.surface import Surface, build_surface
-from ..memory import check_memory
-from ..progress import progress, report
 from .corner_field import CornerField, field_at_corners, transport_phase
 from .face_values import SIMILARITY_EPS, similarity_scale
 from .field_channel import rotation_order

@@ -6,10 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from ..cache import Cache
+from ..core.cache import Cache
+from ..core.progress import progress, report
 from ..field.feature_curvature import feature_curvature
 from ..field.frames import dot
-from ..progress import progress, report
 from .gbuffer import GBuffer, MeshInstance
 
 #: Lower bound of the cosine between normal and view direction. Bounds the area of the surface that

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..deterministic_trig import vector_angle
+from ..core.deterministic_trig import vector_angle
 from ..field.frames import dot_components
 
 #: Faces, corners or triangles per block. Bounds memory, and fits the caches of the processor.

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..progress import report
 from .camera import Camera
 from .gbuffer import MeshInstance
 from .project import all_triangles, first_triangles

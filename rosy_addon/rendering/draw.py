@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 
-from ..cache import BAKE_CACHE, Cache
 from ..compositor.color_values import check_color_values
 from ..compositor.compose import compose
 from ..compositor.flow import noise_channel_count
@@ -17,10 +16,11 @@ from ..compositor.picture_key import fixed_color_range
 from ..compositor.strip_division import context_rows, divide_into_strips, group_strips
 from ..compositor.strips import Strip, join_strips
 from ..compositor.target_tone import check_tone
-from ..errors import NothingInViewError, RosyError
+from ..core.cache import BAKE_CACHE, Cache
+from ..core.errors import NothingInViewError, RosyError
+from ..core.memory import PIXEL_BYTES, PROCESS_BYTES, TRIANGLE_BYTES, check_memory, samples_memory
+from ..core.progress import progress
 from ..field.symmetry import FieldSymmetry
-from ..memory import PIXEL_BYTES, PROCESS_BYTES, TRIANGLE_BYTES, check_memory, samples_memory
-from ..progress import progress
 from ..projection.project import cached_project, check_instances, project, raise_nothing_in_view
 from ..worker.pool import POOL, core_count
 from .marks import with_marks

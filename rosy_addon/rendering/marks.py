@@ -13,12 +13,12 @@ from ..annotation.draw_marks import draw_marks
 from ..annotation.key_contents import PictureKey, sorted_indices
 from ..annotation.singularity_marks import cached_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
-from ..cache import BAKE_CACHE, Cache
 from ..compositor.look import Look
 from ..compositor.look_units import look_in_pixels
 from ..compositor.picture import Picture
 from ..compositor.picture_key import color_scale_of, fixed_color_range
-from ..progress import progress
+from ..core.cache import BAKE_CACHE, Cache
+from ..core.progress import progress
 from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..projection.camera import orbit_camera

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..color import to_linear
 from ..compositor.picture import Picture
+from ..core.color import to_linear
+from ..core.progress import progress, report
 from ..image_io.image_data import ImageData, image_of_pixels
-from ..progress import progress, report
 from .draw import bake_picture
 from .view_input import ViewInput
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..color import from_hex, to_linear
 from ..compositor.look import is_hatched
+from ..core.color import from_hex, to_linear
 from .camera_planes import (
     add_camera_plane,
     frame_corners,

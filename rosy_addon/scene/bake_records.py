@@ -17,7 +17,7 @@ import numpy as np
 
 from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..projection.camera import Camera
 from .backdrop import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from ..errors import RosyError
-from ..file_io import check_readable
+from ..core.errors import RosyError
+from ..core.file_io import check_readable
 
 
 def open_blend(path: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import bpy
 
-from ..errors import RosyError
-from ..file_io import check_writable, make_folder, replacing, write_bytes
+from ..core.errors import RosyError
+from ..core.file_io import check_writable, make_folder, replacing, write_bytes
 from ..image_io.image_data import ImageData
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from ..cache import Cache
+from ..core.cache import Cache
 from ..field.frames import dot, normalize
 from ..field.surface import Surface, mean_per_face
 from .meshes import evaluated_mesh, vertex_positions

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..projection.camera import Camera, check_size
 from .libraries import check_object_type
 

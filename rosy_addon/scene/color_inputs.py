@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..cache import Cache, content_hash
 from ..compositor.look import Look, colors_values
-from ..errors import RosyError
+from ..core.cache import Cache, content_hash
+from ..core.errors import RosyError
 from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 
 #: Types of attributes that messages list. Booleans are mostly Blender's own.

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..color import from_hex, to_linear
+from ..core.color import from_hex, to_linear
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from .node_builder import new_emissive_material
 from .surface_strokes import attribute_values

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..cache import Cache, content_hash
-from ..errors import RosyError
+from ..core.cache import Cache, content_hash
+from ..core.errors import RosyError
+from ..core.progress import report
 from ..field.frames import dot, normalize, transport
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
@@ -20,7 +21,6 @@ from ..field.validate import (
     project_to_tangent,
     tangent_normals,
 )
-from ..progress import report
 from .compat import is_editable
 from .field_attributes import (
     VECTOR_TYPE,

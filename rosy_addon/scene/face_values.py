@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..color import REC709_LUMINANCE
-from ..errors import RosyError
+from ..core.color import REC709_LUMINANCE
+from ..core.errors import RosyError
 from ..field.surface import mean_per_face
 from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values

@@ -19,8 +19,8 @@ from collections.abc import Callable, Hashable
 import bpy
 import numpy as np
 
-from ..cache import Cache, content_hash
-from ..errors import RosyError
+from ..core.cache import Cache, content_hash
+from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from .compat import has_rosy_properties

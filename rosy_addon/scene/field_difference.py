@@ -8,7 +8,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.analysis import ErrorStatistics, compare_fields
 from ..worker.job import Call, Steps, job
 from .combed_guides import GUIDE_ATTRIBUTE

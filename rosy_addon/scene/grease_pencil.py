@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..color import from_hex, to_linear
+from ..core.color import from_hex, to_linear
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.outline import OUTLINE_KINDS
 from .compat import has_grease_pencil_drawings

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from mathutils.geometry import interpolate_bezier
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.surface import Surface
 from .compat import is_annotation_in_space, scene_annotation
 from .face_values import read_face_vectors

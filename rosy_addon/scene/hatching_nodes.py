@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import bpy
 
-from ..color import from_hex, to_linear
 from ..compositor.hatching import ONSET_LEAD, ONSET_RANGE
 from ..compositor.ink_thresholds import (
     DENSITY_FACTOR,
@@ -29,6 +28,7 @@ from ..compositor.ink_thresholds import (
 from ..compositor.look import Look
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
 from ..compositor.target_tone import MIN_TONE_RANGE
+from ..core.color import from_hex, to_linear
 from .node_builder import NodeBuilder, Number
 from .owned_data import OWNED_TAG
 

@@ -11,10 +11,10 @@ from ..annotation.draw_key import DARK_PLATES, LIGHT_PLATES, KeyColors, draw_key
 from ..annotation.key_contents import PictureKey
 from ..annotation.key_layout import KeyParts, lay_out_key
 from ..annotation.round_numbers import format_number, round_below
-from ..color import LUMINANCE_WEIGHTS, from_hex, to_linear
 from ..compositor.look import is_hatched
 from ..compositor.picture import Picture
-from ..errors import RosyError
+from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
+from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.picture_images import picture_image
 from .blender_images import new_image

@@ -6,7 +6,7 @@ from typing import Literal
 
 import bpy
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 
 
 def check_object_type(obj: bpy.types.Object, kind: Literal["MESH", "CAMERA"]) -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..color import from_hex, to_hex
 from ..compositor.flow import flow_at
 from ..compositor.look import Look
-from ..settings import Color, Number, Setting, settings_of
+from ..core.color import from_hex, to_hex
+from ..core.settings import Color, Number, Setting, settings_of
 
 if TYPE_CHECKING:
     import bpy

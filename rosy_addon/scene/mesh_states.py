@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..cache import content_hash
+from ..core.cache import content_hash
 from ..field.rosy_field import MAX_DEGREE
 from .color_inputs import color_values_digest
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from ..cache import Cache, content_hash
-from ..errors import NoFeaturesError, RosyError
+from ..core.cache import Cache, content_hash
+from ..core.errors import NoFeaturesError, RosyError
+from ..core.progress import progress
 from ..field.surface import Surface, build_surface, smooth_fans
-from ..progress import progress
 
 #: Marks of edges: RNA property, label, and description in the user interface.
 EDGE_MARKS = {

@@ -8,7 +8,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
 from ..projection.gbuffer import MeshInstance
 from ..worker.job import Call, Steps, job

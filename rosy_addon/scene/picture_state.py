@@ -16,10 +16,10 @@ import numpy as np
 
 from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
-from ..errors import RosyError
-from ..file_io import read_bytes
+from ..core.errors import RosyError
+from ..core.file_io import read_bytes
+from ..core.settings import settings_of
 from ..projection.camera import Camera
-from ..settings import settings_of
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
 from .color_inputs import color_values_digest

@@ -20,8 +20,8 @@ import bpy
 import numpy as np
 
 from ..compositor.picture import Picture
-from ..errors import RosyError
-from ..file_io import check_folder
+from ..core.errors import RosyError
+from ..core.file_io import check_folder
 from ..image_io.image_data import ImageData
 from ..projection.camera import Camera
 from .bake_records import (

@@ -5,8 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..cache import Cache
-from ..errors import RosyError
+from ..core.cache import Cache
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from ..field.frames import normalize, tangent_frame
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
@@ -18,7 +19,6 @@ from ..field.validate import (
     validated_directions,
     validated_field,
 )
-from ..progress import progress, report
 from .field_attributes import (
     ANGLE_TYPE,
     VECTOR_TYPE,

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..cache import Cache
 from ..compositor.look import Look
 from ..compositor.shading import Light
-from ..errors import RosyError
+from ..core.cache import Cache
+from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera

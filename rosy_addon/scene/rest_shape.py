@@ -11,7 +11,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.carry import carried_vectors
 from ..field.surface import Surface
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, get_or_create_attribute

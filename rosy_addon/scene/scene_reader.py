@@ -17,8 +17,8 @@ from dataclasses import field as dataclass_field
 import bpy
 import numpy as np
 
-from ..cache import Cache, content_hash
-from ..errors import REPORTED_ERRORS, RosyError
+from ..core.cache import Cache, content_hash
+from ..core.errors import REPORTED_ERRORS, RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.singularities import find_singularities
 from ..field.surface import Surface

@@ -14,10 +14,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..cache import content_hash
-from ..color import to_hex
 from ..compositor.family_hues import PALETTE
-from ..errors import RosyError
+from ..core.cache import content_hash
+from ..core.color import to_hex
+from ..core.errors import RosyError
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen

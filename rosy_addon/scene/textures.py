@@ -12,8 +12,8 @@ from functools import partial
 import bpy
 import numpy as np
 
-from ..cache import Cache
-from ..errors import RosyError
+from ..core.cache import Cache
+from ..core.errors import RosyError
 from ..image_io.image_data import ImageData
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, recorded_materials, store_record

@@ -10,12 +10,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..cache import Cache, content_hash
-from ..color import luminance, to_linear
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
-from ..errors import RosyError
-from ..file_io import check_readable
+from ..core.cache import Cache, content_hash
+from ..core.color import luminance, to_linear
+from ..core.errors import RosyError
+from ..core.file_io import check_readable
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .compat import has_rosy_properties

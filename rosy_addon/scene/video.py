@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..worker.job import Step, Steps, job
 from ..worker.program import run_program
 from . import video_encoding

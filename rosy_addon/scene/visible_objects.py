@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator
 
 import bpy
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from .compat import has_rosy_properties
 from .field_attributes import attribute_name, has_field
 from .libraries import check_object_type, remedy_for_absence

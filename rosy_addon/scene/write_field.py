@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..errors import RosyError, counted
+from ..core.errors import RosyError, counted
 from ..field.directional_field import field_directions
 from ..field.frames import dot
 from ..field.representation import face_frames

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from ..field.frames import dot, transport
 from ..field.surface import Surface, connected_components
 from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
-from ..progress import progress, report
 
 #: Corners are at the same point of a UV map if their coordinates differ by at most this much.
 SAME_UV = 1e-6

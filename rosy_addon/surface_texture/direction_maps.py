@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh, nearest_member
-from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import uv_tangents

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache import BAKE_CACHE, Cache
 from ..compositor.color_values import (
     check_color_values,
     scaled_positions,
@@ -24,10 +23,9 @@ from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.look_units import look_on_surface
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
-from ..errors import RosyError
-from ..image_io.image_data import ImageData, image_of_pixels
-from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
-from ..memory import (
+from ..core.cache import BAKE_CACHE, Cache
+from ..core.errors import RosyError
+from ..core.memory import (
     PIXEL_BYTES,
     PROCESS_BYTES,
     TRIANGLE_BYTES,
@@ -35,7 +33,9 @@ from ..memory import (
     raise_mmap_threshold,
     samples_memory,
 )
-from ..progress import progress, report
+from ..core.progress import progress, report
+from ..image_io.image_data import ImageData, image_of_pixels
+from ..line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles

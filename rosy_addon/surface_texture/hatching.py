@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..cache import Cache
-from ..color import LUMINANCE_WEIGHTS
 from ..compositor.even_lines import (
     SPACING_GRAINS,
     WOBBLE_SHIFT,
@@ -40,7 +38,9 @@ from ..compositor.streak_statistics import (
 from ..compositor.target_tone import apply_tone_curve
 from ..compositor.undirected import undirected_texture
 from ..compositor.wobble import WOBBLE_STD, has_wobble, rotate_pixel_field, solid_wobble_angle
-from ..progress import progress, report
+from ..core.cache import Cache
+from ..core.color import LUMINANCE_WEIGHTS
+from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_positions
 from ..projection.surface_lines import MAX_TRIANGLES, SurfaceLines, cached_surface_lines

@@ -18,13 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
 from ..field.representation import power
 from ..field.surface import build_surface, connected_components
 from ..field.surface_averages import SurfaceAverages
 from ..line_drawing.tangent_mesh import TangentMesh, nearest_member, shared_edges
-from ..progress import progress, report
 
 #: Longest edge of the triangles on which the order is computed, as a fraction of the side of a square
 #: as large as the surface; and the most triangles, unless the mesh has more.

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compositor.covering import ALL_NEIGHBORS
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
-from ..progress import report
+from ..core.progress import report
 from .texels import TextureFrame
 
 #: Label of the progress.

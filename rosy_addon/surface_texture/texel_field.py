@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
+from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
 from ..field.representation import power, signed_power
 from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from ..line_drawing.tangent_mesh import unit
-from ..progress import progress, report
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.pixel_blocks import pixel_blocks
 from .charts import UvCharts

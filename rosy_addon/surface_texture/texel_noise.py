@@ -10,7 +10,7 @@ from ..compositor.flow import noise_channel_count
 from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
 from ..compositor.look import Look
 from ..compositor.surface_noise import instance_hashes, solid_noise
-from ..progress import report
+from ..core.progress import report
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
 from .texels import TexelSurface

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
+from ..core.progress import progress, report
 from ..line_drawing.tangent_mesh import TangentMesh
-from ..progress import progress, report
 from ..projection.gbuffer import MeshInstance
 from ..projection.rasterizer import rasterize
 from .charts import UvCharts

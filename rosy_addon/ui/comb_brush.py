@@ -16,8 +16,8 @@ from bpy_extras.view3d_utils import (
 from gpu_extras.presets import draw_circle_2d
 from mathutils import Vector
 
-from ..cache import BAKE_CACHE
-from ..errors import RosyError
+from ..core.cache import BAKE_CACHE
+from ..core.errors import RosyError
 from ..scene.brush_surface import BrushSurface
 from ..scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.field_attributes import attribute_name, field_degree, has_field, is_face_vector_field

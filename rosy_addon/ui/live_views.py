@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..viewport import session
 from .preferences import addon_preferences
 

@@ -9,8 +9,8 @@ import bpy
 
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.picture_key import fixed_color_range
-from ..errors import as_sentence
-from ..settings import Setting, Switch, panel_settings, settings_of
+from ..core.errors import as_sentence
+from ..core.settings import Setting, Switch, panel_settings, settings_of
 from . import preset_library
 from .sidebar import (
     SidebarPanel,

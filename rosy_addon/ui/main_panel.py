@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..compositor.look import has_flow, is_hatched
-from ..errors import counted
+from ..core.errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
 from ..scene.field_attributes import has_field

@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..scene.singularity_points import (
     Singularities,
     read_editable_singularities,

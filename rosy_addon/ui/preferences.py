@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 
 from ..compositor.look import Look
+from ..core.settings import settings_of
 from ..scene.paths import EXTENSION_ID
-from ..settings import settings_of
 from . import preset_library
 
 

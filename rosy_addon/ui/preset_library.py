@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import bpy
 import bpy.utils.previews
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..preset_files.store import (
     SHIPPED_FOLDER,
     Preset,

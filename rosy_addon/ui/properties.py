@@ -7,8 +7,9 @@ from typing import Any
 
 import bpy
 
-from ..color import from_hex
 from ..compositor.look import Look
+from ..core.color import from_hex
+from ..core.settings import Choice, Color, Number, Setting, Switch, settings_of, title
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
@@ -17,7 +18,6 @@ from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..scene.keys import update_keys
-from ..settings import Choice, Color, Number, Setting, Switch, settings_of, title
 from ..surface_texture.draw import (
     CONTENTS,
     DEFAULT_MARGIN,

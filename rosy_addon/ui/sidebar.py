@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import bpy
 
-from ..errors import as_sentence
+from ..core.errors import as_sentence
 from . import job_status
 
 #: Mean width of a character, and width of the icon and margins of a row, at a user interface scale

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
+from ..core.settings import panel_settings, settings_of
 from ..line_drawing.style import StrokeStyle
 from ..scene.stroke_objects import stroke_objects
-from ..settings import panel_settings, settings_of
 from . import job_status
 from .sidebar import SidebarPanel, closed_panel, draw_progress, use_property_columns
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..color import from_hex, to_linear
 from ..compositor.look import Look, is_hatched
-from ..errors import RosyError
+from ..core.color import from_hex, to_linear
+from ..core.errors import RosyError
 from ..projection.camera import Camera
 from ..rendering.view_input import Background
 from ..scene.camera_planes import frame_corners

@@ -26,8 +26,8 @@ from ..annotation.singularity_marks import (
     OUTLINE_COLOR,
     dot_diameters,
 )
-from ..cache import Cache
-from ..color import from_hex
+from ..core.cache import Cache
+from ..core.color import from_hex
 from ..field.singularities import find_singularities
 from ..gpu.preparation import Preparation
 from ..projection.gbuffer import MeshInstance

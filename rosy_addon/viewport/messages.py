@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import blf
 import bpy
 
-from ..errors import as_sentence
+from ..core.errors import as_sentence
 
 #: RGBA, display values.
 _COLOR = 1.0, 0.6, 0.2, 1.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ..compositor.look_units import preview_look
-from ..errors import RosyError, error_text
+from ..core.errors import RosyError, error_text
 from ..gpu.preparation import prepare_steps
 from ..rendering.renderer import ViewportRenderer
 from ..rendering.view_input import ViewInput

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
-from ..errors import REPORTED_ERRORS, RosyError, error_text
+from ..core.errors import REPORTED_ERRORS, RosyError, error_text
 from ..scene.cameras import render_camera
 from ..scene.tone_inputs import load_luminance, load_reference, reference_path
 

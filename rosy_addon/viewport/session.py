@@ -15,9 +15,9 @@ import bpy
 
 from ..annotation.arrow_marks import ArrowMarks
 from ..annotation.singularity_settings import shows_singularities
-from ..cache import Cache
 from ..compositor.look import Look, has_flow
-from ..errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
+from ..core.cache import Cache
+from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.marks import view_arrows
 from ..rendering.view_input import ViewInput

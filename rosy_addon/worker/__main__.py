@@ -10,8 +10,8 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from ..cache import BAKE_CACHE
-from ..progress import listening
+from ..core.cache import BAKE_CACHE
+from ..core.progress import listening
 from .channel import Channel
 from .pool import POOL
 from .start import own_end

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator
 from functools import update_wrapper
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
-from ..progress import progress, report
+from ..core.progress import progress, report
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")

@@ -9,7 +9,7 @@ from contextlib import suppress
 from multiprocessing.connection import wait
 from typing import Any
 
-from ..progress import current_report, listening
+from ..core.progress import current_report, listening
 from .helper import Helper, HelperLostError
 
 #: Environment of the helpers. Each has one core.

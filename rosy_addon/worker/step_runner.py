@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NoReturn
 
-from ..errors import RosyError
+from ..core.errors import RosyError
 from .helper import Helper, HelperLostError
 from .job import Call, Step, Steps
 

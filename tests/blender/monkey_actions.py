@@ -157,7 +157,7 @@ class Monkey:
         count = self.pick([0, 1, 1, 2, 3, 5, 8])
         self.note(f"cancel {what} after {count} steps")
         before = fingerprint()
-        error_class = rosy("rosy_addon.errors").RosyError
+        error_class = rosy("rosy_addon.core.errors").RosyError
         try:
             steps, answer = begin(), None
             try:

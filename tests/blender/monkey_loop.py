@@ -184,7 +184,7 @@ def open_panel():
 def check_memory(monkey: Monkey, counts: dict[str, int]) -> Memory:
     """Check that an empty file holds nothing, nor does Python, and measure the memory."""
     if monkey.uses_rosy:
-        state.rosy("rosy_addon.cache").BAKE_CACHE.clear()
+        state.rosy("rosy_addon.core.cache").BAKE_CACHE.clear()
         state.rosy("rosy_addon.scene.staleness").SCENE_STATES.clear()
     if (found := state.data_counts()) != counts:
         raise CheckError(f"an empty file holds {found}, it held {counts}")

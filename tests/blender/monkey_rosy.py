@@ -197,7 +197,7 @@ def occlusion(monkey):
 
 def randomize(monkey, group, cls, probability):
     """Set random values of settings within their ranges."""
-    description = rosy("rosy_addon.settings")
+    description = rosy("rosy_addon.core.settings")
     for name, setting in description.settings_of(cls).items():
         if not monkey.chance(probability):
             continue

@@ -151,7 +151,7 @@ def test_errors_of_export(with_field, tmp_path):
 )
 def test_lack_of_memory_is_reported(with_field, monkeypatch, free, message):
     """Whether it is known before, or noticed when the memory is taken."""
-    memory = sys.modules["bl_ext.user_default.rosy.rosy_addon.memory"]
+    memory = sys.modules["bl_ext.user_default.rosy.rosy_addon.core.memory"]
 
     def fail(*_):
         raise MemoryError
@@ -192,7 +192,7 @@ def test_every_setting_of_a_look_is_shown_once():
     from dataclasses import fields
 
     from bl_ext.user_default.rosy.rosy_addon.compositor.look import Look
-    from bl_ext.user_default.rosy.rosy_addon.settings import panel_settings
+    from bl_ext.user_default.rosy.rosy_addon.core.settings import panel_settings
     from bl_ext.user_default.rosy.rosy_addon.ui.look_panels import LOOK_PANELS
 
     shown = [name for panel in (*LOOK_PANELS, "") for name in panel_settings(Look, panel)]

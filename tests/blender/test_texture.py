@@ -31,7 +31,7 @@ def hatching_node(obj):
 
 def test_hatching_follows_the_tone(scene, tmp_path):
     """The paper and the ink of a texture have the mean that the tone asks, without a new texture."""
-    from bl_ext.user_default.rosy.rosy_addon.color import to_linear
+    from bl_ext.user_default.rosy.rosy_addon.core.color import to_linear
 
     bpy.ops.mesh.primitive_plane_add(size=8.0, rotation=(np.pi / 2, 0.0, 0.0))
     plane = bpy.context.object

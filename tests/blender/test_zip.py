@@ -38,13 +38,13 @@ REFUSED_MODULES = {
 #: only the connections are used: it neither starts nor finds processes.
 QUESTIONED_MODULES = {
     "subprocess": {
-        *("frame_workers.py", "worker/start.py", "worker/helper.py", "worker/program.py"),
+        *("worker/frame_workers.py", "worker/start.py", "worker/helper.py", "worker/program.py"),
     },
     "pickle": {"worker/channel.py", "worker/__main__.py"},
     "multiprocessing": {
         *("worker/start.py", "worker/helper.py", "worker/channel.py", "worker/pool.py"),
     },
-    "ctypes": {"memory.py"},
+    "ctypes": {"core/memory.py"},
 }
 
 #: The file that starts helpers. They look for modules where Blender does, so it reads `sys.path`, and

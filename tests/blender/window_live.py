@@ -140,7 +140,7 @@ def bake_of_view(space=None, region=None, method="brute"):
     gbuffer = rosy("rosy_addon.projection.project").project(instances, camera, look.display)
     compose = rosy("rosy_addon.compositor.compose").compose
     picture = compose(gbuffer, look, lights, reference).rgba.copy()
-    picture[..., :3] = rosy("rosy_addon.color").to_display(picture[..., :3])
+    picture[..., :3] = rosy("rosy_addon.core.color").to_display(picture[..., :3])
     return picture
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.cache import BAKE_CACHE
-from rosy.rosy_addon.color import to_display
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.cache import BAKE_CACHE
+from rosy.rosy_addon.core.color import to_display
+from rosy.rosy_addon.core.errors import RosyError
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras

@@ -5,10 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.animation import bake_animation
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.color import from_hex, to_linear
 from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.core.color import from_hex, to_linear
+from rosy.rosy_addon.jobs.animation import bake_animation
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.backdrop import update_backdrops
 from rosy.rosy_addon.scene.bake_records import remove_bakes
 from rosy.rosy_addon.scene.camera_planes import frame_corners

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 import pytest
 from rosy.rosy_addon import memory
-from rosy.rosy_addon.bake import bake
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.cameras import camera_of_object, scene_cameras
 from rosy.rosy_addon.scene.face_values import read_face_scalars
 from rosy.rosy_addon.scene.guides import (

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import pytest
 from rosy.rosy_addon.cli.parser import main
-from rosy.rosy_addon.draw_strokes import draw_strokes
+from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.line_drawing.svg import Pen
 from scenes import add_camera
 

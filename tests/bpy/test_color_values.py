@@ -7,11 +7,11 @@ from unittest.mock import Mock
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.bake_texture import bake_texture
-from rosy.rosy_addon.color import map_colors
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.color import map_colors
+from rosy.rosy_addon.core.errors import RosyError
+from rosy.rosy_addon.jobs.bake import bake
+from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes
 from rosy.rosy_addon.scene.color_inputs import color_attribute_of
 from rosy.rosy_addon.scene.look_properties import read_look

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.errors import RosyError
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.meshes import mesh_surface

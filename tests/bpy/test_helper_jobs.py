@@ -5,14 +5,14 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.animation import bake_animation
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.bake_texture import bake_texture
-from rosy.rosy_addon.comb_field import CombStroke
-from rosy.rosy_addon.draw_strokes import draw_strokes
 from rosy.rosy_addon.field.guide_brush import GuideBrush
+from rosy.rosy_addon.jobs.animation import bake_animation
+from rosy.rosy_addon.jobs.bake import bake
+from rosy.rosy_addon.jobs.bake_texture import bake_texture
+from rosy.rosy_addon.jobs.comb_field import CombStroke
+from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
+from rosy.rosy_addon.jobs.render_turntable import render_turntable
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
-from rosy.rosy_addon.render_turntable import render_turntable
 from rosy.rosy_addon.scene.field_difference import store_difference
 from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.pictures import OutputSettings

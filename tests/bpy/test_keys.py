@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.animation import bake_animation
 from rosy.rosy_addon.annotation.key_contents import PictureKey
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.color import to_linear
 from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.core.color import to_linear
+from rosy.rosy_addon.jobs.animation import bake_animation
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.bake_records import baked_objects, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import camera_of_object

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.color import to_display
 from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.core.color import to_display
+from rosy.rosy_addon.jobs.bake import bake
 from scenes import add_field, add_plane, aim, link, render
 
 #: No shading, so that only the picture is compared.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import pytest
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.preset_files import store
 from rosy.rosy_addon.preset_files.store import Preset, default_user_folder, preset_keys, save_preset
 from rosy.rosy_addon.scene.look_properties import read_look

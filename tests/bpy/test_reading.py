@@ -6,7 +6,7 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy.rosy_addon.field.frames import normalize
 from rosy.rosy_addon.field.generate import GeneratorSettings, axis_field, generate

@@ -6,9 +6,9 @@ import weakref
 
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.cache import BAKE_CACHE, Cache, content_hash
 from rosy.rosy_addon.compositor import stages
+from rosy.rosy_addon.core.cache import BAKE_CACHE, Cache, content_hash
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection import project as projection
 from scenes import add_camera, add_field, add_plane, set_vectors
 

@@ -8,8 +8,8 @@ import sys
 import typing
 
 import numpy as np
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.draw_strokes import draw_strokes
+from rosy.rosy_addon.jobs.bake import bake
+from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.scene.bake_records import remove_bakes
 from rosy.rosy_addon.scene.stroke_objects import remove_strokes
 from scenes import contents, member_vectors, pixels

@@ -10,13 +10,13 @@ from itertools import pairwise
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.draw_strokes import draw_strokes
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.errors import RosyError
+from rosy.rosy_addon.core.progress import listening
+from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
 from rosy.rosy_addon.line_drawing.svg import Pen
 from rosy.rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
-from rosy.rosy_addon.progress import listening
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.compat import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.scene_reader import read_scene

@@ -7,9 +7,9 @@ import json
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.bake_texture import bake_texture
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.errors import RosyError
+from rosy.rosy_addon.jobs.bake import bake
+from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.pictures import show_bake
 from scenes import add_field, contents, render

@@ -7,11 +7,11 @@ import os
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.animation import bake_animation
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.color import to_linear
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.color import to_linear
+from rosy.rosy_addon.core.errors import RosyError
+from rosy.rosy_addon.jobs.animation import bake_animation
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.read_request import ReadRequest

@@ -11,12 +11,12 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from rosy.rosy_addon.animation import bake_animation
-from rosy.rosy_addon.bake import bake
-from rosy.rosy_addon.cache import BAKE_CACHE
-from rosy.rosy_addon.errors import RosyError
+from rosy.rosy_addon.core.cache import BAKE_CACHE
+from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.gpu.select import automatic_device
 from rosy.rosy_addon.image_io.png import write_png
+from rosy.rosy_addon.jobs.animation import bake_animation
+from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.preset_files.store import load_preset
 from rosy.rosy_addon.projection.camera import look_at, perspective_camera
 from rosy.rosy_addon.scene import staleness

@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from extras.rotations import rotation
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.extras.command_line import main
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import rosy_addon as rf
-from rosy_addon.color import from_hex
+from rosy_addon.core.color import from_hex
 from rosy_addon.projection.camera import orbit_camera
 
 #: Small and fast.

@@ -9,8 +9,8 @@ from numpy.random import Generator
 
 from rosy_addon.cli.parser import _build_parser
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.settings import settings_of
 from rosy_addon.preset_files.store import preset_keys
-from rosy_addon.settings import settings_of
 
 from .damage import WORDS
 from .preset_files import setting_value

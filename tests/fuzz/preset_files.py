@@ -8,7 +8,7 @@ from typing import Any
 from numpy.random import Generator
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.settings import Choice, Color, Number, Setting, Switch, settings_of
+from rosy_addon.core.settings import Choice, Color, Number, Setting, Switch, settings_of
 
 _OTHER_VALUES = (None, [], {}, [1], "", "nan", True, -1, 10**400, 1e308, "\x1b[31m", "\u202e", 0.1)
 

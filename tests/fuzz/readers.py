@@ -18,7 +18,7 @@ import atheris
 import numpy as np
 
 with atheris.instrument_imports(include=["rosy_addon"]):
-    from rosy_addon.errors import RosyError
+    from rosy_addon.core.errors import RosyError
     from rosy_addon.field.field_io import READ_SUFFIXES, load_field
     from rosy_addon.field.formats.guide_strokes import read_guide_strokes
     from rosy_addon.field.formats.sings import read_sings

@@ -11,9 +11,9 @@ from numpy.random import Generator
 
 from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.settings import settings_of
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.scene.meshes import mesh_surface
-from rosy_addon.settings import settings_of
 from rosy_addon.ui.properties import ensure_registered
 
 from .cases import Case, hash_file

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 from PIL import Image
 
-from rosy_addon.errors import UNSAFE, RosyError
+from rosy_addon.core.errors import UNSAFE, RosyError
 from rosy_addon.field.formats.ply import read_vertex_values
 from rosy_addon.field.formats.text_rows import read_rows
 

@@ -9,7 +9,6 @@ from unittest import mock
 import numpy as np
 
 import rosy_addon.compositor.compose as compose_module
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.compose import colorize, compose, streak_tone
 from rosy_addon.compositor.filter_kernel import look_for_symmetry
 from rosy_addon.compositor.flow import with_cycle_distance
@@ -18,7 +17,8 @@ from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, mask_undefined
 from rosy_addon.compositor.strips import Strip
-from rosy_addon.deterministic_trig import unit_phasor
+from rosy_addon.core.cache import Cache
+from rosy_addon.core.deterministic_trig import unit_phasor
 from rosy_addon.projection.gbuffer import GBuffer
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 
 #: Machines may be busy, so hypothesis has no deadline for an example.
 settings.register_profile("patient", deadline=None)

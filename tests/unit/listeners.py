@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from rosy_addon.progress import Listener, listening
+from rosy_addon.core.progress import Listener, listening
 
 
 class CancelledError(Exception):

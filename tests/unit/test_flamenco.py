@@ -7,7 +7,7 @@ import json
 import pytest
 from conftest import ROOT
 
-from rosy_addon.frame_workers import parse_frames
+from rosy_addon.worker.frame_workers import parse_frames
 
 quickjs = pytest.importorskip("quickjs")
 

@@ -14,160 +14,65 @@ from conftest import ROOT
 
 PACKAGE = ROOT / "rosy_addon"
 
-#: The modules that every room may import.
-BASE_ROOMS = {
-    "errors",
-    "progress",
-    "file_io",
-    "memory",
-    "deterministic_trig",
-    "color",
-    "settings",
-    "cache",
-}
-
-#: What each room may import besides itself. Modules at the top of the package are rooms, too.
+#: What each room may import besides `core` and itself.
 MAY_IMPORT = {
-    "errors": set(),
-    "progress": set(),
-    "memory": {"errors"},
-    "cache": set(),
-    "deterministic_trig": set(),
-    "color": {"errors"},
-    "file_io": {"errors", "memory", "progress"},
-    "settings": {"errors"},
-    "field": BASE_ROOMS,
-    "projection": BASE_ROOMS | {"field"},
-    "annotation": BASE_ROOMS | {"field", "projection"},
-    "compositor": BASE_ROOMS | {"field", "projection", "annotation"},
-    "line_drawing": BASE_ROOMS | {"field", "projection", "annotation"},
-    "image_io": BASE_ROOMS,
-    "surface_texture": BASE_ROOMS
-    | {"field", "projection", "compositor", "line_drawing", "image_io"},
-    "worker": BASE_ROOMS | {"field", "projection", "compositor"},
-    "rendering": BASE_ROOMS
-    | {"field", "projection", "annotation", "compositor", "worker", "image_io"},
-    "preset_files": BASE_ROOMS | {"field", "projection", "compositor", "image_io"},
-    "gpu": BASE_ROOMS | {"field", "projection", "compositor", "rendering", "worker", "image_io"},
-    "scene": BASE_ROOMS
-    | {
-        "field",
-        "projection",
-        "annotation",
-        "compositor",
-        "line_drawing",
-        "surface_texture",
-        "worker",
-        "rendering",
-        "image_io",
-        "preset_files",
+    "core": set(),
+    "field": set(),
+    "projection": {"field"},
+    "annotation": {"field", "projection"},
+    "compositor": {"field", "projection", "annotation"},
+    "line_drawing": {"field", "projection", "annotation"},
+    "image_io": set(),
+    "surface_texture": {"field", "projection", "compositor", "line_drawing", "image_io"},
+    "worker": {"field", "projection", "compositor"},
+    "rendering": {"field", "projection", "annotation", "compositor", "worker", "image_io"},
+    "preset_files": {"field", "projection", "compositor", "image_io"},
+    "gpu": {"field", "projection", "compositor", "rendering", "worker", "image_io"},
+    "scene": {
+        *("field", "projection", "annotation", "compositor", "line_drawing", "surface_texture"),
+        *("worker", "rendering", "image_io", "preset_files"),
     },
-    "bake": BASE_ROOMS | {"compositor", "worker", "rendering", "scene", "gpu"},
-    "comb_field": BASE_ROOMS | {"field", "worker", "scene"},
-    "bake_texture": BASE_ROOMS
-    | {"compositor", "surface_texture", "worker", "rendering", "scene", "image_io"},
-    "animation": BASE_ROOMS
-    | {"projection", "annotation", "compositor", "worker", "rendering", "scene", "gpu"},
-    "viewport": BASE_ROOMS
-    | {"field", "projection", "annotation", "compositor", "rendering", "worker", "scene", "gpu"},
-    "draw_strokes": BASE_ROOMS | {"projection", "compositor", "line_drawing", "worker", "scene"},
-    "frame_workers": BASE_ROOMS | {"worker"},
-    "render_turntable": BASE_ROOMS
-    | {"rendering", "image_io", "worker", "scene", "gpu", "turntable_video"},
-    "turntable_video": BASE_ROOMS | {"projection", "compositor", "worker", "rendering", "image_io"},
-    "ui": BASE_ROOMS
-    | {
-        "preset_files",
-        "field",
-        "projection",
-        "compositor",
-        "line_drawing",
-        "surface_texture",
-        "worker",
-        "scene",
-        "gpu",
-        "bake",
-        "viewport",
+    "jobs": {
+        *("field", "projection", "annotation", "compositor", "line_drawing", "surface_texture"),
+        *("worker", "rendering", "image_io", "scene", "gpu"),
     },
-    "external": BASE_ROOMS | {"field", "annotation", "worker", "turntable_video"},
-    "api": BASE_ROOMS
-    | {
-        "field",
-        "projection",
-        "annotation",
-        "compositor",
-        "line_drawing",
-        "surface_texture",
-        "worker",
-        "rendering",
-        "image_io",
-        "preset_files",
-        "turntable_video",
-        "external",
+    "viewport": {
+        *("field", "projection", "annotation", "compositor", "rendering", "worker", "scene", "gpu"),
     },
-    "cli": BASE_ROOMS
-    | {
-        "api",
-        "field",
-        "projection",
-        "compositor",
-        "scene",
-        "gpu",
-        "rendering",
-        "bake",
-        "ui",
-        "animation",
-        "frame_workers",
-        "turntable_video",
-        "line_drawing",
-        "surface_texture",
-        "draw_strokes",
-        "image_io",
-        "preset_files",
+    "ui": {
+        *("preset_files", "field", "projection", "compositor", "line_drawing", "surface_texture"),
+        *("worker", "scene", "gpu", "jobs", "viewport"),
     },
-    "extras": BASE_ROOMS
-    | {
-        "field",
-        "projection",
-        "compositor",
-        "rendering",
-        "turntable_video",
-        "external",
-        "api",
-        "cli",
-        "worker",
-        "frame_workers",
+    "external": {"field", "annotation", "worker", "rendering"},
+    "api": {
+        *("field", "projection", "annotation", "compositor", "line_drawing", "surface_texture"),
+        *("worker", "rendering", "image_io", "preset_files", "external"),
+    },
+    "cli": {
+        *("api", "field", "projection", "compositor", "line_drawing", "surface_texture"),
+        *("scene", "gpu", "rendering", "worker", "jobs", "ui", "image_io", "preset_files"),
+    },
+    "extras": {
+        *("field", "projection", "compositor", "rendering", "external", "api", "cli", "worker"),
     },
     "__main__": {"extras"},
     "__init__": {"api"},
 }
 NUMPY_ROOMS = (
+    "core",
     "field",
     "projection",
     "compositor",
     "line_drawing",
     "surface_texture",
     "image_io",
-    "presets",
+    "preset_files",
     "worker",
     "rendering",
 )
 
 #: What may use Blender everywhere.
-BLENDER_ROOMS = (
-    *(
-        "scene",
-        "ui",
-        "bake",
-        "bake_texture",
-        "comb_field",
-        "draw_strokes",
-        "render_turntable",
-        "viewport",
-        "cli",
-        "animation",
-    ),
-)
+BLENDER_ROOMS = ("scene", "ui", "jobs", "viewport", "cli")
 
 #: Files of the room `gpu` that draw with Blender, and may import its modules.
 BLENDER_GPU_FILES = ("device.py",)
@@ -206,7 +111,7 @@ def test_imports_run_one_way(path):
     room = room_of(path)
     assert room in MAY_IMPORT, f"which rooms may {room} import?"
     rooms = {name.split(".")[0] for name in inside} - {room}
-    assert rooms <= MAY_IMPORT[room]
+    assert rooms <= MAY_IMPORT[room] | {"core"}
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in BLENDER_ROOMS:
         allowed |= {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
@@ -286,8 +191,7 @@ def test_numpy_rooms_import_without_blender():
     modules = [
         "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         for path in FILES
-        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli", "frame_workers", "turntable_video")
-        and path.stem != "__init__"
+        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli") and path.stem != "__init__"
     ]
     assert len(modules) > 20
     code = "\n".join(

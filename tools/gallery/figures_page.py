@@ -118,7 +118,7 @@ def _render_with_key() -> Image.Image:
     import bpy
     from mathutils import Matrix
 
-    from rosy_addon.bake import bake
+    from rosy_addon.jobs.bake import bake
     from rosy_addon.projection.camera import orbit_basis
     from rosy_addon.scene.look_properties import apply_look
     from rosy_addon.scene.meshes import mesh_surface

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image, ImageDraw
 
-from rosy_addon.color import from_hex
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.color import from_hex
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from rosy_addon.color import from_hex, to_display
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.color import from_hex, to_display
 
 from .page import ROOT
 from .plane import compose_field, points, singularity

@@ -8,13 +8,13 @@ import numpy as np
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.settings import Choice, Color, Number, Setting, Switch, settings_of
 from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
 from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.settings import Choice, Color, Number, Setting, Switch, settings_of
 
 from .figure_11 import smoothed_a_little
 from .page import ROOT

@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.turntable_video import draw_next, turntable, turntable_views
+from rosy_addon.rendering.turntable import draw_next, turntable, turntable_views
 
 from .page import ROOT
 from .shapes import sphere, suzanne

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
-from rosy_addon.color import to_display
+from rosy_addon.core.color import to_display
 
 #: Largest width of a sheet that a page shows unscaled, in pixels.
 MAX_WIDTH = 820

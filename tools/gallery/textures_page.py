@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from rosy_addon.color import to_linear
 from rosy_addon.compositor.ink_thresholds import ink_of_thresholds
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
+from rosy_addon.core.color import to_linear
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.image_io.image_data import image_of_pixels

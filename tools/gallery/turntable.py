@@ -8,7 +8,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
-from rosy_addon.turntable_video import turntable, turntable_views
+from rosy_addon.rendering.turntable import turntable, turntable_views
 
 from .page import ROOT
 from .shapes import suzanne

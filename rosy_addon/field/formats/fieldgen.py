@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError, counted
-from ...file_io import read_bytes
-from ...progress import progress, report
+from ...core.errors import RosyError, counted
+from ...core.file_io import read_bytes
+from ...core.progress import progress, report
 from ..blocks import row_blocks
 from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError
+from ...core.errors import RosyError
 from .text_rows import read_rows
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import counted
-from ...progress import progress, report
+from ...core.errors import counted
+from ...core.progress import progress, report
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, read_rows
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError, counted
-from ...progress import progress
+from ...core.errors import RosyError, counted
+from ...core.progress import progress
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
 

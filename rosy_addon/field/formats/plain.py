@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError, counted
-from ...file_io import read_bytes
-from ...progress import progress
+from ...core.errors import RosyError, counted
+from ...core.file_io import read_bytes
+from ...core.progress import progress
 from ..blocks import row_blocks
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError, counted
-from ...progress import progress
+from ...core.errors import RosyError, counted
+from ...core.progress import progress
 from ..rosy_field import RosyField, check_degree
 from .polygons import RawField
 from .text_rows import TextRows, abbreviate, format_blocks, read_rows

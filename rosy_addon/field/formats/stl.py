@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError, counted
-from ...file_io import read_bytes
-from ...progress import progress, report
+from ...core.errors import RosyError, counted
+from ...core.file_io import read_bytes
+from ...core.progress import progress, report
 from ..validate import as_float64
 from .polygons import Polygons
 from .text_rows import LABEL, read_rows

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import RosyError, counted
-from ...file_io import read_bytes
-from ...progress import report
+from ...core.errors import RosyError, counted
+from ...core.file_io import read_bytes
+from ...core.progress import report
 from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.

@@ -17,9 +17,9 @@ from rosy_addon.annotation.arrow_marks import (
 )
 from rosy_addon.annotation.draw_arrows import draw_arrows
 from rosy_addon.annotation.surface_places import spaced_points, surface_places
-from rosy_addon.cache import Cache
-from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.cache import Cache
+from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.field.directional_field import field_directions, field_from_directions
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField

@@ -27,9 +27,9 @@ from rosy_addon.annotation.round_numbers import (
     tick_values,
 )
 from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN
-from rosy_addon.color import from_hex, luminance, map_colors, to_display
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture_key import fixed_color_range, picture_key
+from rosy_addon.core.color import from_hex, luminance, map_colors, to_display
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera

@@ -12,8 +12,8 @@ from shapes import globe, icosphere, torus
 from rosy_addon.annotation.draw_marks import draw_marks
 from rosy_addon.annotation.index_labels import LETTERS, placed_labels, text_segments, text_width
 from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN, OUTLINE, SingularityMarks
-from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.singularities import find_singularities, format_index
 from rosy_addon.line_drawing.pipeline import draw_instances

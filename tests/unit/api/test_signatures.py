@@ -10,7 +10,7 @@ from public_signatures import FILE, signatures
 
 from rosy_addon import api
 from rosy_addon.compositor.look import Look
-from rosy_addon.settings import settings_of
+from rosy_addon.core.settings import settings_of
 
 
 def test_public_signatures():

@@ -18,7 +18,7 @@ from harness.forked import run_command
 from shapes import cube, icosphere, torus
 
 from rosy_addon.cli import bake, parser
-from rosy_addon.color import to_linear
+from rosy_addon.core.color import to_linear
 from rosy_addon.extras.command_line import main
 from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.png import write_png

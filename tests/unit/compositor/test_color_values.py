@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from shapes import icosphere, plane
 
-from rosy_addon.color import color_stops, map_colors, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.errors import RosyError
+from rosy_addon.core.color import color_stops, map_colors, to_linear
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance

@@ -11,8 +11,6 @@ from conftest import long, mainly
 from scipy.ndimage import gaussian_filter
 from shapes import icosphere, plane
 
-from rosy_addon.cache import Cache
-from rosy_addon.color import from_hex, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import (
     COARSE_RATIO,
@@ -25,13 +23,15 @@ from rosy_addon.compositor.hatching import LineModulation
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import instance_line_spacing, supersampled_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
+from rosy_addon.core.cache import Cache
+from rosy_addon.core.color import from_hex, to_linear
+from rosy_addon.core.settings import Choice, Number, Switch, settings_of
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.settings import Choice, Number, Switch, settings_of
 
 SIZE = 256
 LOOK = Look(

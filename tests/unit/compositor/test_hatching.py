@@ -13,7 +13,6 @@ from harness.planar import planar_pixel_field
 from scipy.ndimage import gaussian_filter, map_coordinates
 from shapes import cube
 
-from rosy_addon.color import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.even_lines import EvenLines
 from rosy_addon.compositor.family_hues import line_families
@@ -37,6 +36,7 @@ from rosy_addon.compositor.streak_statistics import (
 )
 from rosy_addon.compositor.surface_noise import instance_hashes, surface_noise
 from rosy_addon.compositor.wobble import WOBBLE_STD, rotate_pixel_field, wobble_angle
+from rosy_addon.core.color import from_hex, to_display, to_linear
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface

@@ -13,7 +13,6 @@ from planar_fields import pixel_centers
 from scipy import ndimage
 
 from bench import cases
-from rosy_addon.cache import Cache
 from rosy_addon.compositor import stages
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.filter_kernel import full_sample_count
@@ -23,6 +22,7 @@ from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, SeamSteps
+from rosy_addon.core.cache import Cache
 from rosy_addon.projection.project import project
 
 LOOK = Look(method="ibfv")

@@ -10,7 +10,6 @@ from conftest import mainly
 from harness.planar import planar_pixel_field
 from shapes import torus
 
-from rosy_addon.color import to_linear
 from rosy_addon.compositor.hatching import LineModulation, line_coverage
 from rosy_addon.compositor.ink_thresholds import (
     cyclic_places,
@@ -27,6 +26,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.paper_grain import picture_paper_grain
 from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.undirected import undirected_texture
+from rosy_addon.core.color import to_linear
 from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance

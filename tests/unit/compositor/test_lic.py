@@ -14,7 +14,7 @@ from scipy import ndimage
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 
 #: These tests draw many pictures and measure them.
 pytestmark = pytest.mark.slow

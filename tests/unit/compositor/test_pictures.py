@@ -8,11 +8,11 @@ from conftest import long
 from harness.planar import degree_layers
 from shapes import icosphere, plane, torus
 
-from rosy_addon.color import map_colors, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import neighbor_table, surface_pixel_field
 from rosy_addon.compositor.shading import Light, diffuse
+from rosy_addon.core.color import map_colors, to_display, to_linear
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import axis_field
 from rosy_addon.field.rosy_field import RosyField

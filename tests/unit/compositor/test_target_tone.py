@@ -11,12 +11,12 @@ from harness.planar import degree_layers
 from scipy.ndimage import gaussian_filter
 from shapes import from_quads, grid_of_quads, icosphere, plane
 
-from rosy_addon.cache import Cache
-from rosy_addon.color import from_hex, to_display, to_linear
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.compositor.target_tone import ReferenceRender, apply_tone_curve, target_tone
+from rosy_addon.core.cache import Cache
+from rosy_addon.core.color import from_hex, to_display, to_linear
 from rosy_addon.field.generate import axis_field
 from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.extras import blender
 from rosy_addon.extras.command_line import main
 

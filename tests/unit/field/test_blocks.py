@@ -7,11 +7,11 @@ import pytest
 from listeners import CancelledError, cancel_at
 from shapes import torus
 
+from rosy_addon.core.progress import listening
 from rosy_addon.field import blocks, surface
 from rosy_addon.field.field_io import load_field, write_field
 from rosy_addon.field.formats import fieldgen, obj, plain, text_rows
 from rosy_addon.field.generate import axis_field
-from rosy_addon.progress import listening
 
 #: Rows of the blocks in these tests, and faces of the mesh.
 BLOCK, SIDE = 64, 32

@@ -7,7 +7,7 @@ import pytest
 from conftest import long
 from shapes import cylinder, globe, icosphere, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.analysis import dirichlet_energy
 from rosy_addon.field.cheapest_singularities import cheapest_singularities
 from rosy_addon.field.generate import GeneratorSettings, generate

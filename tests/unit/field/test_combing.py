@@ -8,7 +8,7 @@ from conftest import mainly
 from scipy.spatial import cKDTree
 from shapes import from_quads, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.combing import Combing, start_combing
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate

@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
 
-from rosy_addon.color import to_display
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
+from rosy_addon.core.color import to_display
 from rosy_addon.field.directional_field import (
     closest_rosy,
     field_directions,

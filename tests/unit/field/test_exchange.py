@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import from_triangles, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import load_field, write_field

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import cylinder, from_quads, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import write_field
 from rosy_addon.field.frames import dot

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapes import cube, cylinder, from_quads, from_triangles, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
 from rosy_addon.field.curvature import curvature_field

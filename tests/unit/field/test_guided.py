@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial.transform import Rotation
 from shapes import cube, from_quads, from_triangles, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate

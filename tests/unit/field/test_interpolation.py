@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shapes import icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.carry import vectors_on_rest_shape
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.directional_field import field_directions, tensor_field

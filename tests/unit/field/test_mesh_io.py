@@ -266,7 +266,7 @@ def test_missing_files_and_folders(tmp_path, error_of):
 @pytest.mark.slow
 @given(st.binary(max_size=300), st.sampled_from(sorted(FILES)), st.integers(0, 400))
 def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, offset):
-    from rosy_addon.errors import RosyError
+    from rosy_addon.core.errors import RosyError
 
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     data = FILES[name]

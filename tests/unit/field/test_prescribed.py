@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from shapes import cylinder, from_quads, globe, icosphere, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field import prescribed, turning_angles
 from rosy_addon.field.face_graph import face_graph, spanning_forest, triangle_graph
 from rosy_addon.field.prescribed import prescribed_field

@@ -7,7 +7,7 @@ import pytest
 from conftest import long
 from shapes import cylinder, globe, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.prescribed import change_singularities, prescribed_field

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapes import cylinder, globe
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.singularities import find_singularities

@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from shapes import from_triangles, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot
 from rosy_addon.field.mesh_io import read_mesh

@@ -9,8 +9,8 @@ import zlib
 import numpy as np
 import pytest
 
-from rosy_addon import memory
-from rosy_addon.color import luminance, to_display, to_linear
+from rosy_addon.core import memory
+from rosy_addon.core.color import luminance, to_display, to_linear
 from rosy_addon.image_io.png import read_png, write_png
 
 

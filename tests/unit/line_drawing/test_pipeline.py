@@ -11,6 +11,7 @@ from listeners import cancel_at
 from shapes import from_triangles, icosphere, moved, plane
 
 from rosy_addon.compositor.shading import KEY_LIGHT, Light
+from rosy_addon.core.progress import listening
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
@@ -22,7 +23,6 @@ from rosy_addon.line_drawing.spacing import lit_tone
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
 from rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
-from rosy_addon.progress import listening
 from rosy_addon.projection.camera import (
     look_at,
     orbit_camera,

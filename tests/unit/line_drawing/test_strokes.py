@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from shapes import cube, cylinder, icosphere, plane, torus
 
 from rosy_addon.cli.parser import main
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, transport, view_frame
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh

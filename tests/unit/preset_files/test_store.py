@@ -17,7 +17,8 @@ from PIL import Image
 
 from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
+from rosy_addon.core.settings import Choice, Color, Switch
 from rosy_addon.image_io.png import to_srgb_uint8
 from rosy_addon.preset_files import store
 from rosy_addon.preset_files.preview import PREVIEW_SIZE, draw_preview
@@ -39,7 +40,6 @@ from rosy_addon.preset_files.store import (
     save_preset,
     write_preset,
 )
-from rosy_addon.settings import Choice, Color, Switch
 
 
 def values_of(entry):

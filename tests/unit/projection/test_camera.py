@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import icosphere
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.projection.camera import (
     Camera,
     look_at,

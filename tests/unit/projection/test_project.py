@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import from_quads, from_triangles, icosphere, plane, torus
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface

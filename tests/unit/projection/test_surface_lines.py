@@ -9,7 +9,7 @@ from conftest import long
 from harness.line_spacing import share_within, spacing_ratios
 from shapes import cylinder, from_triangles, icosphere, plane, torus
 
-from rosy_addon.cache import Cache
+from rosy_addon.core.cache import Cache
 from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.mesh_io import read_mesh
@@ -239,7 +239,7 @@ def test_the_number_of_triangles_is_bounded():
 
 
 def test_too_little_memory_is_an_error(monkeypatch, error_of):
-    monkeypatch.setattr("rosy_addon.memory.available_memory", lambda: 1 << 20)
+    monkeypatch.setattr("rosy_addon.core.memory.available_memory", lambda: 1 << 20)
     surface = icosphere(2)
     message = error_of(lines_of, surface, axis_field(surface, 4), 0.02)
     assert "sphere: the spacing of lines on" in message and "choose wider lines" in message

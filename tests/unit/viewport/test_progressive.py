@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.viewport import progressive as progressive_module

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import time
 
-from rosy_addon.errors import RosyError
-from rosy_addon.progress import report
+from rosy_addon.core.errors import RosyError
+from rosy_addon.core.progress import report
 
 
 def count(steps: int, seconds: float = 0.01) -> int:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
 from rosy_addon.worker import start as module
 from rosy_addon.worker.helper import Helper, HelperLostError
 
@@ -137,7 +137,7 @@ def test_no_frame_worker_outlives_the_command_that_started_it(tmp_path):
     program = f"""
 import sys
 sys.path[:0] = [{str(ROOT)!r}]
-from rosy_addon.frame_workers import run_local
+from rosy_addon.worker.frame_workers import run_local
 code = "import os, time; print(os.getpid(), flush=True); time.sleep(100)"
 for line in run_local([sys.executable, "-c", code], range(2), 2):
     print(line, flush=True)

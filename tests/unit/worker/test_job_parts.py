@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from rosy_addon.errors import RosyError
-from rosy_addon.progress import listening
+from rosy_addon.core.errors import RosyError
+from rosy_addon.core.progress import listening
 from rosy_addon.worker.helper import Helper
 from rosy_addon.worker.job import Call, Step, job, part, run
 from rosy_addon.worker.program import run_program

@@ -15,11 +15,11 @@ import pytest
 from conftest import ROOT, long
 from shapes import torus
 
-from rosy_addon.cache import BAKE_CACHE, Cache
 from rosy_addon.compositor.look import Look
-from rosy_addon.errors import NothingInViewError
+from rosy_addon.core.cache import BAKE_CACHE, Cache
+from rosy_addon.core.errors import NothingInViewError
+from rosy_addon.core.progress import listening
 from rosy_addon.field.generate import axis_field
-from rosy_addon.progress import listening
 from rosy_addon.projection.camera import look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture, picture_groups

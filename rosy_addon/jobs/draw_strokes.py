@@ -8,23 +8,23 @@ from pathlib import Path
 
 import bpy
 
-from .cache import BAKE_CACHE
-from .compositor.shading import lights_of
-from .errors import RosyError
-from .file_io import check_writable, write_bytes
-from .line_drawing.drawing_outputs import drawing_curves, drawing_file
-from .line_drawing.pipeline import StrokeDrawing
-from .line_drawing.polyline_files import check_drawing_suffix
-from .line_drawing.style import StrokeStyle
-from .line_drawing.svg import Pen
-from .projection.gbuffer import MeshInstance
-from .scene.cameras import CameraSource, render_camera, render_size, resolve_camera
-from .scene.lights import read_lights
-from .scene.read_request import ReadRequest, nonfinite_policy
-from .scene.read_view import scene_depsgraph
-from .scene.scene_reader import SceneData, read_scene
-from .scene.stroke_objects import read_pen, read_stroke_style, store_strokes
-from .worker.job import Call, Step, Steps, job
+from ..compositor.shading import lights_of
+from ..core.cache import BAKE_CACHE
+from ..core.errors import RosyError
+from ..core.file_io import check_writable, write_bytes
+from ..line_drawing.drawing_outputs import drawing_curves, drawing_file
+from ..line_drawing.pipeline import StrokeDrawing
+from ..line_drawing.polyline_files import check_drawing_suffix
+from ..line_drawing.style import StrokeStyle
+from ..line_drawing.svg import Pen
+from ..projection.gbuffer import MeshInstance
+from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
+from ..scene.lights import read_lights
+from ..scene.read_request import ReadRequest, nonfinite_policy
+from ..scene.read_view import scene_depsgraph
+from ..scene.scene_reader import SceneData, read_scene
+from ..scene.stroke_objects import read_pen, read_stroke_style, store_strokes
+from ..worker.job import Call, Step, Steps, job
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,17 +13,17 @@ from hypothesis import strategies as st
 from PIL import Image
 from shapes import icosphere, torus
 
-from rosy_addon.cache import Cache
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
-from rosy_addon.errors import RosyError
+from rosy_addon.core.cache import Cache
+from rosy_addon.core.errors import RosyError
+from rosy_addon.core.progress import listening
 from rosy_addon.external.ffmpeg import find_encoder
 from rosy_addon.field.generate import axis_field
 from rosy_addon.image_io.gif import BAYER_MATRIX, PALETTE_LEVELS, gif_bytes, lzw_compress
-from rosy_addon.progress import listening
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
-from rosy_addon.turntable_video import (
+from rosy_addon.rendering.turntable import (
     check_still,
     check_video_path,
     draw_next,

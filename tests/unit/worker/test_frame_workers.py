@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from rosy_addon.errors import RosyError
-from rosy_addon.frame_workers import run_local
+from rosy_addon.core.errors import RosyError
+from rosy_addon.worker.frame_workers import run_local
 
 
 def command(script):

@@ -10,12 +10,12 @@ import time
 
 import pytest
 
-from rosy_addon.errors import RosyError
-from rosy_addon.file_io import LEFTOVER_SECONDS, check_folder, replacing, write_bytes
+from rosy_addon.core.errors import RosyError
+from rosy_addon.core.file_io import LEFTOVER_SECONDS, check_folder, replacing, write_bytes
 
 WRITER = """
 import sys, time
-from rosy_addon.file_io import replacing
+from rosy_addon.core.file_io import replacing
 with replacing(sys.argv[1]) as temporary:
     temporary.write_bytes(b"half")
     print("writing", flush=True)

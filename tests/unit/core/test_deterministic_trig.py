@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rosy_addon.deterministic_trig import cos_sin, unit_phasor, vector_angle
+from rosy_addon.core.deterministic_trig import cos_sin, unit_phasor, vector_angle
 
 ANGLES = st.floats(-1e4, 1e4)
 

@@ -1,7 +1,7 @@
 """Labels and panels of settings."""
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.settings import panel_settings, settings_of
+from rosy_addon.core.settings import panel_settings, settings_of
 
 
 def test_every_setting_is_in_one_panel():

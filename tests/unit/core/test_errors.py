@@ -2,7 +2,7 @@
 
 import pytest
 
-from rosy_addon.errors import RosyError, as_sentence, counted
+from rosy_addon.core.errors import RosyError, as_sentence, counted
 
 
 @pytest.mark.parametrize(

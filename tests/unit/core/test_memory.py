@@ -11,19 +11,19 @@ import pytest
 from conftest import ROOT
 
 from bench import cases
-from rosy_addon import memory
-from rosy_addon.cache import Cache
 from rosy_addon.compositor import image_noise, picture_tiles, streak_statistics
 from rosy_addon.compositor.look import Look
-from rosy_addon.errors import RosyError
+from rosy_addon.core import memory
+from rosy_addon.core.cache import Cache
+from rosy_addon.core.errors import RosyError
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.rendering.draw import draw_picture, picture_groups, picture_memory
+from rosy_addon.rendering.turntable import turntable, turntable_views
 from rosy_addon.rendering.view_input import ViewInput
-from rosy_addon.turntable_video import turntable, turntable_views
 
 
 def ball_view(width: int = 512, height: int = 512, degree: int = 4, **settings) -> ViewInput:

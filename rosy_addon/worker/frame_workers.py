@@ -16,8 +16,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from .errors import RosyError
-from .worker.start import Guarded, GuardedFolder
+from ..core.errors import RosyError
+from .start import Guarded, GuardedFolder
 
 #: Largest number of a frame in Blender.
 MAX_FRAME = 1_048_574

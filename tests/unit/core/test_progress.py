@@ -14,7 +14,8 @@ from uv_maps import torus_uv
 
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
-from rosy_addon.errors import RosyError
+from rosy_addon.core.errors import RosyError
+from rosy_addon.core.progress import current_report, listening, progress, report
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.generate import generate
 from rosy_addon.field.prescribed import prescribed_field
@@ -22,7 +23,6 @@ from rosy_addon.field.singularities import find_singularities
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.preset_files.store import load_preset
-from rosy_addon.progress import current_report, listening, progress, report
 from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance

@@ -7,27 +7,27 @@ from dataclasses import replace
 
 import bpy
 
-from .cache import BAKE_CACHE
-from .compositor.ink_thresholds import unlit_look
-from .compositor.look import Look, is_hatched
-from .compositor.picture_key import picture_key
-from .gpu.select import image_steps, select_device
-from .scene.backdrop import update_backdrops
-from .scene.bake_records import DrawnFrom
-from .scene.cameras import CameraSource, render_camera
-from .scene.keys import update_keys
-from .scene.look_properties import look_at_frame, read_look
-from .scene.picture_state import read_picture_states
-from .scene.pictures import (
+from ..compositor.ink_thresholds import unlit_look
+from ..compositor.look import Look, is_hatched
+from ..compositor.picture_key import picture_key
+from ..core.cache import BAKE_CACHE
+from ..gpu.select import image_steps, select_device
+from ..scene.backdrop import update_backdrops
+from ..scene.bake_records import DrawnFrom
+from ..scene.cameras import CameraSource, render_camera
+from ..scene.keys import update_keys
+from ..scene.look_properties import look_at_frame, read_look
+from ..scene.picture_state import read_picture_states
+from ..scene.pictures import (
     BakeResult,
     OutputSettings,
     apply_picture,
     check_targets,
     read_output_settings,
 )
-from .scene.read_view import read_views, scene_depsgraph
-from .scene.texture_nodes import Hatching
-from .worker.job import Step, Steps, job, part
+from ..scene.read_view import read_views, scene_depsgraph
+from ..scene.texture_nodes import Hatching
+from ..worker.job import Step, Steps, job, part
 
 __all__ = ["BakeResult", "bake"]
 

@@ -11,23 +11,23 @@ from typing import Any
 
 import numpy as np
 
-from .cache import Cache
-from .color import to_display
-from .compositor.flow import flow_at
-from .compositor.look import Look, has_flow
-from .compositor.picture import Picture
-from .compositor.shading import Light
-from .errors import RosyError
-from .file_io import write_bytes
-from .image_io.gif import gif_bytes
-from .image_io.png import png_bytes
-from .memory import check_memory
-from .projection.camera import orbit_camera
-from .projection.gbuffer import MeshInstance
-from .rendering.draw import bake_picture, draw_picture
-from .rendering.view_input import ViewInput
-from .worker.job import Call, Steps, call_steps, part, run
-from .worker.start import GuardedFolder
+from ..compositor.flow import flow_at
+from ..compositor.look import Look, has_flow
+from ..compositor.picture import Picture
+from ..compositor.shading import Light
+from ..core.cache import Cache
+from ..core.color import to_display
+from ..core.errors import RosyError
+from ..core.file_io import write_bytes
+from ..core.memory import check_memory
+from ..image_io.gif import gif_bytes
+from ..image_io.png import png_bytes
+from ..projection.camera import orbit_camera
+from ..projection.gbuffer import MeshInstance
+from ..worker.job import Call, Steps, call_steps, part, run
+from ..worker.start import GuardedFolder
+from .draw import bake_picture, draw_picture
+from .view_input import ViewInput
 
 #: Suffixes of videos that can be written.
 VIDEO_SUFFIXES = (".mp4", ".gif")

@@ -20,36 +20,36 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .annotation.key_contents import PictureKey
-from .cache import Cache, content_hash
-from .compositor.look import Look, has_flow
-from .errors import RosyError
-from .file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
-from .gpu.select import image_steps, select_device
-from .projection.camera import Camera
-from .rendering.marks import sequence_key
-from .rendering.view_input import ViewInput
-from .scene.backdrop import update_backdrops
-from .scene.bake_records import DrawnFrom
-from .scene.blender_images import frame_path, write_frame
-from .scene.cameras import CameraSource, frame_camera
-from .scene.evaluated_field import temp_attributes
-from .scene.file_names import picture_stem
-from .scene.keys import update_keys
-from .scene.look_properties import look_at_frame, read_look
-from .scene.picture_state import PictureState, read_picture_states
-from .scene.pictures import (
+from ..annotation.key_contents import PictureKey
+from ..compositor.look import Look, has_flow
+from ..core.cache import Cache, content_hash
+from ..core.errors import RosyError
+from ..core.file_io import check_folder, check_writable, read_bytes, remove_leftovers, write_bytes
+from ..gpu.select import image_steps, select_device
+from ..projection.camera import Camera
+from ..rendering.marks import sequence_key
+from ..rendering.view_input import ViewInput
+from ..scene.backdrop import update_backdrops
+from ..scene.bake_records import DrawnFrom
+from ..scene.blender_images import frame_path, write_frame
+from ..scene.cameras import CameraSource, frame_camera
+from ..scene.evaluated_field import temp_attributes
+from ..scene.file_names import picture_stem
+from ..scene.keys import update_keys
+from ..scene.look_properties import look_at_frame, read_look
+from ..scene.picture_state import PictureState, read_picture_states
+from ..scene.pictures import (
     ImageSequence,
     OutputSettings,
     apply_sequence,
     check_targets,
     read_output_settings,
 )
-from .scene.read_request import nonfinite_policy
-from .scene.read_view import read_views, scene_depsgraph
-from .scene.scene_reader import SceneData
-from .scene.visible_objects import field_objects
-from .worker.job import Call, Step, Steps, job, part
+from ..scene.read_request import nonfinite_policy
+from ..scene.read_view import read_views, scene_depsgraph
+from ..scene.scene_reader import SceneData
+from ..scene.visible_objects import field_objects
+from ..worker.job import Call, Step, Steps, job, part
 
 #: Suffix of a sidecar file, after the name of the picture.
 SIDECAR_SUFFIX = ".rosy.txt"

@@ -9,13 +9,9 @@ from typing import Any
 
 import bpy
 
-from .file_io import write_bytes
-from .gpu.select import picture_steps, select_device
-from .rendering.view_input import ViewInput
-from .scene.look_properties import read_look
-from .scene.read_view import read_turntable, scene_depsgraph
-from .scene.video import encode_video
-from .turntable_video import (
+from ..core.file_io import write_bytes
+from ..gpu.select import picture_steps, select_device
+from ..rendering.turntable import (
     check_still,
     draw_frame,
     is_gif,
@@ -23,7 +19,11 @@ from .turntable_video import (
     video_frame,
     video_steps,
 )
-from .worker.job import Call, Step, Steps, job
+from ..rendering.view_input import ViewInput
+from ..scene.look_properties import read_look
+from ..scene.read_view import read_turntable, scene_depsgraph
+from ..scene.video import encode_video
+from ..worker.job import Call, Step, Steps, job
 
 #: Least samples along each side of a pixel: streaks that move must not flicker.
 MIN_SUPERSAMPLING = 2

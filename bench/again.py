@@ -19,11 +19,11 @@ from .timing import Case, compare, main
 CHANGES: dict[str, tuple[object, ...]] = {
     "gain": (3.0, 3.5),
     "shading": (0.5, 0.6),
-    "colour_map": ("magma", "grey"),
+    "color_map": ("magma", "gray"),
     "seed": (1, 2),
     "grain": (2.0, 2.5),
     "density": (0.2, 0.3),
-    "noise": ("colour", "grey"),
+    "noise": ("color", "gray"),
     "length": (30, 50),
     "guiding_angle": (0.2, 0.4),
     "crease_angle": (0.8, 0.9),

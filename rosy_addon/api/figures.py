@@ -345,7 +345,7 @@ def _color_bar(look: Look, label: str) -> ColorBar | None:
         ends = look.values_low, look.values_high
     else:
         return None
-    return ColorBar(label, *ends, color_stops(look.colour_map))
+    return ColorBar(label, *ends, color_stops(look.color_map))
 
 
 def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
@@ -458,7 +458,7 @@ class _Studio:
                 magnitude="none",
                 values_low=-slope * at_zero,
                 values_high=slope * (1.0 - at_zero),
-                colour_map=DIFFERENCE_COLORS,
+                color_map=DIFFERENCE_COLORS,
             )
             for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]
         ]

@@ -180,7 +180,7 @@ def render(
         Name of a preset, or a ``.json`` file; see `list_presets`.
     color_values : str or (F,), (V,) or (C,) array_like, optional
         Numbers of the faces, vertices or corners, such as the angle between two fields, which the hue of
-        the lines shows through the `colour_map`; NaN where there is none. A string names an array of
+        the lines shows through the `color_map`; NaN where there is none. A string names an array of
         `Surface.face_data` or `Surface.vertex_data`. If there are as many faces as vertices, they are of
         faces. The settings `values_low` and `values_high` are the ends of the color map.
     tone_values : str or (V,) or (C,) array_like, optional

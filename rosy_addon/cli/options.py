@@ -17,7 +17,7 @@ from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..core.file_io import check_writable
-from ..core.settings import settings_of, stored_key
+from ..core.settings import settings_of
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from ..projection.up_axis import UP_AXIS_MATRIX
@@ -283,7 +283,7 @@ def int_between(low: int, high: int) -> Callable[[str], int]:
 def _parse_setting(text: str) -> tuple[str, Any]:
     """Return the name and the value of NAME=VALUE, converted to the type of the setting."""
     name, separator, value = text.partition("=")
-    name, settings = stored_key(name), settings_of(Look)
+    settings = settings_of(Look)
     if not separator:
         raise RosyError(f"--set {text}: expected NAME=VALUE")
     if name not in settings:

@@ -34,13 +34,13 @@ MESH_ONLY_DEFAULTS = {
     "view": DEFAULT_VIEW,
 }
 #: The same of the options that are only for pictures.
-PAGE_ONLY_DEFAULTS = dict.fromkeys(("plotter", "millimetres", "colours", "paper"))
+PAGE_ONLY_DEFAULTS = dict.fromkeys(("plotter", "millimeters", "colors", "paper"))
 #: What users give for a value, if it has another name.
 OPTION_NAMES = {
     "field": "FIELD",
     "orthographic": "--ortho",
-    "millimetres": "--mm",
-    "colours": "--colors",
+    "millimeters": "--mm",
+    "colors": "--colors",
 }
 
 SCENE_ONLY_DEFAULTS = dict.fromkeys(("object", "camera", "frames"))
@@ -227,13 +227,12 @@ def add_pen_options(parser: CommandParser) -> None:
     )
     add(
         "--mm",
-        dest="millimetres",
+        dest="millimeters",
         type=float_between(1.0, 1e5),
         metavar="WIDTH",
         help="width of the page in millimeters",
     )
     add(
-        "--colours",
         "--colors",
         metavar="C,C,...",
         help="SVG colors of the layers (#000000)",
@@ -245,10 +244,10 @@ def pen_of(options: Options, base: Pen) -> Pen:
     """Return the pen with the fields that the options override."""
     values = vars(options)
     overrides = {
-        name: values[name] for name in ("width", "millimetres", "plotter") if name in values
+        name: values[name] for name in ("width", "millimeters", "plotter") if name in values
     }
-    if "colours" in values:
-        overrides |= {"colours": values["colours"].split(","), "outline": None}
+    if "colors" in values:
+        overrides |= {"colors": values["colors"].split(","), "outline": None}
     if values.get("plotter"):
         overrides["paper"] = None
     elif "paper" in values:

@@ -417,10 +417,10 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
     """
     hue, position = None, None
     if colors_magnitude(look):
-        hue = map_colors(relative_magnitude(field, look), look.colour_map)
+        hue = map_colors(relative_magnitude(field, look), look.color_map)
     elif field.map_position is not None:
         position = field.map_position
-        hue = map_colors(np.nan_to_num(position), look.colour_map)
+        hue = map_colors(np.nan_to_num(position), look.color_map)
     elif look.hue == "families":
         hue = family_hues(field, images, look)
     if hue is None:

@@ -46,7 +46,7 @@ def noise_channel_count(look: Look) -> int:
     """Return the number of noise channels that a look convolves."""
     if has_flow(look):
         return FLOW_CHANNELS
-    return 3 if look.noise == "colour" else 1
+    return 3 if look.noise == "color" else 1
 
 
 def cycle_distance(look: Look) -> float:

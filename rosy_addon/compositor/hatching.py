@@ -156,11 +156,11 @@ def _render_one_ink(
     inks = inks_of(look)
     by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
-        ink = to_linear(map_colors(relative_magnitude(field, look), look.colour_map))
+        ink = to_linear(map_colors(relative_magnitude(field, look), look.color_map))
     else:
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
     if position is not None:
-        mapped = to_linear(map_colors(np.nan_to_num(position), look.colour_map))
+        mapped = to_linear(map_colors(np.nan_to_num(position), look.color_map))
         ink = np.where(np.isnan(position)[:, None], ink, mapped)
     transmittance = inks.complement_if_light(_line_tones(tone, modulation))
     if not by_magnitude and position is None:

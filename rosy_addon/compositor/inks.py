@@ -165,12 +165,12 @@ def inks_of(look: Look, families: int = 1) -> Inks:
     families : int
         Number of inks (see `ink_count`).
     """
-    paper = to_linear(from_hex(look.paper_colour))
-    light_code = look.ink_colour_light if look.ink_ramp else look.ink_colour
-    dark, light = (_ink_series(code, families) for code in (look.ink_colour, light_code))
+    paper = to_linear(from_hex(look.paper_color))
+    light_code = look.ink_color_light if look.ink_ramp else look.ink_color
+    dark, light = (_ink_series(code, families) for code in (look.ink_color, light_code))
     middle, mid_tone = (dark + light) / 2, 0.5
     if look.ink_ramp and look.ink_middle > 0:
-        middle, mid_tone = _ink_series(look.ink_colour_middle, families), look.ink_middle
+        middle, mid_tone = _ink_series(look.ink_color_middle, families), look.ink_middle
     inks = Inks(paper, dark, middle, light, mid_tone, is_light(look), 0.0)
     solid_ink = inks.light if inks.is_light else inks.dark
     return replace(inks, min_transmittance=float(np.max(inks.luminance_transmittance(solid_ink))))
@@ -179,8 +179,7 @@ def inks_of(look: Look, families: int = 1) -> Inks:
 def is_light(look: Look) -> bool:
     """Whether the ink is lighter than the paper, by luminance."""
     ink_luminance, paper_luminance = (
-        to_linear(from_hex(code)) @ LUMINANCE_WEIGHTS
-        for code in (look.ink_colour, look.paper_colour)
+        to_linear(from_hex(code)) @ LUMINANCE_WEIGHTS for code in (look.ink_color, look.paper_color)
     )
     return bool(ink_luminance > paper_luminance)
 

@@ -13,7 +13,6 @@ from ..annotation.singularity_settings import (
 )
 from ..core.errors import RosyError
 from ..core.settings import (
-    Choice,
     Stage,
     always,
     check_settings,
@@ -22,14 +21,13 @@ from ..core.settings import (
     number,
     settings_of,
     stage_key,
-    stored_key,
     switch,
 )
 
 
 def colors_magnitude(look: Any) -> bool:
     """Return whether the magnitude of the field drives the color of the lines."""
-    return look.magnitude in ("colour", "both")
+    return look.magnitude in ("color", "both")
 
 
 def colors_values(look: Any) -> bool:
@@ -53,7 +51,7 @@ def has_flow(look: Any) -> bool:
 
 
 def _can_flow(look: Any) -> bool:
-    return _has_streaks(look) and look.method in ("sheets", "ibfv") and look.noise == "grey"
+    return _has_streaks(look) and look.method in ("sheets", "ibfv") and look.noise == "gray"
 
 
 def _is_lit(look: Any) -> bool:
@@ -268,13 +266,13 @@ class Look:
         applies=lambda look: look.anchor == "surface",
     )
     noise: str = choice(
-        "grey",
+        "gray",
         "Color of the noise, and so of the streaks",
         {
-            "grey": "One channel",
-            "colour": "Three channels, each convolved separately: a plaid",
+            "gray": "One channel",
+            "color": "Three channels, each convolved separately: a plaid",
         },
-        panel="colour",
+        panel="color",
     )
     anchor: str = choice(
         "picture",
@@ -298,7 +296,7 @@ class Look:
             "color map",
         },
         option_labels={"one": "Single"},
-        **_shading("colour"),
+        **_shading("color"),
     )
     values_low: float = number(
         0.0,
@@ -307,7 +305,7 @@ class Look:
         "Number at the bottom of the color map. Above the number at the top, the map is inverted. Both 0: "
         "the range of the numbers",
         label="Bottom Value",
-        **_shading("colour", colors_values),
+        **_shading("color", colors_values),
     )
     values_high: float = number(
         0.0,
@@ -315,7 +313,7 @@ class Look:
         1e30,
         "Number at the top of the color map. Both 0: the range of the numbers",
         label="Top Value",
-        **_shading("colour", colors_values),
+        **_shading("color", colors_values),
     )
     seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
     gain: float = number(
@@ -355,32 +353,32 @@ class Look:
         "What the magnitude of the field controls",
         {
             "none": "Nothing",
-            "colour": "The color, through a color map",
+            "color": "The color, through a color map",
             "length": "The length of the streaks",
             "both": "Color and length",
         },
         label="Magnitude Drives",
         option_labels={"none": "Nothing"},
-        panel="colour",
+        panel="color",
     )
     magnitude_range: float = number(
         0.0,
         0.0,
         1e30,
         "Magnitude at the top of the color map and at full length. 0: the largest visible magnitude",
-        panel="colour",
+        panel="color",
         panel_label="Top Value",
         applies=lambda look: look.magnitude != "none",
     )
-    colour_map: str = choice(
+    color_map: str = choice(
         "viridis",
         "Perceptually uniform color map of the magnitude, or of numbers on the surface",
         {
             "viridis": "Dark blue through green to yellow",
             "magma": "Black through red to pale yellow",
-            "grey": "Black to white",
+            "gray": "Black to white",
         },
-        **_shading("colour", lambda look: colors_magnitude(look) or colors_values(look)),
+        **_shading("color", lambda look: colors_magnitude(look) or colors_values(look)),
     )
     shading: float = number(
         0.7,
@@ -472,14 +470,14 @@ class Look:
         panel="ink",
         applies=is_hatched,
     )
-    ink_colour: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
+    ink_color: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
     ink_ramp: bool = switch(
         False,
         "Blend the ink to a second color, the highlight color, from the shadows to the lights",
         label="Second Color",
         **_ink(_uses_ink_color),
     )
-    ink_colour_light: str = color(
+    ink_color_light: str = color(
         "#b06a3c",
         "Color of the ink in the lights",
         label="Highlight Color",
@@ -493,13 +491,13 @@ class Look:
         label="Midtone Position",
         **_ink(_uses_ink_ramp),
     )
-    ink_colour_middle: str = color(
+    ink_color_middle: str = color(
         "#6f2d4f",
         "Color of the ink at the midtone position",
         label="Midtone Color",
         **_ink(lambda look: _uses_ink_ramp(look) and look.ink_middle > 0),
     )
-    paper_colour: str = color("#ffffff", "Color of the paper", **_ink())
+    paper_color: str = color("#ffffff", "Color of the paper", **_ink())
     clear_paper: bool = switch(
         False, "Leave the paper transparent, so that only the ink is drawn", **_ink()
     )
@@ -573,21 +571,16 @@ class Look:
     def with_settings(self, settings: dict[str, Any]) -> Look:
         """Return the look with some settings changed.
 
-        Their names and options may be in American spelling, as in the interface; see `stored_key`.
-
         Raises
         ------
         RosyError
             If there is no such setting, or its value is not allowed.
         """
         known = settings_of(Look)
-        values = {stored_key(name): value for name, value in settings.items()}
-        for name, value in values.items():
+        for name in settings:
             if name not in known:
                 raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
-            if isinstance(known[name], Choice) and isinstance(value, str):
-                values[name] = stored_key(value)
-        return replace(self, **values)
+        return replace(self, **settings)
 
 
 def lic_key(look: Look) -> tuple[Any, ...]:

@@ -24,8 +24,8 @@ def color_scale_of(look: Look, color_range: tuple[float, float] | None) -> Color
     """
     low, high = (None, None) if color_range is None else color_range
     if colors_magnitude(look):
-        return ColorScale("Magnitude", look.colour_map, 0.0, high)
-    return ColorScale("", look.colour_map, low, high) if colors_values(look) else None
+        return ColorScale("Magnitude", look.color_map, 0.0, high)
+    return ColorScale("", look.color_map, low, high) if colors_values(look) else None
 
 
 def fixed_color_range(

@@ -25,7 +25,7 @@ class Light:
     kind : {"sun", "point"}
     vector : (3,) ndarray
         The unit direction to a sun, or the position of a point light.
-    colour : (3,) ndarray
+    color : (3,) ndarray
         Linear.
     strength : float
         Radiance of a white diffuse surface that faces the light; 1 is white. For a point light, at
@@ -34,7 +34,7 @@ class Light:
 
     kind: str
     vector: np.ndarray
-    colour: np.ndarray
+    color: np.ndarray
     strength: float
 
     def transformed(self, matrix: np.ndarray) -> Light:
@@ -116,7 +116,7 @@ def diffuse(
             irradiance = source.irradiance(gbuffer.position, gbuffer.normal)
             if visibility:
                 irradiance = irradiance * visibility[index]
-            light += irradiance[:, None] * source.colour
+            light += irradiance[:, None] * source.color
     return (1 - look.shading + look.shading * light).astype(np.float32)
 
 

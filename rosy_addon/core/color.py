@@ -13,7 +13,7 @@ _COLOR_MAPS = {
     "3fbc73 5ec962 84d44b addc30 d8e219 fde725",
     "magma": "000004 0a0822 1d1147 36106b 51127c 6a1c81 832681 9c2e7f b73779 d0416f e75263 "
     "f56b5c fc8961 fea772 fec488 fde2a3 fcfdbf",
-    "grey": "111111 ffffff",
+    "gray": "111111 ffffff",
 }
 
 #: Luminance weights of linear red, green and blue (Rec. 709). Their sum is 1.
@@ -28,7 +28,7 @@ def map_colors(values: np.ndarray, name: str) -> np.ndarray:
     ----------
     values : (P,) ndarray
         Clamped to 0 to 1.
-    name : {"viridis", "magma", "grey"}
+    name : {"viridis", "magma", "gray"}
 
     Returns
     -------

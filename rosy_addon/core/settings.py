@@ -19,9 +19,6 @@ from typing import Any
 
 from .errors import RosyError
 
-#: Stored keys are spelled in British English, the interface in American English.
-AMERICAN_SPELLING = {"Colour": "Color", "Grey": "Gray"}
-
 #: Values of switches on the command line.
 SWITCH_VALUES = {"true": True, "on": True, "1": True, "false": False, "off": False, "0": False}
 
@@ -218,23 +215,8 @@ def settings_of(cls: type) -> Mapping[str, Setting]:
 
 
 def title(key: str) -> str:
-    """Return a stored key as a label of the interface: "ink_colour" is "Ink Color"."""
-    label = key.replace("_", " ").title()
-    for british, american in AMERICAN_SPELLING.items():
-        label = label.replace(british, american)
-    return label
-
-
-def stored_key(text: str) -> str:
-    """Return the key under which a setting or an option is stored, given its American spelling too.
-
-    Examples
-    --------
-    >>> stored_key("ink_color"), stored_key("gray"), stored_key("gain")
-    ('ink_colour', 'grey', 'gain')
-    """
-    stored = {american.lower(): british.lower() for british, american in AMERICAN_SPELLING.items()}
-    return "_".join(stored.get(word, word) for word in text.split("_"))
+    """Return a key as a label of the interface: "ink_color" is "Ink Color"."""
+    return key.replace("_", " ").title()
 
 
 def check_settings(settings: Any) -> None:

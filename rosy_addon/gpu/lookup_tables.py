@@ -34,8 +34,8 @@ def palette(resources: GpuResources) -> Any:
 
 def color_map(resources: GpuResources, look: Look) -> Any:
     """Return the color map of a look."""
-    name = look.colour_map
-    return resources.lookup_texture("colours", name, lambda: color_stops(name)[None])
+    name = look.color_map
+    return resources.lookup_texture("colors", name, lambda: color_stops(name)[None])
 
 
 def thresholds(resources: GpuResources, look: Look) -> Any:

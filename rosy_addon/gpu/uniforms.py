@@ -176,7 +176,7 @@ def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
         {
             "light_kind": SUN_LIGHT if light.kind == "sun" else POINT_LIGHT,
             "light_vector": (*np.asarray(light.vector, dtype=float), 0.0),
-            "light_color": (*np.asarray(light.colour) * light.strength, 1.0),
+            "light_color": (*np.asarray(light.color) * light.strength, 1.0),
         }
         for light in lights_of(look, lights)
     ]

@@ -160,7 +160,7 @@ class LightSource(Protocol):
     kind : {"sun", "point"}
     vector : (3,) ndarray
         Unit direction to a sun, or position of a point light.
-    colour : (3,) ndarray
+    color : (3,) ndarray
         Linear RGB.
     strength : float
         Radiance of a white surface that faces the light; for a point light, at distance 1.
@@ -171,7 +171,7 @@ class LightSource(Protocol):
     @property
     def vector(self) -> np.ndarray: ...
     @property
-    def colour(self) -> np.ndarray: ...
+    def color(self) -> np.ndarray: ...
     @property
     def strength(self) -> float: ...
 
@@ -282,7 +282,7 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
     rotation = camera.view[:3, :3]
     tone = np.zeros(len(instance.surface.vertices))
     for light in lights:
-        strength = light.strength * float(LUMINANCE_WEIGHTS @ light.colour)
+        strength = light.strength * float(LUMINANCE_WEIGHTS @ light.color)
         if light.kind == "sun":
             tone += strength * lambert_tone(instance, rotation.T @ light.vector)
             continue

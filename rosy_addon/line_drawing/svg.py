@@ -69,17 +69,17 @@ class Pen:
     ----------
     width : float
         Full width of a stroke, in pixels of the camera.
-    colours : sequence of str
+    colors : sequence of str
         Colors of the families in turn: ``#rgb``, ``#rrggbb`` or a name of SVG, such as ``navy``. They
         repeat if there are more families.
     paper : str or None
         Color of the background; None for no background.
-    millimetres : float or None
+    millimeters : float or None
         Width of the page in millimeters. If None, the size of the page is in pixels.
     plotter : bool
         Draw lines of constant width, in an order that keeps the travel of the pen short.
     outline : str or None
-        Color of silhouettes, creases and borders. If None, they take colors from `colours`.
+        Color of silhouettes, creases and borders. If None, they take colors from `colors`.
 
     Raises
     ------
@@ -88,26 +88,26 @@ class Pen:
     """
 
     width: float = 1.0
-    colours: Sequence[str] = ("#000000",)
+    colors: Sequence[str] = ("#000000",)
     paper: str | None = "#ffffff"
-    millimetres: float | None = None
+    millimeters: float | None = None
     plotter: bool = False
     outline: str | None = None
 
     def __post_init__(self) -> None:
-        if not self.width > 0 or not self.colours:
+        if not self.width > 0 or not self.colors:
             raise RosyError("the pen needs a width above 0, and at least one color")
-        if self.millimetres is not None and not self.millimetres > 0:
+        if self.millimeters is not None and not self.millimeters > 0:
             raise RosyError("the page needs a width above 0")
         optional = (color for color in (self.paper, self.outline) if color is not None)
-        for color in (*self.colours, *optional):
+        for color in (*self.colors, *optional):
             if not _COLOR_CODE.fullmatch(color) and color.lower() not in COLOR_NAMES:
                 raise RosyError(f"{color!r} is not a color: use #rrggbb or a name of SVG")
 
     def family_colors(self, names: Sequence[str]) -> list[str]:
         """Return the color of each family, given `Strokes.names`."""
         return [
-            self.colours[index % len(self.colours)]
+            self.colors[index % len(self.colors)]
             if self.outline is None or name not in OUTLINE_KINDS
             else self.outline
             for index, name in enumerate(names)
@@ -141,9 +141,9 @@ def svg_text(
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     size = f'width="{camera.width}" height="{camera.height}"'
-    if pen.millimetres is not None:
-        height = pen.millimetres * camera.height / camera.width
-        size = f'width="{pen.millimetres:g}mm" height="{height:g}mm"'
+    if pen.millimeters is not None:
+        height = pen.millimeters * camera.height / camera.width
+        size = f'width="{pen.millimeters:g}mm" height="{height:g}mm"'
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<svg xmlns="http://www.w3.org/2000/svg" '

@@ -75,7 +75,7 @@ def _fast_look(look: Look) -> Look:
 
 def _over_background(rgba: np.ndarray, look: Look) -> np.ndarray:
     """Composite an (H, W, 4) linear picture over the paper of the look, or over `BACKGROUND`."""
-    background = to_linear(from_hex(look.paper_colour if is_hatched(look) else BACKGROUND))
+    background = to_linear(from_hex(look.paper_color if is_hatched(look) else BACKGROUND))
     alpha = rgba[..., 3:]
     opaque = np.ones_like(rgba)
     opaque[..., :3] = rgba[..., :3] * alpha + background * (1 - alpha)

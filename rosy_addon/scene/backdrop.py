@@ -39,7 +39,7 @@ def update_backdrops(scene: bpy.types.Scene) -> None:
     look = read_look(scene.rosy)
     if scene.rosy.backdrop and is_hatched(look):
         for camera in pictured_cameras(scene):
-            _add_backdrop(scene, camera, look.paper_colour)
+            _add_backdrop(scene, camera, look.paper_color)
 
 
 def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) -> None:

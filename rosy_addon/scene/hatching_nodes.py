@@ -98,7 +98,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
         Number of lines through a point.
     """
     layers, inks = layer_inks(look, line_count)
-    ramp = look.ink_colour_light if look.ink_ramp else look.ink_colour
+    ramp = look.ink_color_light if look.ink_ramp else look.ink_color
     values = {
         "Shading": look.shading,
         "Black": look.tone_black,
@@ -109,7 +109,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
         "Crispness": look.crispness,
         "Highlights": float(look.ink_ramp),
         "Highlight Color": (*to_linear(from_hex(ramp)).tolist(), 1.0),
-        "Paper": (*to_linear(from_hex(look.paper_colour)).tolist(), 1.0),
+        "Paper": (*to_linear(from_hex(look.paper_color)).tolist(), 1.0),
     }
     for layer, name in enumerate(INK_NAMES):
         values[name] = (*inks.dark[min(layer, len(inks.dark) - 1)].tolist(), 1.0)

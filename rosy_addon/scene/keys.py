@@ -173,7 +173,7 @@ def _key_colors(scene: bpy.types.Scene) -> KeyColors:
     """Return the colors of a key: dark plates for a background that is known to be dark."""
     look = read_look(scene.rosy)
     if scene.rosy.backdrop and is_hatched(look):
-        background = to_linear(from_hex(look.paper_colour))
+        background = to_linear(from_hex(look.paper_color))
     elif scene.render.film_transparent:
         return LIGHT_PLATES
     else:

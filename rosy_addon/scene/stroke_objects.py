@@ -53,14 +53,14 @@ def read_stroke_style(settings: bpy.types.PropertyGroup) -> StrokeStyle:
 
 def read_pen(settings: bpy.types.PropertyGroup) -> Pen:
     """Return the pen that the properties ``scene.rosy.strokes`` hold."""
-    ink = to_hex(settings.ink_colour)
+    ink = to_hex(settings.ink_color)
     return Pen(
         width=float(f"{settings.width:.7g}"),
-        colours=[to_hex(color) for color in PALETTE] if settings.inks == "FAMILIES" else [ink],
+        colors=[to_hex(color) for color in PALETTE] if settings.inks == "FAMILIES" else [ink],
         paper=None if settings.plotter or not settings.paper else "#ffffff",
-        millimetres=settings.page or None,
+        millimeters=settings.page or None,
         plotter=settings.plotter,
-        outline=to_hex(settings.outline_colour) if settings.inks == "FAMILIES" else ink,
+        outline=to_hex(settings.outline_color) if settings.inks == "FAMILIES" else ink,
     )
 
 

@@ -75,7 +75,7 @@ TEXTURE_SETTINGS = (
         "density",
     ),
     *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
-    *("magnitude", "magnitude_range", "values_low", "values_high", "colour_map"),
+    *("magnitude", "magnitude_range", "values_low", "values_high", "color_map"),
     *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 

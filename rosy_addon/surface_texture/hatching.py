@@ -145,7 +145,7 @@ def lit_ink(
         position = on.mesh.points_at(triangle, weights)
         normal = on.mesh.shading_normals_at(triangle, weights)
         irradiance = sum(
-            light.irradiance(position, normal) * float(light.colour @ LUMINANCE_WEIGHTS)
+            light.irradiance(position, normal) * float(light.color @ LUMINANCE_WEIGHTS)
             for light in lights
         )
         tone = apply_tone_curve(1 - look.shading + look.shading * irradiance, look)
@@ -210,7 +210,7 @@ def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     args = surface_paper_grain_args(look)
     args.pop("channels")
-    noise = texel_noise(on, replace(look, noise="colour", **args))
+    noise = texel_noise(on, replace(look, noise="color", **args))
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]

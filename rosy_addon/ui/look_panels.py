@@ -23,7 +23,7 @@ from .sidebar import (
 #: Labels of the panels of a look's settings by their keys, from top to bottom.
 LOOK_PANELS = {
     "streaks": "Streaks",
-    "colour": "Color",
+    "color": "Color",
     "light": "Light",
     "tone": "Tone",
     "ink": "Ink",

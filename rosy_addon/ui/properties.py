@@ -206,10 +206,10 @@ class RosyStrokes(bpy.types.PropertyGroup):
         "inks": bpy.props.EnumProperty(
             name="Inks", description="Inks of the families", items=INK_ITEMS
         ),
-        "ink_colour": bpy.props.FloatVectorProperty(
+        "ink_color": bpy.props.FloatVectorProperty(
             name="Ink", description="Color of the ink", **COLOR_ARGUMENTS
         ),
-        "outline_colour": bpy.props.FloatVectorProperty(
+        "outline_color": bpy.props.FloatVectorProperty(
             name="Outline Ink",
             description="Color of silhouettes, creases and borders",
             **COLOR_ARGUMENTS,

@@ -22,7 +22,7 @@ STROKE_PANELS = {
     "Density": panel_settings(StrokeStyle, "density"),
     "Ends": panel_settings(StrokeStyle, "ends"),
     "Singularities": panel_settings(StrokeStyle, "singularities"),
-    "Inks": ("inks", "ink_colour", "outline_colour"),
+    "Inks": ("inks", "ink_color", "outline_color"),
 }
 
 
@@ -76,8 +76,8 @@ def _draw_stroke_settings(
     column = layout.column()
     descriptions = settings_of(StrokeStyle)
     active = {
-        "outline_colour": settings.inks != "ONE" and settings.outline,
-        "ink_colour": settings.inks == "ONE",
+        "outline_color": settings.inks != "ONE" and settings.outline,
+        "ink_color": settings.inks == "ONE",
         "paper": not settings.plotter,
     }
     for name in names:

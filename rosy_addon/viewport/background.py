@@ -32,7 +32,7 @@ def view_background(
     """
     if not context.scene.rosy.backdrop or not is_hatched(look):
         return None
-    color = tuple(to_linear(from_hex(look.paper_colour)).tolist())
+    color = tuple(to_linear(from_hex(look.paper_color)).tolist())
     if context.region_data.view_perspective != "CAMERA":
         return Background(color)
     space = context.space_data

@@ -490,7 +490,7 @@ def _picture_key(view_input: ViewInput) -> Hashable:
         view_input.look,
         None if planes is None else planes.tobytes(),
         tuple(
-            (light.kind, tuple(light.vector), tuple(light.colour), light.strength)
+            (light.kind, tuple(light.vector), tuple(light.color), light.strength)
             for light in view_input.lights
         ),
         view_input.reference,

@@ -317,7 +317,7 @@ MAY_CHANGE: dict[str, tuple[str, ...]] = {
     "field_compare": (
         "meshes/SELECTED/attributes/Difference",
         "scenes/SCENE/rosy/color_attribute",
-        *(f"scenes/SCENE/rosy/look/{name}" for name in ("hue", "values_*", "colour_map")),
+        *(f"scenes/SCENE/rosy/look/{name}" for name in ("hue", "values_*", "color_map")),
     ),
     "field_store": _FIELD,
     "field_import": _FIELD,

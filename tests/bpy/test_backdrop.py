@@ -17,7 +17,7 @@ from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings
 from scenes import contents, pixels, render
 
-PAPER = Look(ink="hatch", paper_colour="#c08040")
+PAPER = Look(ink="hatch", paper_color="#c08040")
 
 
 def backdrops():
@@ -97,6 +97,6 @@ def test_renders_show_paper_all_over_the_background(hatched, tmp_path, kind):
     assert 0.3 < background.mean() < 0.95
     np.testing.assert_allclose(
         rendered[background],
-        [*to_linear(from_hex(PAPER.paper_colour)), 1.0] * np.ones((background.sum(), 1)),
+        [*to_linear(from_hex(PAPER.paper_color)), 1.0] * np.ones((background.sum(), 1)),
         atol=1e-3,
     )

@@ -141,12 +141,12 @@ def test_options_override_the_settings_of_the_scene(with_stroke_settings, tmp_pa
     scene = bpy.context.scene
     settings = scene.rosy.strokes
     options = ["--distance", "0.5", "--no-tone", "--taper", "0", "--overshoot", "0"]
-    options += ["--plotter", "--colours", "red,blue"]
+    options += ["--plotter", "--colors", "red,blue"]
     process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", *options, verb="strokes")
     assert process.returncode == 0, process.stderr
     settings.unit, settings.distance, settings.tone = "world", 0.5, False
     settings.taper, settings.overshoot = 0.0, 0.0
-    pen = Pen(width=1.7, colours=["red", "blue"], paper=None, plotter=True)
+    pen = Pen(width=1.7, colors=["red", "blue"], paper=None, plotter=True)
     draw_strokes(scene, kind="FILE", path=tmp_path / "button.svg", pen=pen)
     assert (tmp_path / "out.svg").read_bytes() == (tmp_path / "button.svg").read_bytes()
 

@@ -98,7 +98,7 @@ def test_settings_in_a_file(scene, tmp_path):
         ("families", "none", False, False),
         ("values", "none", True, True),
         ("values", "length", True, True),
-        ("values", "colour", True, False),
+        ("values", "color", True, False),
     ],
 )
 def test_when_the_panel_shows_the_attribute(scene, wall, hue, magnitude, shown, active):

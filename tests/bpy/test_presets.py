@@ -12,7 +12,7 @@ from rosy.rosy_addon.scene.look_properties import read_look
 from rosy.rosy_addon.scene.paths import user_presets_folder
 from rosy.rosy_addon.ui import preset_library
 
-LOOK = Look(ink="hatch", gain=1.23456789, guiding_angle=0.1, ink_colour="#ABCDEF", seed=7)
+LOOK = Look(ink="hatch", gain=1.23456789, guiding_angle=0.1, ink_color="#ABCDEF", seed=7)
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_a_missing_preset(scene, user_folder):
     scene.rosy.preset = "mine"
     assert read_look(scene.rosy) == before
     scene.rosy.preset = "plaid"
-    assert read_look(scene.rosy).noise == "colour"
+    assert read_look(scene.rosy).noise == "color"
     with pytest.raises(TypeError):
         scene.rosy.preset = "mine"
 

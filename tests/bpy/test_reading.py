@@ -421,7 +421,7 @@ def test_lights(scene):
     np.testing.assert_allclose(lights[2].strength, 1.0, rtol=1e-6)
     np.testing.assert_allclose(lights[3].vector, (0, 0, 1), atol=1e-6)
     np.testing.assert_allclose(lights[2].vector, (0, 0, -2), atol=1e-6)
-    np.testing.assert_allclose(lights[2].colour, (1, 0.5, 0.25))
+    np.testing.assert_allclose(lights[2].color, (1, 0.5, 0.25))
 
 
 def test_large_meshes_are_read_quickly(scene):

@@ -120,7 +120,7 @@ def test_a_change_runs_all_stages(scene, camera, monkey, run_stages, change):
         ("length", 20, ["lic_lengths"]),
         ("seed", 3, ["lic_lengths"]),
         ("guiding_angle", 0.4, ["lic_lengths"]),
-        ("noise", "colour", ["lic_lengths"]),
+        ("noise", "color", ["lic_lengths"]),
         ("magnitude", "both", ["lic_lengths"]),
         ("method", "members", ["lic_lengths"]),
         ("crease_angle", 0.05, ["surface_pixel_field", "lic_lengths"]),

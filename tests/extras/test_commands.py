@@ -174,7 +174,7 @@ def _seek(gif, number):
 
 def test_film_has_one_camera_and_one_range(growing):
     """The largest step fills the frame. The range is the largest magnitude of all steps."""
-    look = Look(length=8, magnitude="colour")
+    look = Look(length=8, magnitude="color")
     steps = list_steps(growing)[::-1]
     views = list(Film(SimulationFields(steps), look, (30.0, 20.0), (60, 50)).views())
     assert len({id(view.camera) for view in views}) == 1

@@ -58,7 +58,7 @@ def test_pictures_have_one_camera_and_one_range(surface):
     """The magnitude of one field is twice that of the other: both get the color map of the larger one."""
     one = rf.along_axis(surface, (0, 0, 1), degree=2).with_magnitude("unit")
     fields = {"one": one, "two": one.with_magnitude(2.0)}
-    look = {"magnitude": "colour", "colour_map": "grey", "gain": 0, "shading": 0, "hue": "one"}
+    look = {"magnitude": "color", "color_map": "gray", "gain": 0, "shading": 0, "hue": "one"}
     figure = rf.figure(fields, singularity_dots="none", color_label="speed (m/s)", **look, **SMALL)
     bar = next(axes for axes in figure.axes if axes.get_ylabel() == "speed (m/s)")
     assert bar.get_ylim() == (0, 2)
@@ -73,7 +73,7 @@ def test_pictures_have_one_camera_and_one_range(surface):
 def test_numbers_as_colors(surface):
     """The height over two fields, of which one has half of it: one range, whose name is the label."""
     one, height = rf.form(surface), surface.vertices[:, 2]
-    figure = rf.figure([one, one], color_values=[height, height / 2], colour_map="magma", **SMALL)
+    figure = rf.figure([one, one], color_values=[height, height / 2], color_map="magma", **SMALL)
     bar = next(axes for axes in figure.axes if not axes.images and axes.axison)
     assert np.allclose(bar.get_ylim(), (-2.5, 2.5)) and bar.get_ylabel() == ""
     with pytest.raises(rf.RosyError, match="1 array for 2 fields"):

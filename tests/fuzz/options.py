@@ -174,6 +174,6 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "caption": _text,
     "scale_bar": _text,
     "color_label": _text,
-    "millimetres": _number(1, 1e5, (200.0,)),
-    "colours": _colors,
+    "millimeters": _number(1, 1e5, (200.0,)),
+    "colors": _colors,
 }

@@ -25,7 +25,7 @@ def preset_bytes(rng: Generator) -> bytes:
                 name = list(look)[rng.integers(len(look))]
                 look[name] = _OTHER_VALUES[rng.integers(len(_OTHER_VALUES))]
         case 1:
-            look[("colour", "unknown", "", "a\x1b]0;b")[rng.integers(4)]] = 1
+            look[("color", "unknown", "", "a\x1b]0;b")[rng.integers(4)]] = 1
         case 2:
             key = ("name", "description", "look", "more")[rng.integers(4)]
             preset[key] = _OTHER_VALUES[rng.integers(len(_OTHER_VALUES))]

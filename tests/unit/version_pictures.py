@@ -30,7 +30,7 @@ def draw() -> dict[str, np.ndarray]:
     pictures = {"plane": compose_planar(pair_angle(*pixel_centers(96), 96, 4), 4, look)}
     shapes = {
         "torus": (torus(), "curvature", 4, look),
-        "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="colour")),
+        "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="color")),
         "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0, flow_phase=0.3)),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),

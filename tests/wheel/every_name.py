@@ -86,7 +86,7 @@ def pictures(cube: rf.Surface, field: rf.Field, folder: Path) -> None:
     assert array.shape == linear.shape == (32, 48, 4)
     tone: NDArray[np.float32] = rf.ambient_occlusion(cube, directions=16)
     rf.render(cube, tone_values=tone, size=(16, 16), tone_image=None, workers=1)
-    rf.render(cube, color_values=tone, size=(16, 16), colour_map="magma")
+    rf.render(cube, color_values=tone, size=(16, 16), color_map="magma")
     drawing: rf.Drawing = rf.strokes(cube, field, size=(48, 48), spacing=8, colors=["navy"])
     drawing.save(folder / "cube.svg")
     svg: str = drawing.svg

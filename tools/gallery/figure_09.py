@@ -43,7 +43,7 @@ def write() -> None:
     )
     names = {
         "none": "(a) magnitude not shown",
-        "colour": "(b) as colour",
+        "color": "(b) as color",
         "length": "(c) as length of the streaks",
         "both": "(d) as both",
     }
@@ -69,7 +69,7 @@ def _measure(page: Page) -> None:
     )
     cells = (SIZE // 10, 10, SIZE // 10, 10)
     luminance = {}
-    for mapping in ("none", "colour", "length", "both"):
+    for mapping in ("none", "color", "length", "both"):
         rgba = compose_field(
             field, DEGREE, SIZE, MEASURED.with_settings({"magnitude": mapping})
         ).rgba
@@ -88,7 +88,7 @@ def _measure(page: Page) -> None:
     rows = []
     for mapping, label in (
         ("none", "not shown"),
-        ("colour", "colour"),
+        ("color", "color"),
         ("length", "length"),
         ("both", "both"),
     ):

@@ -29,8 +29,8 @@ from .solid import (
 )
 
 WIDTH = 402
-PLAID = SOLID.with_settings({"noise": "colour", "grain": 3.0, "gain": 3.0, "length": 60})
-MAGNITUDE = SOLID.with_settings({"magnitude": "colour", "gain": 2.0})
+PLAID = SOLID.with_settings({"noise": "color", "grain": 3.0, "gain": 3.0, "length": 60})
+MAGNITUDE = SOLID.with_settings({"magnitude": "color", "gain": 2.0})
 
 
 def write() -> None:
@@ -54,13 +54,13 @@ def write() -> None:
     }
     shots = (
         ("Suzanne", SOLID, (-28, 8), 380, "(a) Suzanne, 4-RoSy"),
-        ("Suzanne", PLAID, (-28, 8), 380, "(b) the same, coloured noise"),
+        ("Suzanne", PLAID, (-28, 8), 380, "(b) the same, colored noise"),
         ("triple torus", SOLID, (14, 52), 330, "(c) triple torus, 4-RoSy"),
-        ("triple torus", PLAID, (14, 52), 330, "(d) the same, coloured noise"),
-        ("knot", MAGNITUDE, (0, 74), 402, "(e) trefoil knot, 4-RoSy, magnitude as colour"),
+        ("triple torus", PLAID, (14, 52), 330, "(d) the same, colored noise"),
+        ("knot", MAGNITUDE, (0, 74), 402, "(e) trefoil knot, 4-RoSy, magnitude as color"),
         ("sphere", SOLID, (20, 20), 402, "(f) sphere, 6-RoSy with twelve singularities"),
         ("torus", SOLID, (20, 42), 290, "(g) torus, 6-RoSy"),
-        ("torus", PLAID, (20, 42), 290, "(h) the same, coloured noise"),
+        ("torus", PLAID, (20, 42), 290, "(h) the same, colored noise"),
     )
     panels, rows = [], []
     for name, look, angles, height, label in shots:

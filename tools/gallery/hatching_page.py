@@ -46,16 +46,16 @@ INKS = {
     "hue families, of light ink": ("white-on-black", {"hue": "families"}),
     "ink_ramp, from blue to ochre": (
         "engraving",
-        {"ink_ramp": True, "ink_colour": "#141a3c", "ink_colour_light": "#b0703c"},
+        {"ink_ramp": True, "ink_color": "#141a3c", "ink_color_light": "#b0703c"},
     ),
     "ink_ramp, through a third ink": (
         "charcoal",
         {
             "ink_ramp": True,
-            "ink_colour": "#14213c",
+            "ink_color": "#14213c",
             "ink_middle": 0.45,
-            "ink_colour_middle": "#8c2f45",
-            "ink_colour_light": "#d29a3c",
+            "ink_color_middle": "#8c2f45",
+            "ink_color_light": "#d29a3c",
         },
     ),
 }

@@ -20,7 +20,7 @@ WIDTH, HEIGHT = 1200, 600
 def write() -> None:
     """Draw and save the picture."""
     monkey, rings, ring = suzanne(), triple_torus(), torus()
-    looks = {"grey": SOLID.with_settings({"gain": 2.8}), "plaid": PLAID}
+    looks = {"gray": SOLID.with_settings({"gain": 2.8}), "plaid": PLAID}
     shots = (
         (
             rings,
@@ -32,11 +32,11 @@ def write() -> None:
         (
             monkey,
             smoothed_a_little(monkey, curvature_field(monkey, 4)),
-            "grey",
+            "gray",
             (-24, 8),
             (338, 4, 604, 540),
         ),
-        (ring, around_field(ring, 6), "grey", (24, 44), (806, 268, 394, 332)),
+        (ring, around_field(ring, 6), "gray", (24, 44), (806, 268, 394, 332)),
     )
     canvas = Image.new("RGB", (WIDTH, HEIGHT), (255, 255, 255))
     for surface, field, name, angles, (left, top, width, height) in shots:

@@ -155,7 +155,7 @@ def on_paper(rgba: np.ndarray, look: Look) -> np.ndarray:
     if look.ink != "hatch":
         return rgba
     alpha = rgba[..., 3:]
-    color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_colour)) * (1 - alpha)
+    color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_color)) * (1 - alpha)
     return np.concatenate([color, np.ones_like(alpha)], axis=-1)
 
 

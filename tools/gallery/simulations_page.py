@@ -28,7 +28,7 @@ def write() -> None:
         path = Path(folder) / "beam.vtu"
         _beam().save(path)
         words = ["render", str(path), "-o", str(PICTURE)]
-        words += ["--array", "stress", "--size", "640x360", "--set", "magnitude=colour"]
+        words += ["--array", "stress", "--size", "640x360", "--set", "magnitude=color"]
         assert main(words) == 0
 
 

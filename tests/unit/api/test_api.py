@@ -251,7 +251,7 @@ def test_numbers_as_colors(error_of):
     ):
         np.testing.assert_array_equal(corner_numbers(surface, numbers), expected)
     keywords = {"view": (0, 90), "size": (16, 16), "orthographic": True, "gain": 0.0}
-    colors = {"color_values": [0, 1], "colour_map": "grey", "shading": 0.0}
+    colors = {"color_values": [0, 1], "color_map": "gray", "shading": 0.0}
     picture = np.asarray(rf.render(quad, **keywords, **colors))
     assert set(np.unique(picture[picture[..., 3] == 255][:, :3])) >= {17, 255}
     for wrong, expected in (

@@ -46,7 +46,7 @@ def test_the_command_draws_the_same_texture(tmp_path, words, options):
 def test_numbers_as_colors(error_of):
     """u, from 0 to 1 between the borders of the chart, is the gray of the texels."""
     square = rf.Surface(*SQUARE, name="square", uv=UV)
-    flat = {"gain": 0.0, "colour_map": "grey", "values_high": 1.0, "margin": 0, "size": 64}
+    flat = {"gain": 0.0, "color_map": "gray", "values_high": 1.0, "margin": 0, "size": 64}
     texture = rf.texture(square, rf.along_uv(square, 2), color_values=square.vertices[:, 0], **flat)
     gray = np.asarray(texture.tiles[1001])[32, 4:60, 0]
     expected = ((np.arange(4, 60) + 0.5) / 64 - 0.05) / 0.9
@@ -94,7 +94,7 @@ def test_hatching_for_one_light():
     """The ink of a texture has the tone of the light; without a light it has thresholds of all tones."""
     square = rf.Surface(*SQUARE, name="square", uv=np.array(SQUARE[0])[:, :2])
     field = rf.along_axis(square, (1, 0.4, 0), 4)
-    settings = {"ink": "hatch", "grain": 3, "shading": 1, "ink_colour": "#000000"}
+    settings = {"ink": "hatch", "grain": 3, "shading": 1, "ink_color": "#000000"}
     thresholds = rf.texture(square, field, size=512, margin=0, **settings).tiles[1001]
     red, green = (np.asarray(thresholds)[..., channel].ravel() / 255 for channel in (0, 1))
     np.testing.assert_allclose(np.quantile(red, [0.2, 0.5, 0.8]), [0.2, 0.5, 0.8], atol=0.03)

@@ -495,10 +495,10 @@ def painted(tmp_path_factory):
     """A ball that is dark on the left and light on the right, in its colors and in a number."""
     ball = icosphere(4)
     right = ball.vertices[:, 0] > 0
-    grey = np.where(right, 230, 60)
-    colours = dict.fromkeys(("red", "green", "blue"), grey)
+    gray = np.where(right, 230, 60)
+    colors = dict.fromkeys(("red", "green", "blue"), gray)
     path = tmp_path_factory.mktemp("painted") / "ball.ply"
-    return write_ply(path, ball, **colours, cavity=np.where(right, 0.8, 0.1))
+    return write_ply(path, ball, **colors, cavity=np.where(right, 0.8, 0.1))
 
 
 @pytest.mark.slow
@@ -517,7 +517,7 @@ def test_tones_of_vertices(painted, tmp_path):
 
 def test_colors_of_vertices(painted, tmp_path):
     out = tmp_path / "a.png"
-    words = ["--generate", "axis", "--color-values", "cavity", "--set", "colour_map=grey"]
+    words = ["--generate", "axis", "--color-values", "cavity", "--set", "color_map=gray"]
     flat = ["--set", "gain=0", "--set", "shading=0", "--size", "128x128"]
     assert main(["render", str(painted), *words, *flat, "-o", str(out), "--view", "0,0"]) == 0
     left, right = halves_of(out)

@@ -62,7 +62,7 @@ def mapped(position, name="viridis"):
 @pytest.mark.parametrize("name", ["viridis", "magma"])
 def test_colors_are_those_of_interpolated_numbers(look, name):
     """x is linear on the triangles of a ball, so at each pixel the number is its x."""
-    colors, x = drawn([of_vertices(BALL, BALL.vertices[:, 0])], replace(look, colour_map=name))
+    colors, x = drawn([of_vertices(BALL, BALL.vertices[:, 0])], replace(look, color_map=name))
     low, high = BALL.vertices[:, 0].min(), BALL.vertices[:, 0].max()
     np.testing.assert_allclose(colors, mapped((x - low) / (high - low), name), atol=2e-3)
 
@@ -109,7 +109,7 @@ def test_one_number_has_the_color_at_the_bottom():
     np.testing.assert_array_equal(colors, np.broadcast_to(mapped([0.0]), colors.shape))
 
 
-@pytest.mark.parametrize("look", [replace(FLAT, gain=2.5), replace(INK, ink_colour="#204060")])
+@pytest.mark.parametrize("look", [replace(FLAT, gain=2.5), replace(INK, ink_color="#204060")])
 def test_pixels_without_a_number(look):
     """They are as with one hue, and do not count for the range."""
     values = BALL.vertices[:, 0].copy()
@@ -129,15 +129,15 @@ def test_pixels_without_a_number(look):
 def test_streaks_darken_and_lighten_the_color():
     """The hue is that of the map: the ratios of display values do not change."""
     values = np.full(len(BALL.corner_vertex), 0.5)
-    look = replace(FLAT, gain=1.0, length=12, values_low=0.0, values_high=1.0, colour_map="grey")
+    look = replace(FLAT, gain=1.0, length=12, values_low=0.0, values_high=1.0, color_map="gray")
     colors, _ = drawn([numbered(BALL, values)], look)
-    gray = to_linear(color_stops("grey").mean(axis=0))[0]
+    gray = to_linear(color_stops("gray").mean(axis=0))[0]
     assert colors.std() > 0.02 and abs(np.median(colors) - gray) < 0.06
 
 
 def test_the_magnitude_has_precedence():
     instance = of_vertices(BALL, BALL.vertices[:, 0])
-    with_magnitude = replace(FLAT, magnitude="colour")
+    with_magnitude = replace(FLAT, magnitude="color")
     colors, _ = drawn([instance], with_magnitude)
     expected, _ = drawn([replace(instance, color_values=None)], replace(with_magnitude, hue="one"))
     np.testing.assert_array_equal(colors, expected)

@@ -42,7 +42,7 @@ LOOK = Look(
     shading=0.5,
     grain=3.0,
     crispness=1.0,
-    ink_colour="#000000",
+    ink_color="#000000",
     layers=1,
 )
 
@@ -257,10 +257,10 @@ def test_uneven_lines_have_the_mean_width(breaks, paper_grain):
 )
 def test_flat_tones(shading, degree):
     look = replace(
-        load_preset("engraving").look, light="scene", shading=shading, paper_colour="#ffffff"
+        load_preset("engraving").look, light="scene", shading=shading, paper_color="#ffffff"
     )
     rgba = picture(wall_instance(degree, 0.4), camera_above(), look)
-    ink = to_linear(from_hex(look.ink_colour))[0]
+    ink = to_linear(from_hex(look.ink_color))[0]
     tone = (rgba[..., 0] - ink) / (1 - ink)
     blurred = gaussian_filter(tone, 16)[40:-40, 40:-40]
     assert np.abs(blurred - (1 - shading)).max() <= 0.04

@@ -154,7 +154,7 @@ def test_presets_reproduce_a_ramp(name):
     gbuffer = project([instance], camera)
     target_tone = np.clip(diffuse(gbuffer, look).mean(axis=1), 0, 1)
     assert target_tone.min() < 1 - look.shading + 0.05 and target_tone.max() > 0.97
-    paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
+    paper, ink = (to_linear(from_hex(code)) for code in (look.paper_color, look.ink_color))
     # Lightness from the darker of ink and paper to the lighter, in the channel of largest contrast.
     channel = int(np.argmax(np.abs(paper - ink)))
     darker, lighter = sorted((paper[channel], ink[channel]))
@@ -447,24 +447,24 @@ def test_undefined_faces_keep_the_tone_in_color(kind):
 
 
 COLORED_INKS = {
-    "ramp": {"ink_ramp": True, "ink_colour": "#201848"},
+    "ramp": {"ink_ramp": True, "ink_color": "#201848"},
     "ramp, light": {
         "ink_ramp": True,
-        "ink_colour": "#c08050",
-        "ink_colour_light": "#fff0c0",
-        "paper_colour": "#182028",
+        "ink_color": "#c08050",
+        "ink_color_light": "#fff0c0",
+        "paper_color": "#182028",
     },
     "families": {"hue": "families"},
-    "families, colored": {"hue": "families", "ink_colour": "#204890", "paper_colour": "#f4ecd8"},
-    "families, light": {"hue": "families", "ink_colour": "#f0e8d0", "paper_colour": "#101418"},
+    "families, colored": {"hue": "families", "ink_color": "#204890", "paper_color": "#f4ecd8"},
+    "families, light": {"hue": "families", "ink_color": "#f0e8d0", "paper_color": "#101418"},
     "families, ramp": {"hue": "families", "ink_ramp": True},
-    "ramp with a third ink": {"ink_ramp": True, "ink_colour": "#201848", "ink_middle": 0.35},
+    "ramp with a third ink": {"ink_ramp": True, "ink_color": "#201848", "ink_middle": 0.35},
 }
 
 
 def test_a_third_ink_is_between_the_other_two():
     look = Look(ink="hatch", ink_ramp=True, ink_middle=0.25)
-    codes = [look.ink_colour, look.ink_colour_middle, look.ink_colour_light]
+    codes = [look.ink_color, look.ink_color_middle, look.ink_color_light]
     dark, middle, light = (to_linear(from_hex(code)) for code in codes)
     tones = np.array([0.0, 0.125, 0.25, 0.625, 1.0], dtype=np.float32)
     actual = inks_of(look).ink_at_tone(np.zeros(5), tones)
@@ -500,7 +500,7 @@ def test_required_coverage_has_the_target_luminance(kind):
 def test_inks_of_families_differ_visibly():
     for code in ("#101010", "#8a2020", "#f4f0e8"):
         paper = "#000000" if code == "#f4f0e8" else "#ffffff"
-        look = replace(INK, ink_colour=code, paper_colour=paper, hue="families")
+        look = replace(INK, ink_color=code, paper_color=paper, hue="families")
         inks = inks_of(look, 6)
         np.testing.assert_array_equal(inks.dark[0], to_linear(from_hex(code)))
         display = to_display(inks.dark)
@@ -521,7 +521,7 @@ def test_inks_swap_ranks_without_a_seam(degree):
         np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
     ).all()
     assert line_ink_indices(field, replace(look, hue="one")) is None
-    assert line_ink_indices(field, replace(look, magnitude="colour")) is None
+    assert line_ink_indices(field, replace(look, magnitude="color")) is None
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
@@ -537,7 +537,7 @@ def test_families_keep_their_inks_at_any_guiding_angle():
 
 def test_ink_is_colored_by_magnitude():
     """Pixels covered by ink have the colors of the color map."""
-    look = replace(INK, magnitude="colour", colour_map="grey", clear_paper=True, shading=0.5)
+    look = replace(INK, magnitude="color", color_map="gray", clear_paper=True, shading=0.5)
     surface = ball()
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     height = surface.vertices[surface.corner_vertex[surface.face_start[:-1]], 2]
@@ -545,8 +545,8 @@ def test_ink_is_colored_by_magnitude():
     field = replace(field, vectors=vectors * (1.5 + height)[:, None])
     rgba = render(MeshInstance(surface, np.eye(4), field), make_camera(), look)
     row = np.nonzero(rgba[..., 3] > 0.5)[0]
-    grey = rgba[..., 0][rgba[..., 3] > 0.5]
-    assert np.corrcoef(row, to_display(grey))[0, 1] > 0.95
+    gray = rgba[..., 0][rgba[..., 3] > 0.5]
+    assert np.corrcoef(row, to_display(gray))[0, 1] > 0.95
 
 
 # --- overshoot ---------------------------------------------------------------------------------------
@@ -565,7 +565,7 @@ def render_half_dark_wall(method, overshoot):
     instance = MeshInstance(wall, np.eye(4), field, SurfaceTone(uv, image))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2 * HALF)
     look = replace(
-        INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_colour="#000000"
+        INK, tone="image", overshoot=overshoot, method=method, seed=5, ink_color="#000000"
     )
     # The image of tones repeats, so the last column is dark and is left out.
     return render(instance, camera, look)[..., :-1, 0]
@@ -817,7 +817,7 @@ def test_instances_have_different_noise():
 
 
 def test_clear_paper_shows_only_ink():
-    look = replace(INK, clear_paper=True, ink_colour="#204060")
+    look = replace(INK, clear_paper=True, ink_color="#204060")
     clear, full = (
         render(make_instance(ball()), make_camera(), look),
         render(make_instance(ball()), make_camera(), replace(look, clear_paper=False)),
@@ -890,7 +890,7 @@ def test_outlines_are_drawn_in_ink():
     )
     changed = np.abs(lined - bare)[..., 0] > 1e-3
     assert changed.sum() > 500
-    ink = to_linear(from_hex(plain.ink_colour))
+    ink = to_linear(from_hex(plain.ink_color))
     whole = lined[..., 3] == 1
     darkest = lined[changed & whole].min(axis=0)[:3]
     np.testing.assert_allclose(darkest, ink, atol=1e-3)

@@ -334,7 +334,7 @@ def test_undefined_pixels_are_gray():
 @pytest.mark.parametrize(
     "settings",
     [
-        {"noise": "colour"},
+        {"noise": "color"},
         {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
         {"anchor": "surface", "flow": 1.0},
         {"magnitude": "both"},

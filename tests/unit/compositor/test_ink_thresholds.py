@@ -201,7 +201,7 @@ def test_the_spread_of_averaged_pixels():
 def test_smaller_versions_of_a_texture_keep_the_tone(count):
     """The ink of means of thresholds has the mean tone, however many thresholds are averaged."""
     thresholds, _ = random_lines(2, 204_800)
-    look = replace(INK, ink_colour="#000000", crispness=1.0)
+    look = replace(INK, ink_color="#000000", crispness=1.0)
     pixels = threshold_pixels(thresholds).reshape(-1, count, 4).mean(axis=1)
     for tone in (0.0, 0.1, 0.3, 0.5, 0.8, 1.0):
         color, coverage = ink_of_thresholds(pixels, np.full(len(pixels), tone), look, 2)

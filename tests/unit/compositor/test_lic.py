@@ -286,12 +286,12 @@ def test_magnitude_drives_the_length_of_streaks(method):
 
 def test_color_noise_has_three_channels():
     angles = pair_angle(*pixel_centers(128), 128, 4)
-    picture = compose_planar(angles, 4, plain(noise="colour"))
+    picture = compose_planar(angles, 4, plain(noise="color"))
     channels = picture.layer.tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1
-    grey = tone(angles, 4)
-    assert np.allclose(channels[:, 0].reshape(128, 128), grey, atol=1e-6)
+    gray = tone(angles, 4)
+    assert np.allclose(channels[:, 0].reshape(128, 128), gray, atol=1e-6)
 
 
 def test_the_same_settings_give_the_same_bytes():

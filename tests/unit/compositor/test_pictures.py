@@ -226,7 +226,7 @@ def test_magnitude_is_colored():
     rho = (surface.face_center[:, :1] + 1) / 2
     field = RosyField(1, rho * [1.0, 0, 0])
     gbuffer = project_surface(surface, field, 128)
-    picture = compose(gbuffer, plain(magnitude="colour", magnitude_range=1.0, gain=0.0))
+    picture = compose(gbuffer, plain(magnitude="color", magnitude_range=1.0, gain=0.0))
     x = gbuffer.position[:, 0]
     actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
     expected = map_colors((x + 1) / 2, "viridis")

@@ -44,7 +44,7 @@ def instances() -> tuple[MeshInstance, ...]:
 
 LOOKS = {
     "default": Look(length=14),
-    "color noise, by families": Look(length=14, noise="colour", hue="families"),
+    "color noise, by families": Look(length=14, noise="color", hue="families"),
     "cross-hatch": replace(load_preset("cross-hatch").look, length=14, overshoot=4.0),
     "pencil": replace(load_preset("pencil").look, length=14, overshoot=4.0),
     "wide grain": Look(length=14, grain=4.0, high_pass=40.0, ink="hatch", outline=3.0),
@@ -82,7 +82,7 @@ def test_strips_depend_on_their_context_alone(name, samples, monkeypatch):
     "look",
     [
         load_preset("engraving").look,
-        Look(magnitude="colour"),
+        Look(magnitude="color"),
         Look(high_pass=1024.0),
     ],
 )

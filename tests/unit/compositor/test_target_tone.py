@@ -66,7 +66,7 @@ def world_positions(gbuffer):
 
 def relative_lightness(rgba, look):
     """(H, W) lightness, from 0 at the darker of ink and paper to 1 at the lighter."""
-    paper, ink = (to_linear(from_hex(code)) for code in (look.paper_colour, look.ink_colour))
+    paper, ink = (to_linear(from_hex(code)) for code in (look.paper_color, look.ink_color))
     channel = int(np.argmax(np.abs(paper - ink)))
     darker, lighter = sorted((paper[channel], ink[channel]))
     return (rgba[..., channel] - darker) / (lighter - darker)

@@ -20,11 +20,3 @@ def test_settings_are_shown_above_those_that_they_name():
 
 def test_the_advanced_panel_has_only_details_of_a_method():
     assert panel_settings(Look, "") == ("weights", "view_plane")
-
-
-def test_american_spelling_names_the_same_settings():
-    american = Look().with_settings(
-        {"magnitude": "color", "color_map": "gray", "ink_color": "#102030"}
-    )
-    british = {"magnitude": "colour", "colour_map": "grey", "ink_colour": "#102030"}
-    assert american == Look().with_settings(british)

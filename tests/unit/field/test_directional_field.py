@@ -276,10 +276,10 @@ def test_family_hues_keep_the_brightness():
     tensor = np.diag([3.0, -1.0, 0.0])
     field = tensor_field(surface, np.tile(tensor, (surface.face_count, 1, 1)))
     gbuffer = project_from_above(surface, field, 256)
-    grey = compose(gbuffer, WEAVE).rgba[..., :3]
+    gray = compose(gbuffer, WEAVE).rgba[..., :3]
     colored = compose(gbuffer, WEAVE.with_settings({"hue": "families"}))
     luminance = [
-        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (grey, colored.rgba[..., :3])
+        to_display(image @ (0.2126, 0.7152, 0.0722)) for image in (gray, colored.rgba[..., :3])
     ]
     # Hues do not change the contrast of the gray picture.
     relative = [image.std() / image.mean() for image in luminance]

@@ -97,7 +97,7 @@ FILES = {
     "a.off": OFF.encode(),
     "split.off": OFF.replace("OFF 5", "OFF\n5").encode(),
     "bare.off": OFF.replace("OFF 5", "5").encode(),
-    "coloured.off": OFF.replace("OFF", "COFF").replace(" 0\n", " 0 0 0 255\n").encode(),
+    "colored.off": OFF.replace("OFF", "COFF").replace(" 0\n", " 0 0 0 255\n").encode(),
     "a.ply": (PLY_HEADER.format(format="ascii") + PLY_BODY).encode(),
     "dos.ply": (PLY_HEADER.format(format="ascii") + PLY_BODY).replace("\n", "\r\n").encode(),
     "little.ply": binary_ply("<"),

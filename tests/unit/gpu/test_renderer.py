@@ -539,14 +539,14 @@ def test_all_degrees(card, degree, perspective):
 
 LOOKS = {
     "default": {},
-    "color noise": {"noise": "colour"},
-    "color noise, three directions": {"noise": "colour", "degree": 3},
-    "magnitude as color": {"magnitude": "colour"},
-    "magnitude as color, with a range": {"magnitude": "colour", "magnitude_range": 0.8},
-    "magnitude as gray": {"magnitude": "colour", "colour_map": "grey"},
+    "color noise": {"noise": "color"},
+    "color noise, three directions": {"noise": "color", "degree": 3},
+    "magnitude as color": {"magnitude": "color"},
+    "magnitude as color, with a range": {"magnitude": "color", "magnitude_range": 0.8},
+    "magnitude as gray": {"magnitude": "color", "color_map": "gray"},
     "magnitude as length": {"magnitude": "length"},
     "magnitude as length, with a range": {"magnitude": "length", "magnitude_range": 1.5},
-    "magnitude as both": {"magnitude": "both", "colour_map": "magma"},
+    "magnitude as both": {"magnitude": "both", "color_map": "magma"},
     "magnitude as both, with a range": {"magnitude": "both", "magnitude_range": 0.9, "degree": 2},
     "families, of a field without families": {"hue": "families"},
     "oriented, three directions": {"oriented": True, "degree": 3, "density": 0.03},
@@ -554,7 +554,7 @@ LOOKS = {
     "foreshortened": {"foreshorten": True},
     "foreshortened, three directions": {"foreshorten": True, "degree": 3},
     "supersampled": {"supersampling": 2},
-    "supersampled color noise": {"supersampling": 2, "noise": "colour", "degree": 3},
+    "supersampled color noise": {"supersampling": 2, "noise": "color", "degree": 3},
     "guided": {"guiding_angle": 0.7},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
     "flat": {"display": "flat"},
@@ -565,7 +565,7 @@ LOOKS = {
     "coarse noise": {"grain": 5.0, "seed": 7},
     "long": {"length": 200},
     "on the surface": {"anchor": "surface"},
-    "on the surface, color noise": {"anchor": "surface", "noise": "colour", "high_pass": 0.0},
+    "on the surface, color noise": {"anchor": "surface", "noise": "color", "high_pass": 0.0},
     "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
     "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
     "hatched, oriented": {
@@ -578,16 +578,16 @@ LOOKS = {
     "hatched, three directions": {"ink": "hatch", "shading": 0.8, "degree": 3, "layers": 2},
     "hatched in color, guided": {
         "ink": "hatch",
-        "ink_colour": "#203080",
-        "paper_colour": "#f0e8d0",
+        "ink_color": "#203080",
+        "paper_color": "#f0e8d0",
         "guiding_angle": 0.4,
         "crispness": 0.2,
         "shading": 1.0,
     },
     "hatched, light on dark": {
         "ink": "hatch",
-        "ink_colour": "#fff0d0",
-        "paper_colour": "#101020",
+        "ink_color": "#fff0d0",
+        "paper_color": "#101020",
         "shading": 0.9,
     },
     "hatched, with breaks": {
@@ -634,18 +634,18 @@ LOOKS = {
     "hatched, an ink per family, light on dark": {
         "ink": "hatch",
         "hue": "families",
-        "ink_colour": "#ffd060",
-        "paper_colour": "#101020",
+        "ink_color": "#ffd060",
+        "paper_color": "#101020",
         "degree": 4,
         "shading": 0.9,
         "ink_ramp": True,
-        "ink_colour_light": "#fff0f0",
+        "ink_color_light": "#fff0f0",
     },
     "hatched, ink ramp": {
         "ink": "hatch",
         "ink_ramp": True,
-        "ink_colour": "#101848",
-        "ink_colour_light": "#e08050",
+        "ink_color": "#101848",
+        "ink_color_light": "#e08050",
         "shading": 1.0,
     },
     "hatched, ink ramp with a middle ink": {
@@ -679,8 +679,8 @@ LOOKS = {
         "shading": 0.9,
         "outline": 1.5,
         "supersampling": 2,
-        "ink_colour": "#ffe0b0",
-        "paper_colour": "#102030",
+        "ink_color": "#ffe0b0",
+        "paper_color": "#102030",
     },
     "hatched, overshoot": {
         "ink": "hatch",
@@ -692,8 +692,8 @@ LOOKS = {
     },
     "hatched light on dark, overshoot by magnitude": {
         "ink": "hatch",
-        "ink_colour": "#ffd060",
-        "paper_colour": "#101020",
+        "ink_color": "#ffd060",
+        "paper_color": "#101020",
         "shading": 1.0,
         "overshoot": 20.0,
         "magnitude": "length",
@@ -767,7 +767,7 @@ DRIFTING_LOOKS = {
     | {"overshoot": 15.0},
     "drifting breaks of even lines": DRIFTING
     | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
-    "color noise, which does not drift": DRIFTING | {"noise": "colour"},
+    "color noise, which does not drift": DRIFTING | {"noise": "color"},
 }
 ALL_LOOKS = LOOKS | DRIFTING_LOOKS
 #: Looks that take long, and of which others have every part.
@@ -964,7 +964,7 @@ def test_tones_with_free_directions(card):
 COLORED = {
     "soft": {},
     "hatched": {"ink": "hatch", "grain": 3.0, "outline": 2.0},
-    "light ink": {"ink": "hatch", "ink_colour": "#f0f0e0", "paper_colour": "#101018", "layers": 1},
+    "light ink": {"ink": "hatch", "ink_color": "#f0f0e0", "paper_color": "#101018", "layers": 1},
     "inks that are nearly paper": {
         "ink": "hatch",
         "shading": 0.95,
@@ -972,10 +972,10 @@ COLORED = {
         "grain": 3.0,
         "values_low": -1.0,
         "values_high": 1.0,
-        "colour_map": "grey",
+        "color_map": "gray",
     },
-    "a range, inverted": {"values_low": 0.8, "values_high": 0.2, "colour_map": "magma"},
-    "colored noise": {"noise": "colour"},
+    "a range, inverted": {"values_low": 0.8, "values_high": 0.2, "color_map": "magma"},
+    "colored noise": {"noise": "color"},
     "with tones": {"tone": "attribute", "tone_gamma": 1.5},
 }
 
@@ -1277,7 +1277,7 @@ UNDEFINED_LOOKS = {
     "families": {"hue": "families"},
     "magnitude": {"magnitude": "both"},
     "hatched": {"ink": "hatch", "shading": 1.0},
-    "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "colour"},
+    "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "color"},
     "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
     "drifting": DRIFTING,
@@ -1615,7 +1615,7 @@ def test_a_skewed_projection(card):
 @pytest.mark.parametrize("top", [0.0, 0.7])
 def test_the_range_of_the_colors(card, supersampling, top):
     """It is numpy's, and a look with this range gives the same picture."""
-    look = replace(LOOK, magnitude="colour", magnitude_range=top, supersampling=supersampling)
+    look = replace(LOOK, magnitude="color", magnitude_range=top, supersampling=supersampling)
     instances = [ball(4), MeshInstance(BALL, placed(shift=(0, 0, -9)), axis_field(BALL, 2))]
     drawn, expected = (
         draw(renderer, ViewInput(tuple(instances), view(), look)) for renderer in (card, None)
@@ -1631,7 +1631,7 @@ def test_the_range_of_the_colors(card, supersampling, top):
 
 def test_no_common_range_of_the_colors(card):
     """Fields of several degrees have ranges of their own."""
-    look = replace(LOOK, magnitude="colour")
+    look = replace(LOOK, magnitude="color")
     instances = ball(4), MeshInstance(BALL, placed(shift=(0.7, 0, 0)), axis_field(BALL, 2))
     for renderer in (card, None):
         picture = draw(renderer, ViewInput(instances, view(), look))

@@ -167,7 +167,7 @@ def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(ortho
 @pytest.mark.slow
 def test_stroke_geometry_has_the_width_and_colors_of_the_pen():
     drawing = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, taper=0.0))
-    geometry = stroke_geometry(drawing, CAMERA, Pen(width=3.0, colours=["#112233", "#445566"]))
+    geometry = stroke_geometry(drawing, CAMERA, Pen(width=3.0, colors=["#112233", "#445566"]))
     np.testing.assert_allclose(2 * geometry.radius / pixel_size(geometry.points, CAMERA), 3.0)
     assert geometry.colors == ["#112233", "#445566"]
     hidden = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12, hidden=True))

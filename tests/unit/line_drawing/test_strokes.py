@@ -765,11 +765,11 @@ def path_points(data):
 @pytest.mark.parametrize("color", ["", "\x1b[31m", "blakc", "#12", "#gggggg", 'red" x="', "#00f\n"])
 def test_color_must_be_one_of_svg(color):
     with pytest.raises(RosyError, match="is not a color"):
-        Pen(colours=("Navy", "#00F", color))
+        Pen(colors=("Navy", "#00F", color))
 
 
 def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
-    root, strokes = svg_of(millimetres=100, colours=("red", "#00f"))
+    root, strokes = svg_of(millimeters=100, colors=("red", "#00f"))
     inkscape = "{http://www.inkscape.org/namespaces/inkscape}"
     layers = root.findall("{http://www.w3.org/2000/svg}g")
     assert [layer.get(inkscape + "label") for layer in layers] == ["paper", "family 1", "family 2"]

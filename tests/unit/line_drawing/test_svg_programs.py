@@ -207,7 +207,7 @@ def test_inkscape_finds_one_layer_per_family(strokes, scene, tmp_path):
 
 @needs_inkscape
 def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
-    write_svg(tmp_path / "a.svg", strokes, scene[1], Pen(width=PEN_WIDTH, millimetres=48))
+    write_svg(tmp_path / "a.svg", strokes, scene[1], Pen(width=PEN_WIDTH, millimeters=48))
     # 254 dpi are ten pixels per millimeter.
     inkscape(tmp_path / "a.svg", tmp_path / "a.png", "--export-dpi=254")
     assert correlation(ink_of(tmp_path / "a.png"), raster(strokes, scene[1], PEN_WIDTH)) > 0.98

@@ -83,7 +83,7 @@ def blank_previews(monkeypatch):
     monkeypatch.setattr(store, "draw_preview", lambda look: np.zeros((4, 4, 4), dtype=np.float32))
 
 
-MINE = Preset("My Ink", "Long lines", Look(ink="hatch", length=90, ink_colour="#102030"))
+MINE = Preset("My Ink", "Long lines", Look(ink="hatch", length=90, ink_color="#102030"))
 
 
 # --- files -----------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def test_files_are_readable_by_people(tmp_path):
         '  "look": {',
         '    "length": 90,',
         '    "ink": "hatch",',
-        '    "ink_colour": "#102030"',
+        '    "ink_color": "#102030"',
         "  }",
         "}",
     ]
@@ -148,8 +148,8 @@ HOSTILE = {
     "infinite": ((HEAD + '"gain": 1e999}}').encode(), "setting 'gain' is inf"),
     "minus infinite": ((HEAD + '"gain": -Infinity}}').encode(), "setting 'gain' is -inf"),
     "list": (
-        (HEAD + '"noise": ["grey"]}}').encode(),
-        "setting 'noise' is ['grey'], expected one of",
+        (HEAD + '"noise": ["gray"]}}').encode(),
+        "setting 'noise' is ['gray'], expected one of",
     ),
     "object": ((HEAD + '"noise": {}}}').encode(), "setting 'noise' is {}, expected one of"),
     "null": ((HEAD + '"gain": null}}').encode(), "setting 'gain' is None, expected a number"),
@@ -165,8 +165,8 @@ HOSTILE = {
         (HEAD + '"view_plane": 1}}').encode(),
         "setting 'view_plane' is 1, expected true or",
     ),
-    "colour": ((HEAD + '"ink_colour": "#12345g"}}').encode(), "'#12345g', expected a color"),
-    "colour, line": ((HEAD + '"ink_colour": "#123456\\n"}}').encode(), "expected a color"),
+    "color": ((HEAD + '"ink_color": "#12345g"}}').encode(), "'#12345g', expected a color"),
+    "color, line": ((HEAD + '"ink_color": "#123456\\n"}}').encode(), "expected a color"),
     "twice": ((HEAD + '"gain": 1, "gain": 2}}').encode(), "'gain' appears twice"),
     "name twice": (b'{"name": "a", "name": "b"}', "'name' appears twice"),
     "newer": ((HEAD + '"sparkle": 1}}').encode(), "unknown setting 'sparkle': check its spelling"),
@@ -449,7 +449,7 @@ def test_shipped_previews_show_their_looks(name):
     "look",
     [
         Look(method="brute", length=8000),
-        Look(method="members", length=8000, step=0.05, noise="colour"),
+        Look(method="members", length=8000, step=0.05, noise="color"),
         *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
         Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
         Look(light="scene", hue="families", display="flat", magnitude="both"),
@@ -471,7 +471,7 @@ def test_every_look_has_a_preview(look):
 def test_previews_of_looks_differ():
     plain, long = draw_preview(Look()), draw_preview(Look(length=120))
     assert np.abs(plain - long).mean() > 0.01
-    ink = Look(ink="hatch", paper_colour="#ff0000")
+    ink = Look(ink="hatch", paper_color="#ff0000")
     corner = draw_preview(ink)[0, 0]
     np.testing.assert_allclose(corner, [1, 0, 0, 1], atol=1e-6)
     assert (draw_preview(replace(ink, clear_paper=True))[0, 0] == corner).all()

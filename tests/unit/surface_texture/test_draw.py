@@ -53,7 +53,7 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     instance = MeshInstance(surface, np.eye(4), RosyField(4, field.vectors * middle))
     points = surface_points(surface, 20_000)
     for changes in (
-        {"noise": "colour"},
+        {"noise": "color"},
         {"magnitude": "both"},
         {"taper": True},
         {"method": "ibfv"},

@@ -24,7 +24,7 @@ from ..core.deterministic_trig import vector_angle
 from ..core.progress import progress
 from ..field.frames import transform_components
 from ..projection.gbuffer import GBuffer, MeshInstance
-from ..projection.project import view_plane_rotation
+from ..projection.pixel_values import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
 from .look import Look, is_hatched
 from .look_units import instance_line_spacing

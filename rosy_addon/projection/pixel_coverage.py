@@ -16,7 +16,7 @@ from .camera import Camera, pixel_rays, z_at_depth
 from .gbuffer import GBuffer, PixelCoverage, PixelSamples
 from .pixel_blocks import pixel_blocks
 from .pixel_neighbors import depth_slopes
-from .rasterizer import SampledTriangles
+from .rasterized_samples import SampledTriangles
 
 #: Smallest cosine between the normals of two triangles that show the same surface: that of 30 degrees.
 MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rosy_addon.projection import rasterizer
+from rosy_addon.projection import near_clipping, rasterizer
 from rosy_addon.projection.camera import orthographic_camera, perspective_camera
 from rosy_addon.projection.rasterizer import rasterize
 
@@ -271,8 +271,8 @@ def test_near_plane_intersections_do_not_depend_on_the_edge_direction():
     """Intersections are bit-identical; otherwise rounding would separate adjacent triangles."""
     vertices = np.random.default_rng(3).normal(size=(2000, 4))
     first, second = np.arange(1000), np.arange(1000, 2000)
-    forward = rasterizer._intersect_near(vertices, first, second)
-    assert (forward == rasterizer._intersect_near(vertices, second, first)).all()
+    forward = near_clipping._intersect_near(vertices, first, second)
+    assert (forward == near_clipping._intersect_near(vertices, second, first)).all()
 
 
 def test_the_first_of_equal_depths_is_visible_among_clipped_triangles():

@@ -1,0 +1,75 @@
+"""Perspective-correct barycentric coordinates of pixel centers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.progress import report
+
+#: Triangles, spans or fragments per block. Bounds memory, and fits the caches of the processor.
+BLOCK_SIZE = 1 << 14
+
+#: Sum of barycentric coordinates that is not due to rounding: the pixel center is outside.
+MAX_WEIGHT_SUM = 1 + 1e-4
+
+#: Label of the progress.
+LABEL = "finding visible pixels"
+
+
+def barycentrics(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    pixel: np.ndarray,
+    triangle: np.ndarray,
+    width: int,
+    height: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute perspective-correct barycentric coordinates at pixel centers, in unclipped triangles.
+
+    Uses homogeneous edge functions (Olano and Greer, "Triangle Scan Conversion using 2D Homogeneous
+    Coordinates", 1997), which are also valid for triangles that extend behind the eye. They are
+    evaluated relative to the pixel center, so that small triangles lose no precision.
+
+    Returns
+    -------
+    weights : (P, 3) float32 ndarray
+        Of a point of the triangle, also if the pixel center is outside of it. 1 / 3 each for triangles
+        that have no area on screen.
+    front_facing : (P,) bool ndarray
+        Whether the corners run counter-clockwise on screen.
+    """
+    w = vertices[:, 3]
+    x, y, w = (vertices[:, 0] + w) * (0.5 * width), (vertices[:, 1] + w) * (0.5 * height), w.copy()
+    corners = np.ascontiguousarray(triangles.T)
+    weights = np.empty((3, len(pixel)), dtype=np.float32)
+    front_facing = np.empty(len(pixel), dtype=bool)
+    for start in range(0, len(pixel), BLOCK_SIZE):
+        report(start / len(pixel), LABEL)
+        block = slice(start, start + BLOCK_SIZE)
+        row, column = np.divmod(pixel[block], np.int32(width))
+        column, row = column + 0.5, row + 0.5
+        offsets = []
+        for corner in corners:
+            vertex = corner.take(triangle[block]).astype(np.intp)
+            depth = w.take(vertex)
+            offsets.append((x.take(vertex) - column * depth, y.take(vertex) - row * depth))
+        (ax, ay), (bx, by), (cx, cy) = offsets
+        area_a, area_b, area_c = bx * cy - cx * by, cx * ay - ax * cy, ax * by - bx * ay
+        total = area_a + area_b
+        total += area_c
+        np.greater_equal(total, 0, out=front_facing[block])
+        with np.errstate(divide="ignore"):
+            np.divide(1, total, out=total)
+        # Triangles without area on screen get weights of 1 / 3 below.
+        degenerate = np.isinf(total)
+        total[degenerate] = 0
+        for area, out in zip((area_a, area_b, area_c), weights[:, block], strict=True):
+            area *= total
+            np.maximum(area, 0, out=area)
+            out[:] = area
+        found = weights[:, block]
+        # Pixels with several samples may see a triangle beside their centers.
+        outside = np.flatnonzero(found.sum(axis=0) > MAX_WEIGHT_SUM)
+        found[:, outside] /= found[:, outside].sum(axis=0)
+        found[:, degenerate] = 1 / 3
+    return weights.T, front_facing

@@ -1,0 +1,150 @@
+"""The rasterizer at several samples of each pixel."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.progress import progress
+from .near_clipping import clip_near
+from .rasterizer import MAX_BAND_PIXELS, rasterize_rows, to_screen
+
+
+class SampledTriangles(NamedTuple):
+    """The triangles at S x S samples of each of the P covered pixels, in ascending order of pixel.
+
+    Attributes
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat index, ``row * width + column`` from the lower left.
+    triangle : (P,) int32 ndarray
+        Triangle that is visible at the center, or else at the sample that is nearest to it.
+    depth : (P,) float64 ndarray
+        Its z / w there.
+    own_samples : (P,) uint16 ndarray
+        The samples that show this triangle: bit ``row * S + column``.
+    other_entry : (E,) int32 ndarray
+        Index into `pixel`, for each sample that shows another triangle.
+    other_sample : (E,) int32 ndarray
+        Flat index of that sample in the frame of all samples.
+    other_triangle : (E,) int32 ndarray
+    other_depth : (E,) float64 ndarray
+    """
+
+    pixel: np.ndarray
+    triangle: np.ndarray
+    depth: np.ndarray
+    own_samples: np.ndarray
+    other_entry: np.ndarray
+    other_sample: np.ndarray
+    other_triangle: np.ndarray
+    other_depth: np.ndarray
+
+
+def rasterize_samples(
+    clip_vertices: np.ndarray,
+    triangles: np.ndarray,
+    is_drawn: np.ndarray,
+    width: int,
+    height: int,
+    samples: int,
+    rows: tuple[int, int] | None = None,
+) -> SampledTriangles:
+    """Find the nearest triangle at several samples of each pixel, on a square grid.
+
+    Parameters
+    ----------
+    clip_vertices, triangles, width, height, rows
+        As of `rasterize`.
+    is_drawn : (T,) bool ndarray
+        Triangles that are not drawn only hide others.
+    samples : int
+        S, the samples along each side of a pixel.
+    """
+    first_row, stop_row = (0, height) if rows is None else rows
+    vertices, clipped = clip_near(clip_vertices, triangles)
+    screens = [
+        (scale, to_screen(vertices, width * scale, height * scale)) for scale in (1, samples)
+    ]
+    bands, entry_count = [], 0
+    band_rows = max(1, MAX_BAND_PIXELS // (width * samples * samples))
+    for row_start in range(first_row, stop_row, band_rows):
+        row_stop = min(row_start + band_rows, stop_row)
+        buffers = []
+        for index, (scale, screen) in enumerate(screens):
+            half = (row_stop - row_start) / (2 * height)
+            start = row_start / height + index * half
+            with progress(start, start + half):
+                triangle, depth = rasterize_rows(
+                    screen, clipped, width * scale, row_start * scale, row_stop * scale
+                )
+            if not is_drawn.all():
+                triangle[~is_drawn.take(triangle, mode="clip")] = -1
+            buffers += (
+                triangle.reshape(-1, scale, width, scale),
+                depth.reshape(-1, scale, width, scale),
+            )
+        band = _group_samples(*buffers, row_start)
+        bands.append(band._replace(other_entry=band.other_entry + np.int32(entry_count)))
+        entry_count += len(band.pixel)
+    return SampledTriangles(*(np.concatenate(values) for values in zip(*bands, strict=True)))
+
+
+def _group_samples(
+    center_triangle: np.ndarray,
+    center_depth: np.ndarray,
+    triangle: np.ndarray,
+    depth: np.ndarray,
+    first_row: int,
+) -> SampledTriangles:
+    """Group the samples of some rows by pixels.
+
+    Parameters
+    ----------
+    center_triangle : (h, 1, w, 1) int32 ndarray
+        Triangle at the center of each pixel, -1 where there is none.
+    triangle : (h, S, w, S) int32 ndarray
+        The same at samples.
+    center_depth, depth : float64 ndarray
+        Of the same shapes.
+    first_row : int
+        The first of the rows.
+    """
+    samples, width = triangle.shape[1:3]
+    offset = np.arange(samples) - (samples - 1) / 2
+    order = np.argsort((offset[:, None] ** 2 + offset**2).ravel(), kind="stable").tolist()
+    sample_places = [divmod(sample, samples) for sample in order]
+    own_triangle, own_depth = center_triangle[:, 0, :, 0].copy(), center_depth[:, 0, :, 0].copy()
+    for row, column in sample_places:
+        empty = np.nonzero(own_triangle < 0)
+        own_triangle[empty] = triangle[:, row, :, column][empty]
+        own_depth[empty] = depth[:, row, :, column][empty]
+    pixel = np.flatnonzero(own_triangle >= 0)
+    own_triangle, own_depth = own_triangle.ravel()[pixel], own_depth.ravel()[pixel]
+    own_samples = np.zeros(len(pixel), dtype=np.uint16)
+    others = []
+    pixel_row, pixel_column = np.divmod(pixel.astype(np.int32), np.int32(width))
+    pixel_row += np.int32(first_row)
+    for row, column in sample_places:
+        sample_triangle = triangle[:, row, :, column].ravel()[pixel]
+        is_own = sample_triangle == own_triangle
+        own_samples |= is_own.astype(np.uint16) << np.uint16(row * samples + column)
+        entry = np.flatnonzero((sample_triangle >= 0) & ~is_own)
+        sample_row = pixel_row[entry] * np.int32(samples) + np.int32(row)
+        sample_column = pixel_column[entry] * np.int32(samples) + np.int32(column)
+        others.append(
+            (
+                entry.astype(np.int32),
+                sample_row * np.int32(width * samples) + sample_column,
+                sample_triangle[entry],
+                depth[:, row, :, column].ravel()[pixel[entry]],
+            )
+        )
+    return SampledTriangles(
+        pixel_row * np.int32(width) + pixel_column,
+        own_triangle,
+        own_depth,
+        own_samples,
+        *(np.concatenate(values) for values in zip(*others, strict=True)),
+    )

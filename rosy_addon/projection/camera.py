@@ -94,7 +94,7 @@ class Camera:
 
     @property
     def eye(self) -> np.ndarray:
-        """(3,) float64 position of a perspective camera in world space."""
+        """Position of a perspective camera in world space, (3,) float64."""
         return -self.view[:3, :3].T @ self.view[:3, 3]
 
     def view_directions(self, points: np.ndarray) -> np.ndarray:
@@ -120,7 +120,7 @@ class Camera:
 
     @property
     def clip_to_camera_xy(self) -> np.ndarray:
-        """(2, 2) inverse of the upper left part of the projection matrix.
+        """Inverse of the upper left (2, 2) part of the projection matrix.
 
         Maps x and y of clip space, after the lens shift is removed, to x and y of camera space: at
         depth 1 if perspective, at any depth if orthographic.
@@ -277,7 +277,7 @@ def orthographic_camera(
     scale : float
         Blender units along the longer side of the picture (Blender's orthographic scale).
     clip, name
-        As for `perspective_camera`, but the clip range may start behind the camera.
+        See `perspective_camera`. The clip range may start behind the camera.
 
     Raises
     ------
@@ -434,7 +434,7 @@ def framing_points(
     points : (V, 3) ndarray
         World space; at least one.
     azimuth, elevation, width, height, perspective
-        As for `orbit_camera`, with the default margin.
+        See `orbit_camera`. The margin is its default.
 
     Returns
     -------

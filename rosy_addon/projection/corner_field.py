@@ -73,7 +73,7 @@ class CornerField:
 
     @property
     def representation(self) -> np.ndarray:
-        """(3, T) complex64: z at each corner."""
+        """z at each corner, (3, T) complex64."""
         return self.channels[REPRESENTATION]
 
     def part(self, triangle: np.ndarray) -> CornerField:
@@ -105,12 +105,12 @@ def field_at_corners(
         Object to world space. The translation has no effect.
     field : RosyField
     display : {"smooth", "flat"}
-        Average values and normals over smooth fans, or keep those of each face.
+        Average values and normals over smooth fans, or keep the values and normals of each face.
 
     Returns
     -------
     CornerField
-        In world space.
+        World space.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     deformed = transform_components(np.ascontiguousarray(surface.vertices.T), linear)
@@ -175,7 +175,7 @@ def _fan_values(
         Object to world space, without the translation.
     faces : TangentValues
     corner_angle : (C,) float32 ndarray
-        From `face_values`.
+        Result of `face_values`.
     degree : int
     """
     normal = np.array(
@@ -220,7 +220,7 @@ def _fan_values(
 def transport_phase(
     source: VectorComponents, target: VectorComponents, x: VectorComponents, y: VectorComponents
 ) -> np.ndarray:
-    """Return the rotations from the tangent frames of source normals to those of target normals.
+    """Return the rotations from the tangent frames of source normals to the frames of target normals.
 
     Parameters
     ----------

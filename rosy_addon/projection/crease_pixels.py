@@ -12,13 +12,13 @@ from .camera import Camera
 from .gbuffer import GBuffer
 from .pixel_neighbors import depth_slopes
 
-#: Smallest distance from the camera at which a line is drawn, relative to that of its farther end.
+#: Smallest depth at which a line is drawn, relative to the depth of its farther end.
 MIN_RELATIVE_DEPTH = 1e-3
 
 #: Edges that are projected at once, and crossings that are tested at once.
 BLOCK_EDGES, BLOCK_CROSSINGS = 1 << 14, 1 << 16
 
-#: Tolerance of the depth of a visible line, in multiples of that of `pixel_neighbors`.
+#: Tolerance of the depth of a visible line, in multiples of the tolerance of `depth_slopes`.
 LINE_TOLERANCE = 2.0
 
 
@@ -33,7 +33,7 @@ def crease_pixels(
     """Find the pixels next to visible edges.
 
     An edge crosses the segments between the centers of adjacent pixels. It is visible at one of the
-    two pixels if its depth is that of the surface there, extrapolated to the crossing.
+    two pixels if its depth equals the depth of the surface there, extrapolated to the crossing.
 
     Parameters
     ----------
@@ -92,14 +92,14 @@ def _on_screen(points: np.ndarray, camera: Camera) -> np.ndarray:
 def _crossings(
     lines: np.ndarray, axis: int, camera: Camera
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield where lines cross the pixel rows (axis 0) or columns (axis 1), with the pixels on both sides.
+    """Yield the crossings of lines with pixel rows (axis 0) or columns (axis 1), for the pixels on both sides.
 
     Yields
     ------
     row, column : (k,) int64 ndarray
         A pixel next to the crossing. It may be outside of the frame, by one pixel.
     offset, depth : (k,) float64 ndarray
-        Of the crossing: its distance along the axis from the center of the pixel, and its depth.
+        Distance of the crossing from the center of the pixel, along the axis, and its depth.
     """
     along, across = axis, 1 - axis
     size = (camera.width, camera.height)

@@ -100,7 +100,7 @@ class PixelSamples(NamedTuple):
     other_triangle : (E,) int32 ndarray
         That triangle, counted over all mesh instances.
     other_entry : (E,) int32 ndarray
-        The entry whose surface they show: that of their own pixel, or of one beside it.
+        The entry whose surface they show: the entry of their own pixel, or of a pixel beside it.
     """
 
     side: int
@@ -196,7 +196,7 @@ class GBuffer:
         blocks : list of slice or of (n,) intp ndarray
             Blocks of its pixels; see `pixel_blocks`.
         progress : (float, float)
-            The fractions of all pixels that are those of instances before it, and of these and its own.
+            Fractions of all pixels: in the instances before this one, and including this one.
         """
         counts = np.bincount(self.instance_id)
         ends = np.cumsum(counts) / len(self.pixel)

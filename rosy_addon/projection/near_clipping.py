@@ -70,7 +70,7 @@ def _clip_crossing_triangles(
     Returns
     -------
     new_vertices : (2 K, 4) float64 ndarray
-        Intersections with the near plane. Their indices continue those of `vertices`.
+        Intersections with the near plane. Their indices begin after the last one of `vertices`.
     corners : (K', 3) int32 ndarray
         Vertex indices of the new triangles.
     triangle : (K',) int32 ndarray

@@ -18,7 +18,7 @@ from .pixel_blocks import pixel_blocks
 from .pixel_neighbors import depth_slopes
 from .rasterized_samples import SampledTriangles
 
-#: Smallest cosine between the normals of two triangles that show the same surface: that of 30 degrees.
+#: Smallest cosine between the normals of two triangles that show the same surface: 30 degrees.
 MIN_NORMAL_COSINE = np.float32(np.sqrt(0.75))
 
 #: Label of the progress.
@@ -94,7 +94,7 @@ def pixel_coverage(
     samples : int
         Samples along each side of a pixel.
     instance_id, triangle_normal
-        Of the other triangles of the samples, as in `_OtherSamples`.
+        Instances and normals of the other triangles of the samples; see `_OtherSamples`.
     """
     others = _other_samples(sampled, gbuffer.camera, samples, instance_id, triangle_normal)
     camera = gbuffer.camera

@@ -17,7 +17,7 @@ HOLONOMY_EPS = 3e-4
 
 
 def _channel_pixels(gbuffer: GBuffer, channel: FieldChannel) -> np.ndarray:
-    """Return the values of a channel in a G-buffer. Where it is new, they are those of a plain RoSy field."""
+    """Return the values of a channel in a G-buffer. A new channel has the values of a plain RoSy field."""
     if channel == REPRESENTATION:
         return gbuffer.representation
     if channel not in gbuffer.channels:
@@ -128,8 +128,8 @@ def _interpolated_values(
         exp(i A / 2) ~ 1 + n_0.n_i + n_i.n + n.n_0 + i n_0 . (n_i x n)
 
     up to a positive factor (Van Oosterom and Strackee, "The Solid Angle of a Plane Triangle",
-    1983). All products follow from those of the corner normals, because n is a combination of
-    these. The spherical triangle is part of the triangle of the corner normals, whose area is about
+    1983). All products follow from the products of the corner normals, because n is a combination
+    of these normals. The spherical triangle is part of the triangle of the corner normals, whose area is about
     half of their triple product. If that area is small everywhere, the correction is skipped.
     """
     b0, b1, b2 = weights

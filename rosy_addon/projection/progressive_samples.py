@@ -171,7 +171,7 @@ def _with_points(
 
 
 def _touches_frame(corners: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether triangles, (n, 3, 4) corners in clip space, may be in the frame."""
+    """Return (n,) bool: whether triangles with (n, 3, 4) corners in clip space may be in the frame."""
     w = corners[..., 3:]
     is_beyond = np.concatenate([corners[..., :3] > w, corners[..., :3] < -w], axis=2)
     return ~is_beyond.all(axis=1).any(axis=1)
@@ -241,7 +241,7 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
     triangle : (P,) int32 ndarray
     barycentric : (P, 3) float64 ndarray
     rank : (P,) float64 ndarray
-        As of `progressive_samples`, at most the density.
+        See `progressive_samples`; at most the density.
     """
     area = rest_areas(surface)
     shuffle = _random_bits(len(area))
@@ -254,7 +254,7 @@ def surface_samples(surface: Surface, density: float) -> tuple[np.ndarray, np.nd
 def _points(
     number: np.ndarray, triangle: np.ndarray, shuffle: np.ndarray, area: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the points with (P,) numbers in triangles as `progressive_samples` does.
+    """Return points, given their (P,) numbers in the sequences of triangles; see `progressive_samples`.
 
     `shuffle` and `area` are the random bits and the areas of all triangles.
     """
@@ -264,12 +264,12 @@ def _points(
 
 
 def _random_offsets(shuffle: np.ndarray) -> np.ndarray:
-    """(n,) float64 from 0 to 1: u of triangles, the upper half of their random bits."""
+    """Return u of triangles, (n,) float64 from 0 to 1: the upper half of their random bits."""
     return (shuffle >> np.uint64(32)).astype(np.float64) / 2.0**32
 
 
 def _random_bits(count: int) -> np.ndarray:
-    """(count,) uint64: a hash of the numbers from 0 on (SplitMix64)."""
+    """Return (count,) uint64 hashes of the numbers from 0 on (SplitMix64)."""
     bits = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
         bits ^= bits >> np.uint64(shift)
@@ -278,12 +278,14 @@ def _random_bits(count: int) -> np.ndarray:
 
 
 def _shuffle_bits(shuffle: np.ndarray, depth: int) -> np.ndarray:
-    """(n,) int64, from 0 to 3: by which triangles shuffle their parts, after so many divisions."""
+    """Return the (n,) int64 numbers, 0 to 3, by which triangles shuffle their parts after `depth` divisions."""
     return (shuffle >> np.uint64(2 * depth) & np.uint64(3)).astype(np.int64)
 
 
 def _barycentric(index: np.ndarray, shuffle: np.ndarray) -> np.ndarray:
-    """(n, 3) barycentric coordinates of the points with an index, in triangles with random bits."""
+    """Return the (n, 3) barycentric coordinates of points, given their indices in the sequences of
+    triangles and the random bits of these triangles.
+    """
     result = np.full((len(index), 3), 1 / 3)
     for depth in reversed(range(DIGITS)):
         part = index >> (2 * depth) & 3 ^ _shuffle_bits(shuffle, depth)

@@ -63,7 +63,7 @@ def project(
     Returns
     -------
     GBuffer
-        With at least one pixel.
+        It has at least one pixel.
 
     Raises
     ------
@@ -110,18 +110,19 @@ def project_samples(
     Parameters
     ----------
     gbuffer : GBuffer
-        Of `project` with several samples.
+        Result of `project` with several samples.
     entries : (n,) intp ndarray
         The pixels, as indices into the G-buffer.
     display, cache
-        As for `project`.
+        See `project`.
 
     Returns
     -------
     samples : GBuffer
-        Of the frame of all samples.
+        Its frame has a pixel for each sample.
     home, shown : (Q,) int32 ndarray
-        Entries of `gbuffer` for each sample: that of its pixel, and that whose surface it shows.
+        Two entries of `gbuffer` for each sample: the entry of the pixel that contains the sample, and
+        the entry whose surface it shows.
     """
     report(0.0, LABEL)
     pixel_samples, instances = gbuffer.samples, gbuffer.instances
@@ -129,7 +130,7 @@ def project_samples(
     camera = gbuffer.camera.scaled(side)
     width = np.int32(gbuffer.camera.width)
     first_triangle = first_triangles(instances)
-    # The samples, the entries of `gbuffer`, and the triangles, counted over all instances.
+    # The samples, their two entries of `gbuffer`, and their triangles, counted over all instances.
     columns = []
     row, column = np.divmod(gbuffer.pixel[entries], width)
     for bit in range(side * side):
@@ -181,11 +182,11 @@ def surface_points(
     Parameters
     ----------
     instances, camera, display, cache
-        As for `project`.
+        See `project`.
     points : SurfacePoints
         P points of instances with a field, in front of the camera.
     position : (P, 2) float64 ndarray
-        Where they are in the frame, pixels from the lower left.
+        Their positions in the frame, in pixels from the lower left.
 
     Returns
     -------
@@ -299,14 +300,14 @@ def _visible_samples(
 
 
 def _triangles_with_field(instances: Sequence[MeshInstance]) -> np.ndarray:
-    """(T,) bool: which triangles of all instances have a field."""
+    """Return (T,) bool: which triangles of all instances have a field."""
     return np.concatenate(
         [np.full(len(part.surface.triangles), part.field is not None) for part in instances]
     )
 
 
 def first_triangles(instances: Sequence[MeshInstance]) -> np.ndarray:
-    """(B,) int32: the first triangle of each instance, counted over all instances."""
+    """Return the first triangle of each instance, counted over all instances, (B,) int32."""
     counts = [len(instance.surface.triangles) for instance in instances]
     return np.cumsum([0, *counts[:-1]]).astype(np.int32)
 

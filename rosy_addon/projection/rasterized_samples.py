@@ -56,7 +56,7 @@ def rasterize_samples(
     Parameters
     ----------
     clip_vertices, triangles, width, height, rows
-        As of `rasterize`.
+        See `rasterize`.
     is_drawn : (T,) bool ndarray
         Triangles that are not drawn only hide others.
     samples : int
@@ -105,9 +105,8 @@ def _group_samples(
     center_triangle : (h, 1, w, 1) int32 ndarray
         Triangle at the center of each pixel, -1 where there is none.
     triangle : (h, S, w, S) int32 ndarray
-        The same at samples.
-    center_depth, depth : float64 ndarray
-        Of the same shapes.
+        Triangle at each sample, -1 where there is none.
+    center_depth, depth : (h, 1, w, 1) and (h, S, w, S) float64 ndarray
     first_row : int
         The first of the rows.
     """

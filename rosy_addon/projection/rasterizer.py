@@ -270,9 +270,9 @@ def _spans_with_depth(
     ----------
     row, local_triangle : (S,) ndarray of int
     first, last : (S,) float64 ndarray
-        From `_column_range`.
+        Results of `_column_range`.
     depth_plane : tuple of ndarray
-        From `_depth_plane`.
+        Result of `_depth_plane`.
     width : int
         Width of the frame in pixels.
     """
@@ -323,7 +323,8 @@ def _depth_test(spans: _Spans, depth_buffer: np.ndarray, triangle_buffer: np.nda
         depth_buffer[pending_pixel] = pending_depth
         closer = np.flatnonzero(pending_depth < depth_buffer.take(pending_pixel))
         pending_pixel, pending_depth = pending_pixel.take(closer), pending_depth.take(closer)
-    # In reverse order, so that of equal depths the first triangle is written last and is kept.
+    # The last value that is written stays. In reverse order, this is the first of the triangles that
+    # have equal depths.
     winners = np.flatnonzero(depth == depth_buffer.take(pixel))[::-1]
     triangle_buffer[pixel.take(winners)] = spans.triangle.take(span.take(winners))
 

@@ -129,7 +129,7 @@ def _point_cameras(
 
 
 def render_depth_map(instances: Sequence[MeshInstance], camera: Camera) -> np.ndarray:
-    """(H, W) float32 depth of the nearest surface along the camera axis; inf if there is none."""
+    """Return the (H, W) float32 depth of the nearest surface along the camera axis; inf if none."""
     fragments = rasterize_instances(instances, camera)
     depth = np.full(camera.width * camera.height, np.inf, dtype=np.float32)
     m_z, m_w = camera.projection[2, 2:]
@@ -147,12 +147,12 @@ def shadow_visibility(gbuffer: GBuffer, cameras: Sequence[Camera]) -> np.ndarray
     ----------
     gbuffer : GBuffer
     cameras : sequence of Camera
-        From `light_cameras`.
+        Result of `light_cameras`.
 
     Returns
     -------
     (P,) float32 ndarray
-        From 0, in shadow, to 1, lit.
+        0: in shadow, 1: lit.
     """
     rotation, translation = gbuffer.camera.view[:3, :3], gbuffer.camera.view[:3, 3]
     result = np.ones(len(gbuffer.pixel), dtype=np.float32)
@@ -179,7 +179,7 @@ def visibility_from(
     ----------
     camera : Camera
     depth_map : (H, W) ndarray
-        From `render_depth_map` with the same camera.
+        Result of `render_depth_map` with the same camera.
     points, normals : (n, 3) ndarray
         World space. The normals are unit vectors.
 

@@ -118,7 +118,7 @@ def surface_lines(
         A map of the rest shape to the shape on which distances are measured.
     field : RosyField
     display : {"smooth", "flat"}
-        As for `field_at_corners`.
+        See `field_at_corners`.
     spacing : float
         Distance between neighboring lines after `stretch`.
     max_triangles : int
@@ -182,7 +182,7 @@ def _leaf_directions(
     directions : CornerDirections
         On the leaves, in the planes of the triangles of the surface.
     heading : (2, L) float32 ndarray
-        As `SurfaceLines.heading`.
+        See `SurfaceLines`.
     """
     geometric_normal = corner_field.geometric_normal
     x, y = tangent_frame_components(geometric_normal)
@@ -208,7 +208,7 @@ def _leaf_directions(
     weights = tree.leaf_weights.astype(np.float64)
 
     def at_leaves(values: np.ndarray, order: int) -> np.ndarray:
-        """(L, 3) values of (3, T) corner values that rotate with the frame."""
+        """Return (L, 3) values at the corners of leaves, given (3, T) values that rotate with the frame."""
         in_plane = np.stack(
             [z * signed_power(phase, order) for z, phase in zip(values, to_plane, strict=True)],
             axis=1,

@@ -77,7 +77,7 @@ def values_in_triangles(
     Parameters
     ----------
     instance : MeshInstance
-        With `color_values`.
+        Its `color_values` are given.
     triangle : (n,) ndarray of int
     barycentric : (n, 3) float32 ndarray
 
@@ -103,7 +103,7 @@ def feature_curvatures(gbuffer: GBuffer, cache: Cache) -> np.ndarray:
     Returns
     -------
     (P,) float32 ndarray
-        In 1 / Blender unit of object space.
+        1 / Blender units, object space.
     """
     curvature = np.zeros(len(gbuffer.pixel), dtype=np.float32)
     for instance_id, blocks, (start, stop) in gbuffer.instance_blocks():

@@ -138,7 +138,7 @@ def _edge_angle(
 ) -> np.ndarray:
     """Return the angle between the edge after a corner and the reversed edge before it, in radians.
 
-    `cross_product` is that of the two edges; only its length is used.
+    `cross_product` is the cross product of the two edges; only its length is used.
     """
     cross_length = np.sqrt(dot_components(cross_product, cross_product))
     dot_product = dot_components(next_edge, previous_edge)

@@ -73,14 +73,14 @@ def project_vertices(
         All of them hide vertices.
     camera : Camera
     vertices : sequence of (n,) int ndarray
-        For each instance, the indices of vertices.
+        Indices of vertices, for each instance.
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
 
     Returns
     -------
     ProjectedPoints
-        Of the vertices of all instances, in their order.
+        The vertices of all instances, in their order.
     """
     report(0.0, LABEL)
     scene = _Scene.of(instances, camera, clip_planes)
@@ -115,7 +115,7 @@ def project_points(
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
     finds_hidden : bool
-        Whether hidden points are told from visible ones; if not, all in the frame count as visible.
+        Whether hidden points are found. If not, all points in the frame count as visible.
 
     Returns
     -------
@@ -259,7 +259,7 @@ class _Scene:
         )
 
     def hides(self, triangle: np.ndarray, ndc: np.ndarray, distance: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether triangles hide points that are not on them.
+        """Return (n,) bool: whether triangles hide points that are not on them.
 
         Parameters
         ----------

@@ -126,7 +126,7 @@ def draw_rows(
     strips : sequence of Strip
         A group of `group_strips`.
     cache : Cache
-        Keeps what does not depend on the camera. By default that of the process, for helpers.
+        Keeps what does not depend on the camera. By default the cache of this process.
 
     Returns
     -------

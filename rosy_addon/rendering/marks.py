@@ -40,7 +40,7 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
     view : ViewInput
         The view that it was drawn for.
     cache : Cache, optional
-        Stores corner fields, and the singularities of fields. By default that of bakes in the process,
+        Stores corner fields, and the singularities of fields. By default the cache of bakes in this process,
         for helpers.
 
     Returns
@@ -89,12 +89,12 @@ def sequence_key(instances: Sequence[MeshInstance], look: Look) -> PictureKey:
     """Find what the key of an animation says.
 
     It is true of all frames: the range of the colors is known only if the look sets it, and the
-    singularities are those of the fields, visible or not.
+    singularities include the hidden ones.
 
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Of one of the frames.
+        The instances of one of the frames.
     look : Look
 
     Returns

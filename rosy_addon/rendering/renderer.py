@@ -58,7 +58,7 @@ class ViewportRenderer(Protocol):
         Parameters
         ----------
         items : sequence
-            From `upload`, of the view's instances.
+            Result of `upload`, for the view's instances.
         view : ViewInput
         target_key : hashable
             Pictures with equal keys and sizes share one texture.
@@ -78,10 +78,10 @@ class ViewportRenderer(Protocol):
         Parameters
         ----------
         texture : texture or None
-            From `texture_steps`, of any size.
+            Result of `texture_steps`, of any size.
         items : sequence
         view : ViewInput
-            Its camera and clip planes are those of the 3D view.
+            With the camera and the clip planes of the 3D view.
         opacity : float
         """
 

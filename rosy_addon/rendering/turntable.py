@@ -67,7 +67,7 @@ def turntable_views(
     Parameters
     ----------
     instance : MeshInstance
-        In world space, z up.
+        World space, z up.
     look : Look
     count : int
         Pictures per revolution.
@@ -125,7 +125,7 @@ def turntable(
     draw : function
         Draws a view.
     views : iterator of ViewInput
-        From `turntable_views`.
+        Result of `turntable_views`.
     count : int
         Number of views.
     path : Path
@@ -180,7 +180,7 @@ def video_steps(
     draw : function
         Returns the steps that draw the `video_frame` of a view.
     views, count, path, fps
-        As for `turntable`. Nothing is written to the path; its suffix says which kind of video is meant.
+        See `turntable`. Nothing is written to the path; its suffix is the kind of the video.
     encode : function
         Returns the steps that encode an .mp4, given the arguments of an `Encoder`.
     """

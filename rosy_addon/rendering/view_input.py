@@ -40,12 +40,12 @@ class ViewInput:
     instances : tuple of MeshInstance
         Meshes with their fields, tones and numbers, in world space. Those without a field only occlude.
     camera : Camera
-        Of the size of the finished picture.
+        Its size is the size of the finished picture.
     look : Look
     lights : tuple of Light
-        For the light "scene", in the camera's space.
+        Camera space. Used by the light "scene".
     reference : ReferenceRender or None
-        For the tone "picture".
+        Used by the tone "picture".
     clip_planes : (6, 4) float64 ndarray or None
         World space. The negative side of each plane is cut away.
     draws_thresholds : bool
@@ -63,7 +63,7 @@ class ViewInput:
 
     @property
     def sample_camera(self) -> Camera:
-        """The camera of the frame that is sampled, larger by the look's supersampling."""
+        """The camera with a pixel for each sample."""
         return self.camera.scaled(self.look.supersampling)
 
     @property
@@ -73,5 +73,5 @@ class ViewInput:
 
     @property
     def shaded_camera(self) -> Camera:
-        """The camera of the frame that numpy shades: of pixels, or of samples."""
+        """The camera with a pixel for each point that numpy shades: a pixel of the picture, or a sample."""
         return self.camera if self.samples_per_side > 1 else self.sample_camera

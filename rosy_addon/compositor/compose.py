@@ -16,7 +16,7 @@ from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines, has_even_lines
+from .even_lines import EvenLines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
 from .flow import with_cycle_distance
@@ -33,7 +33,7 @@ from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
 from .lic_images import LicImages, lic_images, relative_magnitude, with_magnitude_range
-from .look import Look, colors_magnitude, colors_values, is_hatched
+from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
@@ -275,7 +275,7 @@ def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: L
         field = stages.pixel_field(degree, pixel_look)
     look = look_for_symmetry(pixel_look, field.symmetry)
     even_lines = paper_grain = outline = None
-    if has_even_lines(look):
+    if is_even(look):
         with progress(0.3, 0.6):
             even_lines = stages.even_lines(field, look)
     if colors_magnitude(look):

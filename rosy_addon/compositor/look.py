@@ -37,12 +37,17 @@ def colors_values(look: Any) -> bool:
 
 def is_hatched(look: Any) -> bool:
     """Return whether lines are drawn with ink on paper."""
-    return look.ink == "hatch"
+    return look.ink != "soft"
+
+
+def is_even(look: Look) -> bool:
+    """Return whether lines of ink are drawn at even distances."""
+    return look.ink == "even"
 
 
 def _has_streaks(look: Any) -> bool:
     """Return whether streaks of noise are drawn, or break even lines."""
-    return not (is_hatched(look) and look.lines == "even" and not (look.breaks or look.wobble))
+    return not (is_even(look) and not (look.breaks or look.wobble))
 
 
 def has_flow(look: Any) -> bool:
@@ -449,26 +454,18 @@ class Look:
     )
     ink: str = choice(
         "soft",
-        "Style of the streaks",
+        "Style of the lines",
         {
             "soft": "Lighter and darker streaks around the mean, on the shaded surface",
-            "hatch": "Lines of ink on paper, whose number and width follow the tone",
+            "hatch": "Streaks of ink on paper, broken and uneven as by hand, whose number and width "
+            "follow the tone",
+            "even": "Long lines of ink at even distances on the surface, which swell and thin with the "
+            "tone, as in engravings. The distance is twice the line width",
         },
         label="Ink Style",
         panel_label="Style",
-        **_shading("ink"),
-    )
-    lines: str = choice(
-        "streaks",
-        "What the lines of ink are",
-        {
-            "streaks": "Streaks of noise: as broken and uneven as by hand",
-            "even": "Long lines at even distances on the surface, which swell and thin with the "
-            "tone, as in engravings. The distance is twice the line width",
-        },
         option_labels={"even": "Evenly Spaced"},
-        panel="ink",
-        applies=is_hatched,
+        **_shading("ink"),
     )
     ink_color: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
     ink_ramp: bool = switch(

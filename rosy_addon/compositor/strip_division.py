@@ -11,7 +11,6 @@ import numpy as np
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .even_lines import has_even_lines
 from .hatching import (
     has_breaks,
     has_outline,
@@ -20,7 +19,7 @@ from .hatching import (
     overshoot_steps,
 )
 from .image_noise import MAX_MARGIN, high_pass_margin
-from .look import Look, colors_magnitude
+from .look import Look, colors_magnitude, is_even
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
 from .paper_grain import surface_paper_grain_args
@@ -101,7 +100,7 @@ def group_strips(
     fields = [instance.field for instance in instances if instance.field is not None]
     depends_on_all = colors_magnitude(look) or look.magnitude in ("length", "both")
     if (
-        has_even_lines(look)
+        is_even(look)
         or (depends_on_all and not look.magnitude_range)
         or high_pass_margin(look.high_pass) > MAX_MARGIN
         or any(field.direction_ratios is not None or field.family_count > 1 for field in fields)

@@ -15,7 +15,6 @@ from ..compositor.even_lines import (
     SPACING_GRAINS,
     WOBBLE_SHIFT,
     crowded_pixels,
-    has_even_lines,
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count, kernel_of, look_for_symmetry
@@ -31,7 +30,7 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_values, has_flow, is_hatched
+from ..compositor.look import Look, colors_values, has_flow, is_even, is_hatched
 from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -114,7 +113,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         **covering_uniforms(kind),
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, look),
-        "half_length": 0 if has_even_lines(look) else look.length,
+        "half_length": 0 if is_even(look) else look.length,
         "full_samples": full_sample_count(look),
         "step_length": look.step,
         "crossing_correlation": crossing,
@@ -144,7 +143,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         # Not defines: compilers reorder sums with constants, and the result would change.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
-        "even_lines": int(has_even_lines(look)),
+        "even_lines": int(is_even(look)),
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": FADE_PIXELS,
         "crowded_pixels": crowded_pixels(look),

@@ -76,7 +76,7 @@ TEXTURE_SETTINGS = (
     ),
     *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
     *("magnitude", "magnitude_range", "values_low", "values_high", "color_map"),
-    *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
+    *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 
 #: Texels on each side of a texture: default and range.

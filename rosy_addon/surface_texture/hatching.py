@@ -11,7 +11,6 @@ from ..compositor.even_lines import (
     SPACING_GRAINS,
     WOBBLE_SHIFT,
     EvenLines,
-    has_even_lines,
     resolved_share,
 )
 from ..compositor.flow import unconvolved_noise
@@ -166,14 +165,14 @@ def _lines(
     cache: Cache | None,
 ) -> tuple[LicImages | None, LineModulation]:
     """Draw the streaks or the even lines of a field, and what makes them uneven."""
-    is_even, is_broken = has_even_lines(look), has_breaks(look)
+    is_spaced, is_broken = is_even(look), has_breaks(look)
     undefined = not field.representation.all()
     images = even_lines = break_images = noise = undirected = paper_grain = None
-    if not is_even or is_broken or undefined:
+    if not is_spaced or is_broken or undefined:
         with progress(0.0, 0.3):
             noise = texel_noise(on, look)
     break_look = replace(look, length=break_steps(look))
-    if is_even:
+    if is_spaced:
         with progress(0.3, 0.6):
             even_lines = _even_lines(on, field, look, wobble_angle, cache)
         if is_broken:

@@ -102,7 +102,7 @@ def _presets(monkey: Surface, form: RosyField) -> Image.Image:
         preset = load_preset(name)
         look = preset.look.with_settings({"supersampling": 2})
         field = form if look.magnitude == "none" else curved
-        paper = look.paper_color if look.ink == "hatch" else "#ffffff"
+        paper = look.paper_color if look.ink != "soft" else "#ffffff"
         size = (width, height - caption)
         shown = _draw(monkey, field, look, (-26.0, 6.0), size, 0.04, paper)
         left, top = index % columns * width, index // columns * height

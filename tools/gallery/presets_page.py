@@ -123,7 +123,7 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
     small = np.concatenate([_draw(model, look, SMALL) for model in others], axis=1)
     sheet = Image.fromarray(np.concatenate([_draw(first, look, LARGE), small]))
     path = IMAGES / f"preset-{name}.png"
-    colors = HATCHING_COLORS if look.ink == "hatch" else COLORS
+    colors = HATCHING_COLORS if look.ink != "soft" else COLORS
     sheet.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE).save(
         path, optimize=True
     )
@@ -152,7 +152,7 @@ def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
 
 def on_paper(rgba: np.ndarray, look: Look) -> np.ndarray:
     """Return an (H, W, 4) picture with the paper of its look as background, if it has paper."""
-    if look.ink != "hatch":
+    if look.ink == "soft":
         return rgba
     alpha = rgba[..., 3:]
     color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_color)) * (1 - alpha)

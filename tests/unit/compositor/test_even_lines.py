@@ -35,8 +35,7 @@ from rosy_addon.projection.project import project
 
 SIZE = 256
 LOOK = Look(
-    ink="hatch",
-    lines="even",
+    ink="even",
     anchor="surface",
     light="scene",
     shading=0.5,

@@ -52,7 +52,7 @@ pytestmark = pytest.mark.slow
 
 SIZE = 384
 PRESETS = {name: load_preset(name).look for name in preset_keys()}
-HATCHED = [name for name, look in PRESETS.items() if look.ink == "hatch"]
+HATCHED = [name for name, look in PRESETS.items() if look.ink != "soft"]
 
 INK = Look(
     taper=True, ink="hatch", anchor="surface", light="lamp", shading=1.0, grain=2.5, supersampling=2
@@ -206,7 +206,7 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
 def test_crowded_even_lines_are_drawn_last():
     """Where a surface turns away across the first lines, the ink of light tones is in the others."""
     field = planar_pixel_field(np.zeros((1, 3)), 4)
-    look = Look(ink="hatch", lines="even", grain=2.5, layers=2, layering=0.5)
+    look = Look(ink="even", grain=2.5, layers=2, layering=0.5)
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
     first, second = line_shares(field, look, np.full((1, 3), 0.9, dtype=np.float32), lines)
@@ -689,7 +689,7 @@ def test_streaks_stay_on_the_surface(motion, ink):
 @pytest.mark.parametrize("name", mainly(HATCHED[:1], HATCHED))
 def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
-    if look.lines == "even" and motion == "zoomed":
+    if look.ink == "even" and motion == "zoomed":
         # At distances in pixels, a zoom needs other lines.
         look = replace(look, unit="world", unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9

@@ -339,7 +339,7 @@ def test_undefined_pixels_are_gray():
         {"anchor": "surface", "flow": 1.0},
         {"magnitude": "both"},
         {"foreshorten": True, "oriented": True},
-        {"ink": "hatch", "lines": "even", "breaks": 0.5, "flow": 1.0},
+        {"ink": "even", "breaks": 0.5, "flow": 1.0},
         {"length": 1, "step": 0.3},
     ],
     ids=str,

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.slow
 
 SIZE = 384
 PRESETS = {name: load_preset(name).look for name in preset_keys()}
-HATCHED = [name for name, look in PRESETS.items() if look.ink == "hatch"]
+HATCHED = [name for name, look in PRESETS.items() if look.ink != "soft"]
 BALL = icosphere(5)
 
 

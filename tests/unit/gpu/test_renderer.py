@@ -712,10 +712,9 @@ LOOKS = {
     },
     "fine on small features": {"anchor": "surface", "detail": 0.7, "grain": 2.5, "degree": 4},
     "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
-    "even lines": {"ink": "hatch", "lines": "even", "shading": 0.9, "grain": 3.0},
+    "even lines": {"ink": "even", "shading": 0.9, "grain": 3.0},
     "even lines, supersampled": {
-        "ink": "hatch",
-        "lines": "even",
+        "ink": "even",
         "shading": 0.9,
         "light": "lamp",
         "grain": 2.8,
@@ -725,8 +724,7 @@ LOOKS = {
         "guiding_angle": 0.5,
     },
     "even lines of an odd degree, soft": {
-        "ink": "hatch",
-        "lines": "even",
+        "ink": "even",
         "shading": 0.8,
         "grain": 4.0,
         "degree": 3,
@@ -734,8 +732,7 @@ LOOKS = {
         "hue": "families",
     },
     "even lines in Blender units, uneven": {
-        "ink": "hatch",
-        "lines": "even",
+        "ink": "even",
         "anchor": "surface",
         "unit": "world",
         "unit_size": 0.012,
@@ -766,7 +763,7 @@ DRIFTING_LOOKS = {
     | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude": "length", "degree": 3}
     | {"overshoot": 15.0},
     "drifting breaks of even lines": DRIFTING
-    | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
+    | {"ink": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
     "color noise, which does not drift": DRIFTING | {"noise": "color"},
 }
 ALL_LOOKS = LOOKS | DRIFTING_LOOKS
@@ -1278,7 +1275,7 @@ UNDEFINED_LOOKS = {
     "magnitude": {"magnitude": "both"},
     "hatched": {"ink": "hatch", "shading": 1.0},
     "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "color"},
-    "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
+    "hatched, even lines": {"ink": "even", "shading": 1.0, "grain": 2.2},
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
     "drifting": DRIFTING,
     "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "taper": True},
@@ -1347,7 +1344,7 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [MeshInstance(tube, placed(distortion), field)], camera)
 
 
-EVEN_LINES = replace(LOOK, ink="hatch", lines="even", shading=0.9, grain=3.0)
+EVEN_LINES = replace(LOOK, ink="even", shading=0.9, grain=3.0)
 
 
 def partly_undefined():

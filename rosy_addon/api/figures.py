@@ -17,7 +17,7 @@ from ..annotation.round_numbers import round_below
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.color_values import value_ends, value_ranges
-from ..compositor.look import Look, colors_magnitude, colors_values
+from ..compositor.look import Look, colors_magnitude, colors_values, uses_magnitude
 from ..compositor.look_units import scaled_look
 from ..core.cache import Cache
 from ..core.color import color_stops, map_colors
@@ -320,7 +320,7 @@ def _figure_look(
     """Return the look of all panels: its lengths in pixels, and common ranges of the color map."""
     look = scaled_look(look, scale)
     look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
-    if look.magnitude != "none" and not look.magnitude_range:
+    if uses_magnitude(look) and not look.magnitude_range:
         largest = max(float(field.magnitude.max()) for field in fields.values())
         look = replace(look, magnitude_range=largest or 1.0)
     if colors_values(look):
@@ -455,7 +455,7 @@ class _Studio:
             self._rgba(
                 replace(instance, color_values=values),
                 hue="values",
-                magnitude="none",
+                magnitude_length=False,
                 values_low=-slope * at_zero,
                 values_high=slope * (1.0 - at_zero),
                 color_map=DIFFERENCE_COLORS,

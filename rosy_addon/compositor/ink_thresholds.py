@@ -27,7 +27,7 @@ from .hatching import (
     soft_rank_of,
     standard_streak,
 )
-from .inks import Inks, inks_of
+from .inks import Inks, has_ink_per_line, inks_of
 from .lic_images import LicImages
 from .look import Look
 from .pixel_field import PixelField
@@ -450,7 +450,7 @@ def _even_sample(
 def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
     """Return the number of lines that cross at most, and their inks: one each, or one for all."""
     layers = min(look.layers, line_count, MAX_LAYERS)
-    return layers, inks_of(look, layers if look.hue == "families" else 1)
+    return layers, inks_of(look, layers if has_ink_per_line(look) else 1)
 
 
 def ink_of_thresholds(

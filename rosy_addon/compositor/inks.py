@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
-from .look import Look, colors_magnitude, is_hatched
+from .look import Look, has_tone_inks, is_hatched
 
 #: Maximum number of inks.
 MAX_INKS = 12
@@ -56,10 +56,8 @@ class Inks:
     ----------
     paper : (3,) float32 ndarray
         Linear color.
-    dark, middle, light : (n, 3) float32 ndarray
-        Linear colors of the n inks in the shadows, at the tone `mid_tone`, and in the lights.
-    mid_tone : float
-        Between 0 and 1.
+    dark, light : (n, 3) float32 ndarray
+        Linear colors of the n inks in the shadows and in the lights.
     is_light : bool
         Whether the ink is lighter than the paper. Lighter tones then need more ink.
     min_transmittance : float
@@ -69,9 +67,7 @@ class Inks:
 
     paper: np.ndarray
     dark: np.ndarray
-    middle: np.ndarray
     light: np.ndarray
-    mid_tone: float
     is_light: bool
     min_transmittance: float
 
@@ -90,22 +86,16 @@ class Inks:
         (P, 3) float32 ndarray
             Linear color. Read-only if there is only one.
         """
-        if (
-            len(self.dark) == 1
-            and (self.dark == self.middle).all()
-            and (self.dark == self.light).all()
-        ):
+        if len(self.dark) == 1 and (self.dark == self.light).all():
             return np.broadcast_to(self.dark, (len(tone), 3))
         lower = np.minimum(index.astype(np.intp), len(self.dark) - 1)
         upper = np.minimum(lower + 1, len(self.dark) - 1)
         fraction = (index - lower).astype(np.float32)[:, None]
-        dark, middle, light = (
+        dark, light = (
             colors[lower] + fraction * (colors[upper] - colors[lower])
-            for colors in (self.dark, self.middle, self.light)
+            for colors in (self.dark, self.light)
         )
-        lighter = np.clip((tone - np.float32(self.mid_tone)) / np.float32(1 - self.mid_tone), 0, 1)
-        darker = np.clip(1 - tone / np.float32(self.mid_tone), 0, 1)
-        return middle + lighter[:, None] * (light - middle) + darker[:, None] * (dark - middle)
+        return dark + tone[:, None] * (light - dark)
 
     def transmittance(self, ink: np.ndarray) -> np.ndarray:
         """(..., 3) ratio of (..., 3) ink to paper, by channel, both complemented for light ink."""
@@ -137,7 +127,7 @@ class Inks:
 
 def has_ink_per_line(look: Look) -> bool:
     """Whether each line, or each family of lines, has its own ink."""
-    return is_hatched(look) and look.hue == "families" and not colors_magnitude(look)
+    return is_hatched(look) and look.hue == "families"
 
 
 def ink_count(look: Look, line_count: int, family_count: int) -> int:
@@ -166,12 +156,10 @@ def inks_of(look: Look, families: int = 1) -> Inks:
         Number of inks (see `ink_count`).
     """
     paper = to_linear(from_hex(look.paper_color))
-    light_code = look.ink_color_light if look.ink_ramp else look.ink_color
-    dark, light = (_ink_series(code, families) for code in (look.ink_color, light_code))
-    middle, mid_tone = (dark + light) / 2, 0.5
-    if look.ink_ramp and look.ink_middle > 0:
-        middle, mid_tone = _ink_series(look.ink_color_middle, families), look.ink_middle
-    inks = Inks(paper, dark, middle, light, mid_tone, is_light(look), 0.0)
+    dark = light = _ink_series(look.ink_color, families)
+    if has_tone_inks(look):
+        light = _ink_series(look.ink_color_light, families)
+    inks = Inks(paper, dark, light, is_light(look), 0.0)
     solid_ink = inks.light if inks.is_light else inks.dark
     return replace(inks, min_transmittance=float(np.max(inks.luminance_transmittance(solid_ink))))
 

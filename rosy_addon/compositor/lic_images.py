@@ -57,7 +57,7 @@ def lic_images(
 
 def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
     """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
-    if look.magnitude not in ("length", "both"):
+    if not look.magnitude_length:
         return None
     look = with_magnitude_range(look, field)
     limits = np.empty(len(field.pixel), dtype=np.int32)

@@ -26,13 +26,18 @@ from ..core.settings import (
 
 
 def colors_magnitude(look: Any) -> bool:
-    """Return whether the magnitude of the field drives the color of the lines."""
-    return look.magnitude in ("color", "both")
+    """Return whether the hue of the lines shows the magnitude of the field."""
+    return look.hue == "magnitude"
+
+
+def uses_magnitude(look: Any) -> bool:
+    """Return whether the magnitude of the field drives the color or the length of the lines."""
+    return colors_magnitude(look) or look.magnitude_length
 
 
 def colors_values(look: Any) -> bool:
-    """Return whether numbers on the surface drive the color of the lines."""
-    return look.hue == "values" and not colors_magnitude(look)
+    """Return whether the hue of the lines shows numbers on the surface."""
+    return look.hue == "values"
 
 
 def is_hatched(look: Any) -> bool:
@@ -43,6 +48,11 @@ def is_hatched(look: Any) -> bool:
 def is_even(look: Look) -> bool:
     """Return whether lines of ink are drawn at even distances."""
     return look.ink == "even"
+
+
+def has_colored_noise(look: Look) -> bool:
+    """Return whether streaks are made of three channels of noise."""
+    return look.hue == "noise" and not is_hatched(look)
 
 
 def _has_streaks(look: Any) -> bool:
@@ -56,7 +66,7 @@ def has_flow(look: Any) -> bool:
 
 
 def _can_flow(look: Any) -> bool:
-    return _has_streaks(look) and look.method in ("sheets", "ibfv") and look.noise == "gray"
+    return _has_streaks(look) and look.method in ("sheets", "ibfv") and not has_colored_noise(look)
 
 
 def _is_lit(look: Any) -> bool:
@@ -67,8 +77,9 @@ def _uses_ink_color(look: Any) -> bool:
     return is_hatched(look) and not colors_magnitude(look)
 
 
-def _uses_ink_ramp(look: Any) -> bool:
-    return _uses_ink_color(look) and look.ink_ramp
+def has_tone_inks(look: Look) -> bool:
+    """Return whether the color of the ink depends on the tone."""
+    return is_hatched(look) and look.hue == "tone"
 
 
 #: Where the settings of singularities are shown, and the stage that they affect.
@@ -270,15 +281,6 @@ class Look:
         panel="streaks",
         applies=lambda look: look.anchor == "surface",
     )
-    noise: str = choice(
-        "gray",
-        "Color of the noise, and so of the streaks",
-        {
-            "gray": "One channel",
-            "color": "Three channels, each convolved separately: a plaid",
-        },
-        panel="color",
-    )
     anchor: str = choice(
         "picture",
         "What the noise stays attached to when something moves",
@@ -294,11 +296,16 @@ class Look:
         "What the hue of the lines shows",
         {
             "one": "Same hue for all",
+            "noise": "Random hues of soft streaks: three channels of noise, each convolved separately, "
+            "which cross like the threads of a plaid",
             "families": "One hue for each line that the field distinguishes: major and minor of "
             "tensors, or dir0, dir1 and so on, if each is the same line on the whole mesh. In "
             "hatching, lines of other fields get inks by their distance to the guiding angle",
             "values": "Numbers on the surface, such as the angle between two fields, through the "
             "color map",
+            "magnitude": "Magnitude of the field, through the color map",
+            "tone": "Tone of hatching: the ink blends from its color in the shadows to the highlight "
+            "color in the lights",
         },
         option_labels={"one": "Single"},
         **_shading("color"),
@@ -353,18 +360,12 @@ class Look:
         panel="streaks",
         applies=lambda look: not look.cross_creases,
     )
-    magnitude: str = choice(
-        "none",
-        "What the magnitude of the field controls",
-        {
-            "none": "Nothing",
-            "color": "The color, through a color map",
-            "length": "The length of the streaks",
-            "both": "Color and length",
-        },
-        label="Magnitude Drives",
-        option_labels={"none": "Nothing"},
-        panel="color",
+    magnitude_length: bool = switch(
+        False,
+        "Draw streaks whose length is proportional to the magnitude of the field",
+        label="Length by Magnitude",
+        panel="streaks",
+        applies=_has_streaks,
     )
     magnitude_range: float = number(
         0.0,
@@ -373,7 +374,7 @@ class Look:
         "Magnitude at the top of the color map and at full length. 0: the largest visible magnitude",
         panel="color",
         panel_label="Top Value",
-        applies=lambda look: look.magnitude != "none",
+        applies=uses_magnitude,
     )
     color_map: str = choice(
         "viridis",
@@ -468,31 +469,11 @@ class Look:
         **_shading("ink"),
     )
     ink_color: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
-    ink_ramp: bool = switch(
-        False,
-        "Blend the ink to a second color, the highlight color, from the shadows to the lights",
-        label="Second Color",
-        **_ink(_uses_ink_color),
-    )
     ink_color_light: str = color(
         "#b06a3c",
         "Color of the ink in the lights",
         label="Highlight Color",
-        **_ink(_uses_ink_ramp),
-    )
-    ink_middle: float = number(
-        0.0,
-        0.0,
-        0.99,
-        "Tone at which the ink has a third color, between the shadows and the lights. 0: none",
-        label="Midtone Position",
-        **_ink(_uses_ink_ramp),
-    )
-    ink_color_middle: str = color(
-        "#6f2d4f",
-        "Color of the ink at the midtone position",
-        label="Midtone Color",
-        **_ink(lambda look: _uses_ink_ramp(look) and look.ink_middle > 0),
+        **_ink(has_tone_inks),
     )
     paper_color: str = color("#ffffff", "Color of the paper", **_ink())
     clear_paper: bool = switch(
@@ -585,4 +566,4 @@ def lic_key(look: Look) -> tuple[Any, ...]:
 
     Two looks with equal keys have the same LIC images of the same G-buffer.
     """
-    return stage_key(look, Stage.LIC)
+    return (*stage_key(look, Stage.LIC), has_colored_noise(look))

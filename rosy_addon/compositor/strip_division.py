@@ -19,7 +19,7 @@ from .hatching import (
     overshoot_steps,
 )
 from .image_noise import MAX_MARGIN, high_pass_margin
-from .look import Look, colors_magnitude, is_even
+from .look import Look, is_even, uses_magnitude
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
 from .paper_grain import surface_paper_grain_args
@@ -98,10 +98,9 @@ def group_strips(
         that only one process should make.
     """
     fields = [instance.field for instance in instances if instance.field is not None]
-    depends_on_all = colors_magnitude(look) or look.magnitude in ("length", "both")
     if (
         is_even(look)
-        or (depends_on_all and not look.magnitude_range)
+        or (uses_magnitude(look) and not look.magnitude_range)
         or high_pass_margin(look.high_pass) > MAX_MARGIN
         or any(field.direction_ratios is not None or field.family_count > 1 for field in fields)
     ):

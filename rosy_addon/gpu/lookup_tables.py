@@ -62,9 +62,9 @@ def undirected_offsets(resources: GpuResources, look: Look) -> Any:
 
 
 def ink_table(resources: GpuResources, kind: FieldKind, look: Look) -> Any:
-    """Return the inks of `inks.Inks`: the dark ones, then the middle ones, then the light ones."""
+    """Return the inks of `inks.Inks`: the dark ones, then the light ones."""
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
-    stops = np.concatenate([inks.dark, inks.middle, inks.light])
+    stops = np.concatenate([inks.dark, inks.light])
     return resources.lookup_texture("inks", stops.tobytes(), lambda: stops[None])
 
 

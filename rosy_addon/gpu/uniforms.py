@@ -30,7 +30,7 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_values, has_flow, is_even, is_hatched
+from ..compositor.look import Look, colors_magnitude, colors_values, has_flow, is_even, is_hatched
 from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -56,7 +56,6 @@ from .defines import (
     FLOW_TO_ANGLE,
     HEADLIGHT,
     KERNELS,
-    MAGNITUDE_MODES,
     POINT_LIGHT,
     SUN_LIGHT,
 )
@@ -122,11 +121,10 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(look),
-        "magnitude_mode": MAGNITUDE_MODES[look.magnitude],
+        "colors_magnitude": int(colors_magnitude(look)),
         "colors_values": int(colors_values(look)),
         "paper_color": (*inks.paper, 1.0),
         "ink_count": len(inks.dark),
-        "ink_mid_tone": inks.mid_tone,
         "min_transmittance": inks.min_transmittance,
         "is_light_ink": int(inks.is_light),
         "softness": softness(look.crispness),

@@ -25,7 +25,7 @@ from ..compositor.ink_thresholds import (
     ROUNDING_SPREAD,
     layer_inks,
 )
-from ..compositor.look import Look
+from ..compositor.look import Look, has_tone_inks
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
 from ..compositor.target_tone import MIN_TONE_RANGE
 from ..core.color import from_hex, to_linear
@@ -98,7 +98,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
         Number of lines through a point.
     """
     layers, inks = layer_inks(look, line_count)
-    ramp = look.ink_color_light if look.ink_ramp else look.ink_color
+    ramp = look.ink_color_light if has_tone_inks(look) else look.ink_color
     values = {
         "Shading": look.shading,
         "Black": look.tone_black,
@@ -107,7 +107,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
         "Layers": layers,
         "Layering": look.layering,
         "Crispness": look.crispness,
-        "Highlights": float(look.ink_ramp),
+        "Highlights": float(has_tone_inks(look)),
         "Highlight Color": (*to_linear(from_hex(ramp)).tolist(), 1.0),
         "Paper": (*to_linear(from_hex(look.paper_color)).tolist(), 1.0),
     }

@@ -74,8 +74,8 @@ TEXTURE_SETTINGS = (
         "grain",
         "density",
     ),
-    *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
-    *("magnitude", "magnitude_range", "values_low", "values_high", "color_map"),
+    *("high_pass", "hue", "seed", "gain", "cross_creases", "crease_angle"),
+    *("magnitude_length", "magnitude_range", "values_low", "values_high", "color_map"),
     *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 

@@ -208,8 +208,8 @@ def _lines(
 def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     args = surface_paper_grain_args(look)
-    args.pop("channels")
-    noise = texel_noise(on, replace(look, noise="color", **args))
+    channels = args.pop("channels")
+    noise = texel_noise(on, replace(look, **args), channels)
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]

@@ -197,9 +197,7 @@ def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -
     settings = context.scene.rosy
     if settings.look.hue != "values":
         return
-    row = column.row()
-    row.active = colors_values(settings.look)
-    _draw_name(row, settings, "color_attribute", _active_mesh_object(context))
+    _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
 
 
 def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:

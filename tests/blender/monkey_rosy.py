@@ -256,7 +256,7 @@ def tone(monkey):
     settings = bpy.context.scene.rosy
     settings.look.tone = monkey.pick(["light", "attribute", "image", "picture"])
     settings.tone_attribute = monkey.pick(["", "Occlusion", "position", "rosy", monkey.name()])
-    settings.look.hue = monkey.pick(["one", "families", "values"])
+    settings.look.hue = monkey.pick(["one", "noise", "families", "values", "magnitude", "tone"])
     settings.color_attribute = monkey.pick(["", "Occlusion", "position", "rosy", monkey.name()])
     settings.tone_picture = monkey.pick(["", str(monkey.folder / "none.png"), "//x####.png"])
     obj = select_mesh(monkey)

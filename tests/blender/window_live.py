@@ -503,7 +503,7 @@ def edits_are_followed():
     switch("ON")
     yield from wait_for_final_pictures()
     scene.rosy.look.gain = 1.2
-    scene.rosy.look.noise = "color"
+    scene.rosy.look.hue = "noise"
     yield from check_is_bake("live-look")
     with in_view():
         bpy.ops.ed.undo_push(message="look")

@@ -19,7 +19,7 @@ from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
 from scenes import add_camera, aim, contents, pixels, read_instances, render
 
-LOOK = Look(magnitude="color", singularity_dots="visible", supersampling=2)
+LOOK = Look(hue="magnitude", singularity_dots="visible", supersampling=2)
 
 
 def keys():

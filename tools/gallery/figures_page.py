@@ -146,7 +146,7 @@ def _render_with_key() -> Image.Image:
     scene.world = bpy.data.worlds.new("World")
     scene.world.color = (1.0, 1.0, 1.0)
     scene.view_settings.view_transform = "Standard"
-    look = replace(LOOK, magnitude="color", singularity_dots="visible", singularity_labels=False)
+    look = replace(LOOK, hue="magnitude", singularity_dots="visible", singularity_labels=False)
     apply_look(scene.rosy, look)
     settings = scene.rosy
     settings.key_counts = True

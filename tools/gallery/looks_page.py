@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look import Look, uses_magnitude
 from rosy_addon.core.settings import Choice, Color, Number, Setting, Switch, settings_of
 from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.curvature import curvature_field
@@ -147,7 +147,7 @@ def _presets() -> str:
     panels = []
     for preset in presets:
         look = preset.look.with_settings({"supersampling": 2})
-        field = even if look.magnitude == "none" else curved
+        field = even if not uses_magnitude(look) else curved
         camera = view(monkey, (-26, 8), (SIDE, SIDE), look.supersampling)
         shown = display(compose_view(monkey, field, look, camera).rgba)
         panels.append(Panel(shown, preset.name))

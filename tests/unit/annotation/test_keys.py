@@ -300,7 +300,7 @@ def largest_visible(view_input):
 
 
 def test_the_range_is_the_largest_visible_magnitude():
-    look = Look(magnitude="color", supersampling=1)
+    look = Look(hue="magnitude", supersampling=1)
     view_input = view(look)
     picture = draw_picture(view_input)
     low, high = picture.color_range
@@ -318,7 +318,7 @@ def test_the_range_does_not_reach_beyond_the_field():
     """Where pixels with several samples see the edge of a face, they do not extend it."""
     largest = view(Look()).instances[0].field.magnitude.max()
     for supersampling in (1, 2, 3):
-        look = Look(magnitude="color", supersampling=supersampling)
+        look = Look(hue="magnitude", supersampling=supersampling)
         picture = draw_picture(view(look))
         assert 0.9 * largest < picture.color_range[1] <= largest * (1 + 1e-4)
 
@@ -331,7 +331,7 @@ def test_fields_with_ranges_of_their_own_have_no_common_one():
     other = MeshInstance(first.surface, matrix, RosyField(2, vectors))
     camera = orthographic_camera(look_at((0.7, -5, 0), (0.7, 0, 0)), 160, 120, scale=4.0)
     for top, expected in ((0.0, None), (0.7, (0.0, 0.7))):
-        look = Look(magnitude="color", magnitude_range=top)
+        look = Look(hue="magnitude", magnitude_range=top)
         picture = draw_picture(view(look, (first, other), camera))
         assert picture.color_range == expected
         assert picture_key(look, picture).color_scale.high == (top or None)

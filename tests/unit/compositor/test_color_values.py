@@ -135,14 +135,6 @@ def test_streaks_darken_and_lighten_the_color():
     assert colors.std() > 0.02 and abs(np.median(colors) - gray) < 0.06
 
 
-def test_the_magnitude_has_precedence():
-    instance = of_vertices(BALL, BALL.vertices[:, 0])
-    with_magnitude = replace(FLAT, magnitude="color")
-    colors, _ = drawn([instance], with_magnitude)
-    expected, _ = drawn([replace(instance, color_values=None)], replace(with_magnitude, hue="one"))
-    np.testing.assert_array_equal(colors, expected)
-
-
 def test_without_numbers_there_is_one_line():
     with pytest.raises(RosyError, match="hue 'values' needs numbers"):
         drawn([replace(numbered(BALL, BALL.corner_vertex), color_values=None)], FLAT)

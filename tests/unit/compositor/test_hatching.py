@@ -447,9 +447,9 @@ def test_undefined_faces_keep_the_tone_in_color(kind):
 
 
 COLORED_INKS = {
-    "ramp": {"ink_ramp": True, "ink_color": "#201848"},
+    "ramp": {"hue": "tone", "ink_color": "#201848"},
     "ramp, light": {
-        "ink_ramp": True,
+        "hue": "tone",
         "ink_color": "#c08050",
         "ink_color_light": "#fff0c0",
         "paper_color": "#182028",
@@ -457,27 +457,20 @@ COLORED_INKS = {
     "families": {"hue": "families"},
     "families, colored": {"hue": "families", "ink_color": "#204890", "paper_color": "#f4ecd8"},
     "families, light": {"hue": "families", "ink_color": "#f0e8d0", "paper_color": "#101418"},
-    "families, ramp": {"hue": "families", "ink_ramp": True},
-    "ramp with a third ink": {"ink_ramp": True, "ink_color": "#201848", "ink_middle": 0.35},
 }
 
 
-def test_a_third_ink_is_between_the_other_two():
-    look = Look(ink="hatch", ink_ramp=True, ink_middle=0.25)
-    codes = [look.ink_color, look.ink_color_middle, look.ink_color_light]
-    dark, middle, light = (to_linear(from_hex(code)) for code in codes)
+def test_inks_of_tones_are_interpolated():
+    look = Look(ink="hatch", hue="tone")
+    dark, light = (to_linear(from_hex(code)) for code in (look.ink_color, look.ink_color_light))
     tones = np.array([0.0, 0.125, 0.25, 0.625, 1.0], dtype=np.float32)
     actual = inks_of(look).ink_at_tone(np.zeros(5), tones)
-    expected = [dark, (dark + middle) / 2, middle, (middle + light) / 2, light]
-    np.testing.assert_allclose(actual, expected, atol=1e-6)
-    # Without a third ink, colors are interpolated linearly.
-    actual = inks_of(replace(look, ink_middle=0.0)).ink_at_tone(np.zeros(5), tones)
     np.testing.assert_allclose(actual, dark + tones[:, None] * (light - dark), atol=1e-6)
 
 
 @pytest.mark.parametrize(
     "kind",
-    mainly(["families, light", "families, ramp", "ramp with a third ink"], COLORED_INKS),
+    mainly(["families, light", "ramp, light"], COLORED_INKS),
 )
 def test_colored_inks_reproduce_a_ramp(kind):
     assert ramp_error(replace(INK, layers=3, **COLORED_INKS[kind])) <= 0.04
@@ -521,7 +514,7 @@ def test_inks_swap_ranks_without_a_seam(degree):
         np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
     ).all()
     assert line_ink_indices(field, replace(look, hue="one")) is None
-    assert line_ink_indices(field, replace(look, magnitude="color")) is None
+    assert line_ink_indices(field, replace(look, hue="magnitude")) is None
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
@@ -537,7 +530,7 @@ def test_families_keep_their_inks_at_any_guiding_angle():
 
 def test_ink_is_colored_by_magnitude():
     """Pixels covered by ink have the colors of the color map."""
-    look = replace(INK, magnitude="color", color_map="gray", clear_paper=True, shading=0.5)
+    look = replace(INK, hue="magnitude", color_map="gray", clear_paper=True, shading=0.5)
     surface = ball()
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     height = surface.vertices[surface.corner_vertex[surface.face_start[:-1]], 2]

@@ -148,10 +148,10 @@ HOSTILE = {
     "infinite": ((HEAD + '"gain": 1e999}}').encode(), "setting 'gain' is inf"),
     "minus infinite": ((HEAD + '"gain": -Infinity}}').encode(), "setting 'gain' is -inf"),
     "list": (
-        (HEAD + '"noise": ["gray"]}}').encode(),
-        "setting 'noise' is ['gray'], expected one of",
+        (HEAD + '"hue": ["one"]}}').encode(),
+        "setting 'hue' is ['one'], expected one of",
     ),
-    "object": ((HEAD + '"noise": {}}}').encode(), "setting 'noise' is {}, expected one of"),
+    "object": ((HEAD + '"hue": {}}}').encode(), "setting 'hue' is {}, expected one of"),
     "null": ((HEAD + '"gain": null}}').encode(), "setting 'gain' is None, expected a number"),
     "bool": (
         (HEAD + '"length": true}}').encode(),
@@ -171,7 +171,7 @@ HOSTILE = {
     "name twice": (b'{"name": "a", "name": "b"}', "'name' appears twice"),
     "newer": ((HEAD + '"sparkle": 1}}').encode(), "unknown setting 'sparkle': check its spelling"),
     "newer, long": ((HEAD + f'"{"x" * 60_000}": 1' + "}}").encode(), "unknown setting 'xxx"),
-    "long text": ((HEAD + f'"noise": "{"x" * 60_000}"' + "}}").encode(), "setting 'noise' is 'xxx"),
+    "long text": ((HEAD + f'"hue": "{"x" * 60_000}"' + "}}").encode(), "setting 'hue' is 'xxx"),
     "lines in a key": ((HEAD + '"a\\nb": 1}}').encode(), "unknown setting 'a\\nb'"),
     "UTF-16": ('{"name": "a"}'.encode("utf-16"), "binary data"),
     "Latin-1": ('{"name": "Schräg"}'.encode("latin-1"), "not UTF-8"),
@@ -449,10 +449,10 @@ def test_shipped_previews_show_their_looks(name):
     "look",
     [
         Look(method="brute", length=8000),
-        Look(method="members", length=8000, step=0.05, noise="color"),
+        Look(method="members", length=8000, step=0.05, hue="noise"),
         *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
         Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
-        Look(light="scene", hue="families", display="flat", magnitude="both"),
+        Look(light="scene", display="flat", hue="magnitude", magnitude_length=True),
     ],
     ids=["brute", "members", "large", "ink", "others"],
 )

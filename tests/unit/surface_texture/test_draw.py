@@ -53,8 +53,8 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     instance = MeshInstance(surface, np.eye(4), RosyField(4, field.vectors * middle))
     points = surface_points(surface, 20_000)
     for changes in (
-        {"noise": "color"},
-        {"magnitude": "both"},
+        {"hue": "noise"},
+        {"hue": "magnitude", "magnitude_length": True},
         {"taper": True},
         {"method": "ibfv"},
     ):

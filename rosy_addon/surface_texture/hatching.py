@@ -26,7 +26,7 @@ from ..compositor.ink_thresholds import (
 )
 from ..compositor.lic import lic_lengths
 from ..compositor.lic_images import LicImages
-from ..compositor.look import Look
+from ..compositor.look import Look, is_even
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
 from ..compositor.shading import Light

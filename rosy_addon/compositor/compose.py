@@ -131,7 +131,7 @@ def compose(
             with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
                 pictures.append(canvas.picture(strip))
     rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
-    color_range = common_color_range({layer.look.magnitude_range for layer in layers})
+    color_range = common_color_range({layer.look.color_range for layer in layers})
     if not colors_magnitude(look):
         color_range = None
     if canvas.map_position is not None:
@@ -417,7 +417,7 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
     """
     hue, position = None, None
     if colors_magnitude(look):
-        hue = map_colors(relative_magnitude(field, look), look.color_map)
+        hue = map_colors(relative_magnitude(field, look.color_range), look.color_map)
     elif field.map_position is not None:
         position = field.map_position
         hue = map_colors(np.nan_to_num(position), look.color_map)

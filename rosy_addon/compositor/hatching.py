@@ -156,7 +156,7 @@ def _render_one_ink(
     inks = inks_of(look)
     by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
-        ink = to_linear(map_colors(relative_magnitude(field, look), look.color_map))
+        ink = to_linear(map_colors(relative_magnitude(field, look.color_range), look.color_map))
     else:
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
     if position is not None:

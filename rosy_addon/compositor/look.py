@@ -13,12 +13,14 @@ from ..annotation.singularity_settings import (
 )
 from ..core.errors import RosyError
 from ..core.settings import (
+    Numbers,
     Stage,
     always,
     check_settings,
     choice,
     color,
     number,
+    numbers,
     settings_of,
     stage_key,
     switch,
@@ -38,6 +40,12 @@ def uses_magnitude(look: Any) -> bool:
 def colors_values(look: Any) -> bool:
     """Return whether the hue of the lines shows numbers on the surface."""
     return look.hue == "values"
+
+
+def magnitude_range(look: Look) -> tuple[float, float] | None:
+    """Return the magnitudes at the ends of the range of a look; None if the fields determine them."""
+    is_set = uses_magnitude(look) and not colors_values(look) and any(look.color_range)
+    return look.color_range if is_set else None
 
 
 def is_hatched(look: Any) -> bool:
@@ -310,23 +318,6 @@ class Look:
         option_labels={"one": "Single"},
         **_shading("color"),
     )
-    values_low: float = number(
-        0.0,
-        -1e30,
-        1e30,
-        "Number at the bottom of the color map. Above the number at the top, the map is inverted. Both 0: "
-        "the range of the numbers",
-        label="Bottom Value",
-        **_shading("color", colors_values),
-    )
-    values_high: float = number(
-        0.0,
-        -1e30,
-        1e30,
-        "Number at the top of the color map. Both 0: the range of the numbers",
-        label="Top Value",
-        **_shading("color", colors_values),
-    )
     seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
     gain: float = number(
         2.5,
@@ -367,14 +358,13 @@ class Look:
         panel="streaks",
         applies=_has_streaks,
     )
-    magnitude_range: float = number(
-        0.0,
-        0.0,
-        1e30,
-        "Magnitude at the top of the color map and at full length. 0: the largest visible magnitude",
-        panel="color",
-        panel_label="Top Value",
-        applies=uses_magnitude,
+    color_range: tuple[float, float] = numbers(
+        (0.0, 0.0),
+        "Magnitudes or numbers at the bottom and at the top of the color map, and of streaks without and "
+        "with full length. If the bottom value is above the top value, the map is inverted. Both 0: from 0 to "
+        "the largest visible magnitude, or the range of the numbers",
+        {"Bottom Value": (-1e30, 1e30), "Top Value": (-1e30, 1e30)},
+        **_shading("color", lambda look: uses_magnitude(look) or colors_values(look)),
     )
     color_map: str = choice(
         "viridis",
@@ -429,28 +419,11 @@ class Look:
         label="Multiply by Light",
         **_shading("tone", lambda look: look.tone != "light"),
     )
-    tone_black: float = number(
-        0.0,
-        -1e6,
-        1e6,
-        "Input value that becomes black",
-        panel_label="Black",
-        **_shading("tone"),
-    )
-    tone_white: float = number(
-        1.0,
-        -1e6,
-        1e6,
-        "Input value that becomes white. Below the value for black, the tone is inverted",
-        panel_label="White",
-        **_shading("tone"),
-    )
-    tone_gamma: float = number(
-        1.0,
-        0.05,
-        20.0,
-        "Gamma of the tones between. Above 1 they become lighter, below 1 darker",
-        panel_label="Gamma",
+    tone_levels: tuple[float, float, float] = numbers(
+        (0.0, 1.0, 1.0),
+        "Input values that become black and white, and the gamma of the tones between, as the levels of "
+        "image programs. White below black inverts the tone. A gamma above 1 lightens, one below 1 darkens",
+        {"Black": (-1e6, 1e6), "White": (-1e6, 1e6), "Gamma": (0.05, 20.0)},
         **_shading("tone"),
     )
     ink: str = choice(
@@ -547,18 +520,20 @@ class Look:
         check_settings(self)
 
     def with_settings(self, settings: dict[str, Any]) -> Look:
-        """Return the look with some settings changed.
+        """Return the look with some settings changed. Numbers may be a list, as in JSON files.
 
         Raises
         ------
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known = settings_of(Look)
-        for name in settings:
+        known, changes = settings_of(Look), dict(settings)
+        for name, value in settings.items():
             if name not in known:
                 raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
-        return replace(self, **settings)
+            if isinstance(known[name], Numbers) and isinstance(value, list):
+                changes[name] = tuple(value)
+        return replace(self, **changes)
 
 
 def lic_key(look: Look) -> tuple[Any, ...]:
@@ -566,4 +541,5 @@ def lic_key(look: Look) -> tuple[Any, ...]:
 
     Two looks with equal keys have the same LIC images of the same G-buffer.
     """
-    return (*stage_key(look, Stage.LIC), has_colored_noise(look))
+    length_range = magnitude_range(look) if look.magnitude_length else None
+    return (*stage_key(look, Stage.LIC), has_colored_noise(look), length_range)

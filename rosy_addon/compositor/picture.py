@@ -38,6 +38,6 @@ class Picture:
     line_count: int = 0
 
 
-def common_color_range(tops: Collection[float]) -> tuple[float, float] | None:
-    """Return `Picture.color_range`, given the magnitudes with the last color for each degree."""
-    return (0.0, min(tops)) if len(set(tops)) == 1 else None
+def common_color_range(ranges: Collection[tuple[float, float]]) -> tuple[float, float] | None:
+    """Return `Picture.color_range`, given the ranges of the magnitudes of each degree."""
+    return min(ranges) if len(set(ranges)) == 1 else None

@@ -19,7 +19,7 @@ from .hatching import (
     overshoot_steps,
 )
 from .image_noise import MAX_MARGIN, high_pass_margin
-from .look import Look, is_even, uses_magnitude
+from .look import Look, is_even, magnitude_range, uses_magnitude
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
 from .paper_grain import surface_paper_grain_args
@@ -100,7 +100,7 @@ def group_strips(
     fields = [instance.field for instance in instances if instance.field is not None]
     if (
         is_even(look)
-        or (uses_magnitude(look) and not look.magnitude_range)
+        or (uses_magnitude(look) and magnitude_range(look) is None)
         or high_pass_margin(look.high_pass) > MAX_MARGIN
         or any(field.direction_ratios is not None or field.family_count > 1 for field in fields)
     ):

@@ -168,7 +168,7 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     tone : ndarray
         Of any shape.
     look : Look
-        Its `tone_black` becomes 0 and its `tone_white` becomes 1. The gamma is applied after that.
+        The black of its `tone_levels` becomes 0 and the white 1. The gamma is applied after that.
 
     Returns
     -------
@@ -177,14 +177,16 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     """
     scale, black = tone_curve(look)
     stretched = np.maximum((tone - np.float32(black)) * np.float32(scale), 0)
-    if look.tone_gamma != 1:
-        stretched = stretched ** np.float32(1 / look.tone_gamma)
+    gamma = look.tone_levels[2]
+    if gamma != 1:
+        stretched = stretched ** np.float32(1 / gamma)
     return stretched.astype(np.float32, copy=False)
 
 
 def tone_curve(look: Look) -> tuple[float, float]:
     """(scale, black) of a look: tones are mapped to (tone - black) * scale before the gamma."""
-    tone_range = look.tone_white - look.tone_black
+    black, white, _ = look.tone_levels
+    tone_range = white - black
     if abs(tone_range) < MIN_TONE_RANGE:
         tone_range = MIN_TONE_RANGE if tone_range >= 0 else -MIN_TONE_RANGE
-    return 1 / tone_range, look.tone_black
+    return 1 / tone_range, black

@@ -14,7 +14,7 @@ from ..compositor.even_lines import COARSE_RATIO, SPACING_GRAINS
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
-from ..compositor.look import is_even, is_hatched, uses_magnitude
+from ..compositor.look import is_even, is_hatched, magnitude_range, uses_magnitude
 from ..compositor.look_units import instance_line_spacing
 from . import lookup_tables
 from .defines import REDUCE_BLOCK
@@ -96,7 +96,7 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
     }
-    if uses_magnitude(look) and not look.magnitude_range:
+    if uses_magnitude(look) and magnitude_range(look) is None:
         values, compute = frame.textures["field_values"], frame.compute
         textures["max_magnitude"] = largest_magnitude(resources, values, kind.degree, compute)
     if frame.samples is not None:

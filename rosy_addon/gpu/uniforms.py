@@ -30,7 +30,16 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_magnitude, colors_values, has_flow, is_even, is_hatched
+from ..compositor.lic_images import distinct_ends
+from ..compositor.look import (
+    Look,
+    colors_magnitude,
+    colors_values,
+    has_flow,
+    is_even,
+    is_hatched,
+    magnitude_range,
+)
 from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -108,6 +117,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     _, crossing = streak_moments(*streak_args(look), kind.line_count, kernel=kernel)
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
     statistics = look_streak_statistics(look) if is_hatched(look) else None
+    ends = magnitude_range(look)
     return {
         **covering_uniforms(kind),
         "kernel": KERNELS[kernel],
@@ -122,6 +132,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "family_channel": len(kind.channels) - 1,
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(look),
         "colors_magnitude": int(colors_magnitude(look)),
+        "magnitude_ends": distinct_ends(*ends) if ends else (0.0, 0.0),
         "colors_values": int(colors_values(look)),
         "paper_color": (*inks.paper, 1.0),
         "ink_count": len(inks.dark),
@@ -191,7 +202,7 @@ def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None)
         "curve_light": int(look.tone == "light"),
         "curve_black": black,
         "curve_scale": scale,
-        "curve_power": 1 / look.tone_gamma,
+        "curve_power": 1 / look.tone_levels[2],
         **matrix_rows("to_reference", "xyw", to_reference[[0, 1, 3]]),
     }
 

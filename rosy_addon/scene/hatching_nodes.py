@@ -101,9 +101,7 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
     ramp = look.ink_color_light if has_tone_inks(look) else look.ink_color
     values = {
         "Shading": look.shading,
-        "Black": look.tone_black,
-        "White": look.tone_white,
-        "Gamma": look.tone_gamma,
+        **dict(zip(("Black", "White", "Gamma"), look.tone_levels, strict=True)),
         "Layers": layers,
         "Layering": look.layering,
         "Crispness": look.crispness,

@@ -330,7 +330,7 @@ def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tup
 
 
 def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
-    """Return the settings of a look by name. Those that do not apply have their defaults.
+    """Return the settings of a look by name, as JSON. Those that do not apply have their defaults.
 
     Parameters
     ----------
@@ -339,10 +339,11 @@ def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
         Whether a mesh does not have the tone of the look. Then the light falls on it.
     """
     drawn_look = replace(look, tone_lit=True) if lacks_tone else look
-    return {
+    values = {
         name: getattr(look, name) if setting.applies(drawn_look) else setting.default
         for name, setting in settings_of(Look).items()
     }
+    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
 
 
 def _resolved_camera(

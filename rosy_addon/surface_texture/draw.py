@@ -75,7 +75,7 @@ TEXTURE_SETTINGS = (
         "density",
     ),
     *("high_pass", "hue", "seed", "gain", "cross_creases", "crease_angle"),
-    *("magnitude_length", "magnitude_range", "values_low", "values_high", "color_map"),
+    *("magnitude_length", "color_range", "color_map"),
     *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 

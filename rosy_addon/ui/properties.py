@@ -9,7 +9,7 @@ import bpy
 
 from ..compositor.look import Look
 from ..core.color import from_hex
-from ..core.settings import Choice, Color, Number, Setting, Switch, settings_of, title
+from ..core.settings import Choice, Color, Number, Numbers, Setting, Switch, settings_of, title
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
@@ -103,6 +103,10 @@ def _setting_property(setting: Setting) -> Any:
             return bpy.props.BoolProperty(**arguments)
         case Number(low=low, high=high, is_integer=True):
             return bpy.props.IntProperty(min=low, max=high, **arguments)
+        case Numbers(parts=parts):
+            lows, highs = zip(*parts.values(), strict=True)
+            arguments |= {"size": len(parts), "min": min(lows), "max": max(highs)}
+            return bpy.props.FloatVectorProperty(**arguments)
         case Number(low=low, high=high, unit=unit):
             subtype = SUBTYPE_BY_UNIT.get(unit, "NONE")
             return bpy.props.FloatProperty(min=low, max=high, subtype=subtype, **arguments)

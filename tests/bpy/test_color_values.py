@@ -80,7 +80,7 @@ def test_looks_that_color_an_attribute(scene):
 
 def test_settings_in_a_file(scene, tmp_path):
     scene.rosy.color_attribute = "Angle"
-    scene.rosy.look.hue, scene.rosy.look.values_low = "values", -2.5
+    scene.rosy.look.hue, scene.rosy.look.color_range = "values", (-2.5, 1.1)
     path = str(tmp_path / "colors.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -88,7 +88,7 @@ def test_settings_in_a_file(scene, tmp_path):
     settings = bpy.context.scene.rosy
     assert settings.color_attribute == "Angle"
     look = read_look(settings)
-    assert (look.hue, look.values_low, look.values_high) == ("values", -2.5, 0.0)
+    assert (look.hue, look.color_range) == ("values", (-2.5, 1.1))
 
 
 @pytest.mark.parametrize(

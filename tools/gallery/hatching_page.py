@@ -167,7 +167,7 @@ def _tones(bare: list[MeshInstance]) -> list[list[Panel]]:
         [
             _tone_panel(
                 occluded,
-                replace(look, tone="attribute", tone_lit=True, tone_gamma=1.3),
+                replace(look, tone="attribute", tone_lit=True, tone_levels=(0.0, 1.0, 1.3)),
                 "the same, lit",
             ),
             _tone_panel(mapped, replace(look, tone="image", tone_lit=True), "tone: image, lit"),

@@ -100,17 +100,16 @@ import rosyfields as rf
 surface = rf.Surface("spot.obj")
 field, other = rf.form(surface, 4), rf.curvature(surface, 4)
 degrees = np.degrees(field.difference(other).angle)
-rf.render(surface, field, color_values=degrees, values_high=45.0).save("spot.png")
+rf.render(surface, field, color_values=degrees, color_range=(0, 45)).save("spot.png")
 ```""",
     "- Numbers of faces are constant on each face; those of points and corners are interpolated.\n"
-    "- `values_low` and `values_high` are the numbers at the bottom and at the top of `color_map`. If "
-    "both are 0, they are the lowest and the highest number on all objects with a field, whether the "
-    "camera sees them or not, so that pictures from several sides have the same colors. If the lower "
-    "end is the greater number, the map is inverted.\n"
+    "- `color_range` holds the numbers at the bottom and at the top of `color_map`. If both are 0, they "
+    "are the lowest and the highest number on all objects with a field, whether the camera sees them or "
+    "not, so that pictures from several sides have the same colors. If the bottom is the greater number, "
+    "the map is inverted.\n"
     "- Where there is no number (NaN, or another object without the attribute), streaks are gray, and "
     "hatching has the color of its ink.\n"
-    "- `magnitude` with `color` or `both` has precedence. Hatching of [textures](textures.md) and "
-    "pictures with *Output > Relight* have the colors of their inks.",
+    "- Hatching of [textures](textures.md) and pictures with *Output > Relight* have the colors of their inks.",
 )
 
 
@@ -167,7 +166,7 @@ def _numbers() -> str:
     known = np.where(monkey.vertices[monkey.corner_vertex, 0] < 0.2, height, np.nan)
     panels = []
     for text, preset, values, settings in (
-        ("angle to the curvature field", "default", angle, {"values_high": 45.0}),
+        ("angle to the curvature field", "default", angle, {"color_range": (0.0, 45.0)}),
         ("height, magma, as an engraving", "engraving", height, {"color_map": "magma"}),
         ("height, on the left only", "default", known, {}),
     ):

@@ -306,7 +306,7 @@ def test_the_range_is_the_largest_visible_magnitude():
     low, high = picture.color_range
     assert low == 0 and high == pytest.approx(largest_visible(view_input), rel=1e-6)
     # A look with this range gives the same picture.
-    fixed = view(replace(look, magnitude_range=high))
+    fixed = view(replace(look, color_range=(0.0, high)))
     again = draw_picture(fixed)
     np.testing.assert_array_equal(again.rgba, picture.rgba)
     assert again.color_range == (0.0, high)
@@ -331,7 +331,7 @@ def test_fields_with_ranges_of_their_own_have_no_common_one():
     other = MeshInstance(first.surface, matrix, RosyField(2, vectors))
     camera = orthographic_camera(look_at((0.7, -5, 0), (0.7, 0, 0)), 160, 120, scale=4.0)
     for top, expected in ((0.0, None), (0.7, (0.0, 0.7))):
-        look = Look(hue="magnitude", magnitude_range=top)
+        look = Look(hue="magnitude", color_range=(0.0, top))
         picture = draw_picture(view(look, (first, other), camera))
         assert picture.color_range == expected
         assert picture_key(look, picture).color_scale.high == (top or None)
@@ -361,7 +361,7 @@ def test_the_range_of_numbers_as_colors(ends):
     instance = view(Look()).instances[0]
     heights = instance.surface.vertices[instance.surface.corner_vertex, 2].astype(np.float32)
     colored = replace(instance, color_values=heights)
-    look = Look(hue="values", values_low=ends[0], values_high=ends[1])
+    look = Look(hue="values", color_range=ends)
     view_input = view(look, (colored,))
     picture = draw_picture(view_input)
     expected = ends if any(ends) else (float(heights.min()), float(heights.max()))

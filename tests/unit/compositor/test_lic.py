@@ -273,7 +273,7 @@ def test_magnitude_drives_the_length_of_streaks(method):
     size = 256
     angles = np.zeros((size, size))
     rho = np.where(np.arange(size)[:, None] < size // 2, 1.0, 0.2) * np.ones((size, size))
-    look = plain(method=method, magnitude_length=True, magnitude_range=1.0)
+    look = plain(method=method, magnitude_length=True, color_range=(0.0, 1.0))
     image = tone(angles, 1, look, magnitude=rho)
 
     def along(rows, lag):

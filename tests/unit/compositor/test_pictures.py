@@ -226,7 +226,7 @@ def test_magnitude_is_colored():
     rho = (surface.face_center[:, :1] + 1) / 2
     field = RosyField(1, rho * [1.0, 0, 0])
     gbuffer = project_surface(surface, field, 128)
-    picture = compose(gbuffer, plain(hue="magnitude", magnitude_range=1.0, gain=0.0))
+    picture = compose(gbuffer, plain(hue="magnitude", color_range=(0.0, 1.0), gain=0.0))
     x = gbuffer.position[:, 0]
     actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
     expected = map_colors((x + 1) / 2, "viridis")
@@ -235,14 +235,15 @@ def test_magnitude_is_colored():
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("magnitude_range", [0.0, 1e-30, 5e-324, 1e9, 1e30])
-def test_magnitudes_of_any_scale(magnitude_range):
+@pytest.mark.parametrize(
+    "ends",
+    [(0.0, 0.0), *((0.0, top) for top in (1e-30, 5e-324, 1e9, 1e30)), (7.0, 7.0), (1e30, -1e30)],
+)
+def test_magnitudes_of_any_scale(ends):
     surface = plane(4, 4)
     rho = 10.0 ** np.linspace(-29, 29, surface.face_count)[:, None]
     gbuffer = project_surface(surface, RosyField(4, rho * [1.0, 0, 0]), 16)
-    look = plain(
-        hue="magnitude", magnitude_length=True, magnitude_range=magnitude_range, supersampling=1
-    )
+    look = plain(hue="magnitude", magnitude_length=True, color_range=ends, supersampling=1)
     assert np.isfinite(compose(gbuffer, look).rgba).all()
 
 

@@ -51,7 +51,7 @@ LOOKS = {
     "wide paper grain": Look(
         length=6, grain=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
     ),
-    "magnitude": Look(length=14, hue="magnitude", magnitude_length=True, magnitude_range=1.0),
+    "magnitude": Look(length=14, hue="magnitude", magnitude_length=True, color_range=(0.0, 1.0)),
     "flow": Look(length=10, flow=1.0, flow_phase=0.2),
 }
 #: Those that need each kind of rows around a strip.

@@ -542,15 +542,20 @@ LOOKS = {
     "color noise": {"hue": "noise"},
     "color noise, three directions": {"hue": "noise", "degree": 3},
     "magnitude as color": {"hue": "magnitude"},
-    "magnitude as color, with a range": {"hue": "magnitude", "magnitude_range": 0.8},
+    "magnitude as color, with a range": {"hue": "magnitude", "color_range": (0.0, 0.8)},
+    "magnitude as both, with an inverted range": {
+        "hue": "magnitude",
+        "magnitude_length": True,
+        "color_range": (1.1, 0.6),
+    },
     "magnitude as gray": {"hue": "magnitude", "color_map": "gray"},
     "magnitude as length": {"magnitude_length": True},
-    "magnitude as length, with a range": {"magnitude_length": True, "magnitude_range": 1.5},
+    "magnitude as length, with a range": {"magnitude_length": True, "color_range": (0.0, 1.5)},
     "magnitude as both": {"hue": "magnitude", "magnitude_length": True, "color_map": "magma"},
     "magnitude as both, with a range": {
         "hue": "magnitude",
         "magnitude_length": True,
-        "magnitude_range": 0.9,
+        "color_range": (0.0, 0.9),
         "degree": 2,
     },
     "families, of a field without families": {"hue": "families"},
@@ -891,8 +896,8 @@ def test_a_headlight_ignores_lights(card):
 TONED = {
     "unchanged": {},
     "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
-    "tone curve": {"tone_black": 0.2, "tone_white": 0.7, "tone_gamma": 1.8},
-    "inverted": {"tone_black": 1.0, "tone_white": 0.0},
+    "tone curve": {"tone_levels": (0.2, 0.7, 1.8)},
+    "inverted": {"tone_levels": (1.0, 0.0, 1.0)},
     "hatched": {"ink": "hatch", "grain": 3.0},
 }
 
@@ -949,7 +954,7 @@ def test_tones_of_pictures(card, name, resolution):
 def test_meshes_without_a_tone_use_the_light(card):
     instances = [toned(waves(), matrix=placed(0.5 * np.eye(3), (-0.6, 0, 0)))]
     instances.append(ball(4, placed(0.5 * np.eye(3), (0.6, 0, 0))))
-    look = replace(LOOK, tone="attribute", tone_gamma=1.5, shading=0.8)
+    look = replace(LOOK, tone="attribute", tone_levels=(0.0, 1.0, 1.5), shading=0.8)
     assert_parity(card, instances, view(), look)
 
 
@@ -972,13 +977,12 @@ COLORED = {
         "shading": 0.95,
         "light": "lamp",
         "grain": 3.0,
-        "values_low": -1.0,
-        "values_high": 1.0,
+        "color_range": (-1.0, 1.0),
         "color_map": "gray",
     },
-    "a range, inverted": {"values_low": 0.8, "values_high": 0.2, "color_map": "magma"},
+    "a range, inverted": {"color_range": (0.8, 0.2), "color_map": "magma"},
     "colored noise": {"hue": "noise"},
-    "with tones": {"tone": "attribute", "tone_gamma": 1.5},
+    "with tones": {"tone": "attribute", "tone_levels": (0.0, 1.0, 1.5)},
 }
 
 
@@ -1621,7 +1625,7 @@ def test_a_skewed_projection(card):
 @pytest.mark.parametrize("top", [0.0, 0.7])
 def test_the_range_of_the_colors(card, supersampling, top):
     """It is numpy's, and a look with this range gives the same picture."""
-    look = replace(LOOK, hue="magnitude", magnitude_range=top, supersampling=supersampling)
+    look = replace(LOOK, hue="magnitude", color_range=(0.0, top), supersampling=supersampling)
     instances = [ball(4), MeshInstance(BALL, placed(shift=(0, 0, -9)), axis_field(BALL, 2))]
     drawn, expected = (
         draw(renderer, ViewInput(tuple(instances), view(), look)) for renderer in (card, None)
@@ -1630,7 +1634,7 @@ def test_the_range_of_the_colors(card, supersampling, top):
     tolerance = 1e-4 if supersampling == 1 else 5e-3
     assert drawn.color_range == pytest.approx(expected.color_range, rel=tolerance)
     assert (drawn.color_range == (0.0, 0.7)) == bool(top)
-    fixed = replace(look, magnitude_range=drawn.color_range[1])
+    fixed = replace(look, color_range=drawn.color_range)
     again = draw(card, ViewInput(tuple(instances), view(), fixed))
     np.testing.assert_allclose(again.rgba, drawn.rgba, atol=1e-6)
 

@@ -315,7 +315,7 @@ def test_a_saved_preset_is_found(user_folder):
 
 def test_previews_of_looks_that_need_a_scene():
     """The tone is the light. The numbers run from left to right, through the whole map."""
-    look = Look(hue="values", values_low=90.0, tone="attribute", shading=0.0)
+    look = Look(hue="values", color_range=(90.0, 0.0), tone="attribute", shading=0.0)
     colors = draw_preview(look).reshape(-1, 4)[:, :3]
     is_purple = (colors[:, 2] > 2 * colors[:, 1]) & (colors[:, 0] > colors[:, 1])
     is_yellow = (colors[:, 1] > 3 * colors[:, 2]) & (colors[:, 0] > 0.3 * colors[:, 1])

@@ -167,7 +167,7 @@ RENDERS = {
     "hatch-paper-grain": f"@torus.obj {HATCH} paper_grain=0.8 paper_color=#efe9dc",
     "hatch-outline": f"@pair.stl {HATCH} outline=2.5",
     "hatch-ramp": f"@bumpy.ply {HATCH} hue=tone ink_color_light=#2255cc",
-    "hatch-clear-paper": f"@bumpy.ply {HATCH} clear_paper=on",
+    "hatch-clear-paper": f"@bumpy.ply {HATCH} paper_color=#ffffff00",
     "hatch-crisp": f"@bumpy.ply {HATCH} crispness=1 layers=6 layering=0.1 taper=on",
     "hatch-soft-one": f"@bumpy.ply {HATCH} crispness=0 layers=1",
     "hatch-members": f"@torus.obj --degree 3 {HATCH} method=members",

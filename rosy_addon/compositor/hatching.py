@@ -133,9 +133,9 @@ def render_hatching(
     Returns
     -------
     color : (P, 3) float32 ndarray
-        Linear color of ink and paper, or of the ink alone if `look.clear_paper`.
+        Linear color of ink and paper, not premultiplied.
     alpha : (P,) float32 ndarray
-        1, or the coverage by ink if `look.clear_paper`.
+        1 if the paper is opaque, the coverage by ink if the paper is transparent.
     """
     tone = np.clip(tone, 0, 1)
     ink_indices = line_ink_indices(field, look)
@@ -143,10 +143,7 @@ def render_hatching(
         ink, coverage = _render_one_ink(field, images, look, tone, modulation)
     else:
         ink, coverage = _render_many_inks(field, images, look, tone, modulation, ink_indices)
-    if look.clear_paper:
-        return ink, coverage
-    paper = inks_of(look).paper
-    return paper + coverage[:, None] * (ink - paper), np.ones_like(coverage)
+    return inks_of(look).on_paper(ink, coverage)
 
 
 def _render_one_ink(

@@ -472,7 +472,7 @@ def ink_of_thresholds(
     Returns
     -------
     color : (P, 3) float32 ndarray
-        Linear color of ink on paper, or of the ink alone if `look.clear_paper`.
+        Linear color of ink on paper, or of the ink alone if the paper is not opaque.
     coverage : (P,) float32 ndarray
         0 to 1.
     """
@@ -491,7 +491,8 @@ def ink_of_thresholds(
     filtered_edge = np.sqrt(EDGE_VARIANCE * spread)
     evenness = np.minimum(3 * spread, 1)
     correction = FILTER_CORRECTION * evenness * evenness * (1 - evenness)
-    color = colors[-1] if look.clear_paper else np.broadcast_to(inks.paper, (len(tone), 3))
+    is_opaque = inks.paper_alpha == 1
+    color = colors[-1] if not is_opaque else np.broadcast_to(inks.paper, (len(tone), 3))
     bare = np.ones(len(tone), dtype=np.float32)
     # The lines that come first are on top of the others.
     for layer in reversed(range(layers)):
@@ -508,6 +509,6 @@ def ink_of_thresholds(
         covered = np.clip(covered, is_dark * missed, 1 - ~is_dark * missed)
         covered = is_dark + np.minimum(room / EXACT_ENDS, 1) * (covered - is_dark)
         bare *= 1 - covered
-        part = covered / np.maximum(1 - bare, np.float32(1e-6)) if look.clear_paper else covered
+        part = covered / np.maximum(1 - bare, np.float32(1e-6)) if not is_opaque else covered
         color = color + part[:, None] * (colors[layer] - color)
     return color.astype(np.float32), 1 - bare

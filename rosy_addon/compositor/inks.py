@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
+from ..core.color import LUMINANCE_WEIGHTS, alpha_from_hex, from_hex, to_linear
 from .look import Look, has_tone_inks, is_hatched
 
 #: Maximum number of inks.
@@ -56,6 +56,8 @@ class Inks:
     ----------
     paper : (3,) float32 ndarray
         Linear color.
+    paper_alpha : float
+        Opacity of the paper, 0 to 1.
     dark, light : (n, 3) float32 ndarray
         Linear colors of the n inks in the shadows and in the lights.
     is_light : bool
@@ -66,6 +68,7 @@ class Inks:
     """
 
     paper: np.ndarray
+    paper_alpha: float
     dark: np.ndarray
     light: np.ndarray
     is_light: bool
@@ -120,6 +123,21 @@ class Inks:
             1,
         )
 
+    def on_paper(self, ink: np.ndarray, coverage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (P, 3) color, not premultiplied, and (P,) opacity of ink that covers the paper.
+
+        Parameters
+        ----------
+        ink : (P, 3) float32 ndarray
+            Linear color.
+        coverage : (P,) float32 ndarray
+            0 to 1.
+        """
+        if self.paper_alpha == 0:
+            return ink, coverage
+        opacity = 1 - (1 - coverage) * (1 - self.paper_alpha)
+        return self.paper + (coverage / opacity)[:, None] * (ink - self.paper), opacity
+
     def complement_if_light(self, light: np.ndarray) -> np.ndarray:
         """Return 1 - `light` if the ink is lighter than the paper, and `light` otherwise."""
         return 1 - light if self.is_light else light
@@ -159,7 +177,7 @@ def inks_of(look: Look, families: int = 1) -> Inks:
     dark = light = _ink_series(look.ink_color, families)
     if has_tone_inks(look):
         light = _ink_series(look.ink_color_light, families)
-    inks = Inks(paper, dark, light, is_light(look), 0.0)
+    inks = Inks(paper, alpha_from_hex(look.paper_color), dark, light, is_light(look), 0.0)
     solid_ink = inks.light if inks.is_light else inks.dark
     return replace(inks, min_transmittance=float(np.max(inks.luminance_transmittance(solid_ink))))
 

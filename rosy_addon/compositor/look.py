@@ -448,9 +448,11 @@ class Look:
         label="Highlight Color",
         **_ink(has_tone_inks),
     )
-    paper_color: str = color("#ffffff", "Color of the paper", **_ink())
-    clear_paper: bool = switch(
-        False, "Leave the paper transparent, so that only the ink is drawn", **_ink()
+    paper_color: str = color(
+        "#ffffff",
+        "Color of the paper, and its opacity. Without opacity, only the ink is drawn",
+        has_alpha=True,
+        **_ink(),
     )
     crispness: float = number(
         0.7, 0.0, 1.0, "Edges of lines, from soft gray streaks to sharp lines", **_ink()

@@ -18,7 +18,7 @@ class Picture:
     ----------
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied. Alpha is the fraction of the pixel in which a field is visible
-        or, with clear paper, the coverage by ink.
+        times, if lines are drawn on paper that is not opaque, the opacity of ink and paper.
     spread : (H, W) float32 ndarray or None
         If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
         is the fraction of the pixel in which a field is visible.

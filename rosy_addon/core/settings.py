@@ -199,12 +199,21 @@ class Switch(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class Color(Setting):
-    """A color in display values (sRGB), as ``#rrggbb``."""
+    """A color in display values (sRGB), as ``#rrggbb``.
+
+    Attributes
+    ----------
+    has_alpha : bool
+        Whether ``#rrggbbaa`` is allowed as well, with an opacity.
+    """
+
+    has_alpha: bool = False
 
     def check(self, value: Any) -> None:
         """Raise a `RosyError` if a value is not a color."""
-        if not isinstance(value, str) or not re.fullmatch("#[0-9a-fA-F]{6}", value):
-            self._refuse(value, "a color like #08080d")
+        pattern = "#[0-9a-fA-F]{6}" + "([0-9a-fA-F]{2})?" * self.has_alpha
+        if not isinstance(value, str) or not re.fullmatch(pattern, value):
+            self._refuse(value, f"a color like #08080d{' or #08080d80' * self.has_alpha}")
 
 
 def number(default: float, low: float, high: float, text: str, **description: Any) -> Any:

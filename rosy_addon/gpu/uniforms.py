@@ -134,7 +134,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "colors_magnitude": int(colors_magnitude(look)),
         "magnitude_ends": distinct_ends(*ends) if ends else (0.0, 0.0),
         "colors_values": int(colors_values(look)),
-        "paper_color": (*inks.paper, 1.0),
+        "paper_color": (*inks.paper, inks.paper_alpha),
         "ink_count": len(inks.dark),
         "min_transmittance": inks.min_transmittance,
         "is_light_ink": int(inks.is_light),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..compositor.flow import flow_at
 from ..compositor.look import Look
-from ..core.color import from_hex, to_hex
+from ..core.color import alpha_from_hex, from_hex, to_hex
 from ..core.settings import Color, Number, Numbers, Setting, settings_of
 
 if TYPE_CHECKING:
@@ -30,7 +30,15 @@ def apply_look(settings: Any, look: Look) -> None:
     group = getattr(settings, "look", settings)
     for name, setting in settings_of(Look).items():
         value = getattr(look, name)
-        setattr(group, name, from_hex(value) if isinstance(setting, Color) else value)
+        setattr(
+            group, name, color_components(value, setting) if isinstance(setting, Color) else value
+        )
+
+
+def color_components(code: str, setting: Color) -> list[float]:
+    """Return a color as the components of its property: three, or four with the opacity."""
+    color = from_hex(code).tolist()
+    return [*color, alpha_from_hex(code)] if setting.has_alpha else color
 
 
 def look_at_frame(scene: bpy.types.Scene, look: Look, frame: float) -> Look:

@@ -24,6 +24,7 @@ from ..compositor.ink_thresholds import (
     sharp_look,
     threshold_pixels,
 )
+from ..compositor.inks import inks_of
 from ..compositor.lic import lic_lengths
 from ..compositor.lic_images import LicImages
 from ..compositor.look import Look, is_even
@@ -135,8 +136,9 @@ def lit_ink(
     Returns
     -------
     (P, 4) float32 ndarray
-        Linear color and opacity. All is opaque unless `look.clear_paper`.
+        Linear color and opacity, not premultiplied.
     """
+    inks = inks_of(look)
     colors = np.ones_like(pixels)
     for block in pixel_blocks(len(pixels)):
         report(block.start / len(pixels), LABEL)
@@ -151,9 +153,9 @@ def lit_ink(
         color, coverage = ink_of_thresholds(
             pixels[block], np.minimum(tone, 1), look, on.mesh.family_count
         )
+        if inks.paper_alpha < 1:
+            color, colors[block, 3] = inks.on_paper(color, coverage)
         colors[block, :3] = color
-        if look.clear_paper:
-            colors[block, 3] = coverage
     return colors
 
 

@@ -261,7 +261,7 @@ def paper_is_behind_everything():
     yield from fresh_scene(levels=0)
     scene, space = bpy.context.scene, view()[1].spaces.active
     bpy.ops.rosy.preset_apply(preset="cross-hatch")
-    scene.rosy.look.paper_color = (0.8, 0.6, 0.3)
+    scene.rosy.look.paper_color = (0.8, 0.6, 0.3, 1.0)
     hex_color = rosy("rosy_addon.scene.look_properties").read_look(scene.rosy).paper_color
     paper = np.array(list(bytes.fromhex(hex_color[1:]))) / 255
     scene.render.resolution_x = scene.render.resolution_y = 400

@@ -437,7 +437,7 @@ TABLE = {
     "look": (put("rosy.look.seed", 7), None, "the look was changed"),
     "light without shading": (put("rosy.look.light", "scene"), put("rosy.look.shading", 0.0), ""),
     "ink without hatching": (put("rosy.look.ink_color", (1.0, 0.0, 0.0)), None, ""),
-    "paper": (put("rosy.look.paper_color", (1.0, 0.0, 0.0)), hatched, "the look was changed"),
+    "paper": (put("rosy.look.paper_color", (1.0, 0.0, 0.0, 1.0)), hatched, "the look was changed"),
     "gain": (put("rosy.look.gain", 1.0), None, "the look was changed"),
     "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
     "unit size in pixels": (put("rosy.look.unit_size", 0.5), None, ""),

@@ -16,7 +16,7 @@ uniform sampler2D field_values, outline_coverage;
 uniform sampler2DArray line_means;
 uniform float breaks, outline, min_transmittance, streak_std, break_std, disc_std;
 uniform float paper_grain_depth;
-uniform int clear_paper, colors_magnitude, flow_mode, colors_values, break_steps, overshoot_steps;
+uniform int colors_magnitude, flow_mode, colors_values, break_steps, overshoot_steps;
 uniform ivec2 box_origin;
 uniform vec4 flow_weights;
 layout(rgba32f) uniform writeonly image2D picture;
@@ -152,7 +152,7 @@ void main()
     drawn_color = paper_color.xyz + (seen_color - paper_color.xyz) / max(1.0 - paper, MIN_COVERAGE);
     drawn_color = clamp(drawn_color, 0.0, 1.0);
   }
-  vec4 color = clear_paper != 0 ? vec4(drawn_color, 1.0 - paper) :
-                                  vec4(mix(drawn_color, paper_color.xyz, paper), 1.0);
-  imageStore(picture, pixel, color);
+  float opacity = 1.0 - paper * (1.0 - paper_color.w);
+  float paper_share = paper * paper_color.w / max(opacity, MIN_COVERAGE);
+  imageStore(picture, pixel, vec4(mix(drawn_color, paper_color.xyz, paper_share), opacity));
 }

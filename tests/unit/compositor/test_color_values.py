@@ -28,7 +28,7 @@ BALL, GRID = icosphere(4), plane(4, 4)
 #: Streaks without contrast, and no shading: the pixels have the colors of the map.
 FLAT = Look(hue="values", gain=0.0, shading=0.0, length=3)
 #: The ink alone, which covers everything.
-INK = replace(FLAT, ink="hatch", tone_levels=(2.0, 3.0, 1.0), clear_paper=True)
+INK = replace(FLAT, ink="hatch", tone_levels=(2.0, 3.0, 1.0), paper_color="#ffffff00")
 
 
 def camera(width=SIZE, height=SIZE):

@@ -272,7 +272,7 @@ UNEVEN_LINES = {
 
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
-    look = replace(look, anchor="picture", clear_paper=True)
+    look = replace(look, anchor="picture", paper_color="#ffffff00")
     field = planar_pixel_field(np.full((side, side), angle), degree)
     noise = look_noise(field, look)
     break_images = paper_grain = None
@@ -530,7 +530,7 @@ def test_families_keep_their_inks_at_any_guiding_angle():
 
 def test_ink_is_colored_by_magnitude():
     """Pixels covered by ink have the colors of the color map."""
-    look = replace(INK, hue="magnitude", color_map="gray", clear_paper=True, shading=0.5)
+    look = replace(INK, hue="magnitude", color_map="gray", paper_color="#ffffff00", shading=0.5)
     surface = ball()
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     height = surface.vertices[surface.corner_vertex[surface.face_start[:-1]], 2]
@@ -810,16 +810,26 @@ def test_instances_have_different_noise():
 
 
 def test_clear_paper_shows_only_ink():
-    look = replace(INK, clear_paper=True, ink_color="#204060")
+    look = replace(INK, paper_color="#ffffff00", ink_color="#204060")
     clear, full = (
         render(make_instance(ball()), make_camera(), look),
-        render(make_instance(ball()), make_camera(), replace(look, clear_paper=False)),
+        render(make_instance(ball()), make_camera(), replace(look, paper_color="#ffffff")),
     )
     inked = clear[..., 3] > 0
     np.testing.assert_allclose(
         clear[inked][:, :3], np.tile(to_linear(from_hex("#204060")), (inked.sum(), 1)), rtol=1e-3
     )
     whole = full[..., 3] == 1
+    for alpha in ("40", "c0"):
+        part = render(
+            make_instance(ball()), make_camera(), replace(look, paper_color="#ffffff" + alpha)
+        )
+        opacity = int(alpha, 16) / 255
+        alpha_of_all = 1 - (1 - clear[..., 3]) * (1 - opacity)
+        np.testing.assert_allclose(part[whole][:, 3], alpha_of_all[whole], atol=1e-5)
+        ink = clear[..., :3] * clear[..., 3:]
+        mixed = ink + opacity * (full[..., :3] - ink)
+        np.testing.assert_allclose((part[..., :3] * part[..., 3:])[whole], mixed[whole], atol=1e-5)
     on_white = clear[..., :3] * clear[..., 3:] + 1 - clear[..., 3:]
     np.testing.assert_allclose(on_white[whole], full[whole][:, :3], atol=2e-3)
 

@@ -1200,9 +1200,10 @@ def test_free_directions_with_uneven_lines(card, name):
     assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
 
 
+@pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])
 @pytest.mark.parametrize("hue", ["one", "families"])
-def test_ink_on_clear_paper(card, hue):
-    look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, grain=3.0)
+def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
+    look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, grain=3.0)
     pair = draw_pair(ROSY, card, [ball(4)], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8

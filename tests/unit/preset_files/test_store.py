@@ -451,7 +451,7 @@ def test_shipped_previews_show_their_looks(name):
         Look(method="brute", length=8000),
         Look(method="members", length=8000, step=0.05, hue="noise"),
         *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
-        Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
+        Look(anchor="surface", ink="hatch", paper_color="#ffffff00", layers=12, grain=0.5),
         Look(light="scene", display="flat", hue="magnitude", magnitude_length=True),
     ],
     ids=["brute", "members", "large", "ink", "others"],
@@ -474,7 +474,7 @@ def test_previews_of_looks_differ():
     ink = Look(ink="hatch", paper_color="#ff0000")
     corner = draw_preview(ink)[0, 0]
     np.testing.assert_allclose(corner, [1, 0, 0, 1], atol=1e-6)
-    assert (draw_preview(replace(ink, clear_paper=True))[0, 0] == corner).all()
+    assert (draw_preview(replace(ink, paper_color="#ff000000"))[0, 0] == corner).all()
 
 
 # --- the command line ------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from PIL import Image
 from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.errors import RosyError
-from rosy_addon.core.settings import Choice, Color, Switch
+from rosy_addon.core.settings import Choice, Color, Numbers, Switch
 from rosy_addon.image_io.png import to_srgb_uint8
 from rosy_addon.preset_files import store
 from rosy_addon.preset_files.preview import PREVIEW_SIZE, draw_preview
@@ -46,11 +46,15 @@ def values_of(entry):
     """Return a strategy for all values that a setting may have."""
     setting = entry.metadata["setting"]
     if isinstance(setting, Color):
-        return st.integers(0, 0xFFFFFF).map("#{:06x}".format) | st.just("#AbCdEf")
+        with_alpha = st.integers(0, 0xFFFFFFFF).map("#{:08x}".format)
+        plain = st.integers(0, 0xFFFFFF).map("#{:06x}".format) | st.just("#AbCdEf")
+        return plain | with_alpha if setting.has_alpha else plain
     if isinstance(setting, Choice):
         return st.sampled_from(list(setting.options))
     if isinstance(setting, Switch):
         return st.booleans()
+    if isinstance(setting, Numbers):
+        return st.tuples(*(st.floats(low, high) for low, high in setting.parts.values()))
     if setting.is_integer:
         return st.integers(setting.low, setting.high)
     return st.floats(setting.low, setting.high)

@@ -138,7 +138,7 @@ RENDERS = {
     "foreshorten": "@torus.obj foreshorten=on --view 10,15",
     "detail": "@suzanne.obj detail=0.7",
     "arrows": "@torus.obj --degree 1 --generate smoothest arrows=20 arrow_size=9",
-    "singularities": "@suzanne.obj singularity_dots=visible singularity_labels=on",
+    "singularities": "@suzanne.obj singularity_dots=visible_indices",
     "singularities-all": "@torus.obj --degree 3 singularity_dots=all singularity_size=12",
     "even-lines": f"@suzanne.obj {HATCH} ink=even",
     "even-lines-3": f"@torus.obj --degree 3 {HATCH} ink=even anchor=surface outline=1",
@@ -217,7 +217,7 @@ STROKES = {
     "distance": "@wave.obj --distance 0.12 --up z --view -30,40 --ortho",
     "engraving": "@suzanne.obj --tone --swell 1 --light lamp --layering 0.4",
     "arrows": "@torus.obj --degree 1 --generate smoothest --spacing 12 --arrows 6",
-    "singularities": "@suzanne.obj --spacing 12 --singularity-dots all --singularity-labels",
+    "singularities": "@suzanne.obj --spacing 12 --singularity-dots all_indices",
     "singularities-visible": "@torus.obj --degree 3 --spacing 14 --singularity-dots visible "
     "--singularity-size 14",
     "tone-plotter": "@wave.obj --tone --plotter --mm 120 --outline",

@@ -8,7 +8,6 @@ from typing import Any
 
 from ..annotation.singularity_settings import (
     singularity_dots_choice,
-    singularity_labels_switch,
     singularity_size_number,
 )
 from ..core.errors import RosyError
@@ -507,7 +506,6 @@ class Look:
     )
     singularity_dots: str = singularity_dots_choice(**_SINGULARITIES)
     singularity_size: float = singularity_size_number(**_SINGULARITIES)
-    singularity_labels: bool = singularity_labels_switch(**_SINGULARITIES)
     supersampling: int = number(
         1,
         1,

@@ -32,7 +32,13 @@ from .hatching import (
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
-from .lic_images import LicImages, lic_images, relative_magnitude, with_magnitude_range
+from .lic_images import (
+    LicImages,
+    lic_images,
+    magnitude_ends,
+    relative_magnitude,
+    with_magnitude_range,
+)
 from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
@@ -417,7 +423,8 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
     """
     hue, position = None, None
     if colors_magnitude(look):
-        hue = map_colors(relative_magnitude(field, look.color_range), look.color_map)
+        ends = magnitude_ends(look, field)
+        hue = map_colors(relative_magnitude(field, ends), look.color_map)
     elif field.map_position is not None:
         position = field.map_position
         hue = map_colors(np.nan_to_num(position), look.color_map)

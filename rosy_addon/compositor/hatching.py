@@ -25,7 +25,7 @@ from .even_lines import EvenLines, uneven_width
 from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
-from .lic_images import LicImages, relative_magnitude
+from .lic_images import LicImages, magnitude_ends, relative_magnitude
 from .look import Look, colors_magnitude, is_hatched
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
@@ -153,7 +153,8 @@ def _render_one_ink(
     inks = inks_of(look)
     by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
-        ink = to_linear(map_colors(relative_magnitude(field, look.color_range), look.color_map))
+        magnitude = relative_magnitude(field, magnitude_ends(look, field))
+        ink = to_linear(map_colors(magnitude, look.color_map))
     else:
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
     if position is not None:

@@ -90,8 +90,11 @@ class PictureState:
     def from_json(text: str) -> PictureState | None:
         """Return the state that a text holds; None if it is not one of this version of RoSy."""
         try:
-            return PictureState(**json.loads(text))
-        except (TypeError, ValueError):
+            state = PictureState(**json.loads(text))
+            # JSON has lists for the tuples of settings.
+            look = {name: tuple(v) if isinstance(v, list) else v for name, v in state.look.items()}
+            return replace(state, look=look)
+        except (AttributeError, TypeError, ValueError):
             return None
 
 
@@ -330,7 +333,7 @@ def settings_key(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> tup
 
 
 def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
-    """Return the settings of a look by name, as JSON. Those that do not apply have their defaults.
+    """Return the settings of a look by name. Those that do not apply have their defaults.
 
     Parameters
     ----------
@@ -339,11 +342,10 @@ def applied_settings(look: Look, lacks_tone: bool = False) -> dict:
         Whether a mesh does not have the tone of the look. Then the light falls on it.
     """
     drawn_look = replace(look, tone_lit=True) if lacks_tone else look
-    values = {
+    return {
         name: getattr(look, name) if setting.applies(drawn_look) else setting.default
         for name, setting in settings_of(Look).items()
     }
-    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
 
 
 def _resolved_camera(

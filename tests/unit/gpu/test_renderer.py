@@ -981,7 +981,6 @@ COLORED = {
         "color_map": "gray",
     },
     "a range, inverted": {"color_range": (0.8, 0.2), "color_map": "magma"},
-    "colored noise": {"hue": "noise"},
     "with tones": {"tone": "attribute", "tone_levels": (0.0, 1.0, 1.5)},
 }
 

@@ -16,9 +16,9 @@ from ..compositor.even_lines import (
 from ..compositor.flow import unconvolved_noise
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
+from ..compositor.ink_from_thresholds import ink_of_thresholds
 from ..compositor.ink_thresholds import (
     cyclic_places,
-    ink_of_thresholds,
     line_thresholds,
     ordered_thresholds,
     sharp_look,

@@ -18,7 +18,6 @@ from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.smoothest import smoothest_field
 from rosy_addon.preset_files.store import load_preset
-from rosy_addon.projection.ambient_occlusion import ambient_occlusion
 from rosy_addon.projection.camera import Camera, look_at, orbit_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.surface_tone import SurfaceTone
@@ -29,7 +28,7 @@ from .shapes import evaluated_surface, plane, sphere, suzanne, torus
 from .sheet import Panel, display, sheet
 
 #: Side of a picture in pixels, and the number of pictures in a row.
-SIDE, COLUMNS = 160, 4
+SIDE, COLUMNS = 192, 4
 
 #: Quality of the files: streaks of noise are large in exact formats.
 WEBP_QUALITY = 60
@@ -70,18 +69,19 @@ def shown(*values: Any, scene: str = "head", preset: str = "default", **settings
 
 
 _ENGRAVED = {"scene": "head", "preset": "engraving"}
-_PEN = {"scene": "head", "preset": "pen-and-ink"}
-_HATCHED = {"scene": "head", "preset": "cross-hatch"}
+_PEN = {"scene": "ball", "preset": "pen-and-ink"}
+_HATCHED = {"scene": "ball", "preset": "cross-hatch"}
+_SHADED = {"light": "lamp", "shading": 0.9}
 _SPARSE = {"density": 0.03, "length": 24, "grain": 2.0}
 
 #: The settings of a look, and how each is shown.
 SETTINGS: dict[str, Shown] = {
     "method": shown("sheets", "members", "brute", "ibfv", scene="vortices"),
-    "weights": shown("cosine", "binary", "none", scene="vortices", method="members", length=80),
-    "view_plane": shown(True, False, scene="ring", method="members", gain=4.0),
+    "weights": shown("cosine", "binary", "none", scene="vortices", method="members", gain=5.0),
+    "view_plane": shown(True, False, scene="slope", method="members", gain=4.0),
     "display": shown("smooth", "flat", scene="coarse_ball"),
-    "unit": shown("pixels", "world", scene="receding", grain=3.0, unit_size=0.02),
-    "unit_size": shown(0.008, 0.016, 0.032, scene="receding", unit="world", grain=3.0),
+    "unit": shown("pixels", "world", scene="slope", unit_size=0.01, grain=2.0),
+    "unit_size": shown(0.005, 0.01, 0.02, scene="slope", unit="world", grain=2.0),
     "length": shown(10, 40, 160, scene="vortices"),
     "taper": shown(False, True, scene="vortices", **_SPARSE),
     "oriented": shown(False, True, scene="wind", **_SPARSE),
@@ -94,14 +94,14 @@ SETTINGS: dict[str, Shown] = {
     "grain": shown(1.0, 1.5, 4.0, scene="vortices"),
     "density": shown(0.02, 0.1, 0.5, scene="vortices"),
     "high_pass": shown(0.0, 16.0, 4.0, scene="vortices"),
-    "detail": shown(0.0, 0.5, 0.9, **_PEN),
+    "detail": shown(0.0, 0.5, 0.9, preset="pen-and-ink"),
     "anchor": shown("picture", "surface", scene="ring", grain=3.0),
     "hue": shown(
         *("one", "noise", "families", "magnitude", "values"),
-        {"hue": "families", "ink": "hatch", "layering": 0.1},
-        {"hue": "tone", "ink": "even"},
+        {"hue": "families", "ink": "hatch", **_SHADED},
+        {"hue": "tone", "ink": "even", **_SHADED},
         scene="numbers",
-        grain=2.0,
+        grain=2.5,
     ),
     "seed": shown(0, 1, scene="vortices"),
     "gain": shown(1.0, 2.5, 6.0, scene="vortices"),
@@ -109,14 +109,14 @@ SETTINGS: dict[str, Shown] = {
     "foreshorten": shown(False, True, scene="ring", grain=2.0),
     "cross_creases": shown(False, True, scene="box", length=80, grain=2.0),
     "crease_angle": shown(0.7, 1.2, 3.1416, scene="box", length=80, grain=2.0),
-    "magnitude_length": shown(False, True, scene="bumps"),
+    "magnitude_length": shown(False, True, scene="gusts", density=0.03, grain=2.0),
     "color_range": shown((0.0, 0.0), (0.0, 0.5), (1.0, 0.0), scene="bumps", hue="magnitude"),
     "color_map": shown("viridis", "magma", "gray", scene="bumps", hue="magnitude"),
     "shading": shown(0.0, 0.7, 1.0),
     "light": shown("headlight", "lamp", "scene", scene="table", shading=0.9),
     "shadows": shown(False, True, scene="table", light="scene", shading=0.9),
-    "tone": shown("light", "attribute", scene="occlusion", preset="cross-hatch"),
-    "tone_lit": shown(False, True, scene="occlusion", preset="cross-hatch", tone="attribute"),
+    "tone": shown("light", "attribute", scene="painted", preset="cross-hatch"),
+    "tone_lit": shown(False, True, scene="painted", preset="cross-hatch", tone="attribute"),
     "tone_levels": shown(
         (0.0, 1.0, 1.0), (0.2, 0.8, 1.0), (0.0, 1.0, 2.0), (1.0, 0.0, 1.0), **_PEN
     ),
@@ -127,15 +127,15 @@ SETTINGS: dict[str, Shown] = {
     "crispness": shown(0.0, 0.5, 1.0, **_HATCHED),
     "layers": shown(1, 2, 3, scene="ring_of_six", preset="cross-hatch"),
     "layering": shown(0.0, 0.3, 0.8, **_HATCHED),
-    "breaks": shown(0.0, 0.5, 1.0, **_PEN),
+    "breaks": shown(0.0, 0.5, 1.0, **_PEN, wobble=0.0, grain=3.5),
     "overshoot": shown(
         0.0, 8.0, 20.0, scene="table", preset="pen-and-ink", light="scene", shadows=True
     ),
-    "wobble": shown(0.0, 0.5, 1.0, **_PEN),
+    "wobble": shown(0.0, 0.5, 1.0, **_PEN, breaks=0.0, grain=3.5),
     "paper_grain": shown(0.0, 0.4, 1.0, scene="head", preset="pencil"),
-    "outline": shown(0.0, 1.5, 4.0, **_HATCHED),
-    "singularity_dots": shown("visible", "visible_indices", "all", "all_indices"),
-    "singularity_size": shown(5.0, 9.0, 18.0, singularity_dots="visible"),
+    "outline": shown(0.0, 1.5, 4.0, preset="cross-hatch"),
+    "singularity_dots": shown("visible", "visible_indices", "all", "all_indices", scene="ball"),
+    "singularity_size": shown(5.0, 9.0, 18.0, scene="ball", singularity_dots="visible"),
     "supersampling": shown(1, 2, 4, scene="vortices", gain=4.0),
 }
 
@@ -218,10 +218,12 @@ def numbers() -> Scene:
 
 
 @cache
-def occlusion() -> Scene:
-    """Return Suzanne with its ambient occlusion as tone."""
+def painted() -> Scene:
+    """Return Suzanne with dark and light bands as tone."""
     (instance,) = head().instances
-    tone = SurfaceTone(ambient_occlusion([instance], 0)[:, None])
+    height = instance.surface.vertices[instance.surface.corner_vertex, 2]
+    tone = 0.55 + 0.4 * np.sin(9 * height)
+    tone = SurfaceTone(tone.astype(np.float32)[:, None])
     return head()._replace(instances=(replace(instance, tone=tone),))
 
 
@@ -247,12 +249,28 @@ def ring_of_six() -> Scene:
 
 
 @cache
-def receding() -> Scene:
-    """Return a torus from near, in strong perspective."""
+def ball() -> Scene:
+    """Return a sphere with few singularities."""
+    surface = sphere()
+    return _framed(MeshInstance(surface, np.eye(4), smoothest_field(surface, 4)))
+
+
+@cache
+def slope() -> Scene:
+    """Return the plane of `vortices`, which recedes."""
     camera = perspective_camera(
-        look_at((0.0, -2.2, 1.1), (0, 0, -0.1)), SIDE, SIDE, fov=np.radians(60)
+        look_at((0.3, -1.5, 0.5), (0, -0.2, 0)), SIDE, SIDE, fov=np.radians(60)
     )
-    return ring()._replace(camera=camera)
+    return vortices()._replace(camera=camera)
+
+
+@cache
+def gusts() -> Scene:
+    """Return a vector field in the plane whose magnitude rises from the left to the right."""
+    (instance,) = wind().instances
+    magnitude = (instance.surface.face_center[:, :1] + 1.1) / 2.1
+    field = RosyField(1, instance.field.vectors * magnitude)
+    return wind()._replace(instances=(replace(instance, field=field),))
 
 
 @cache

@@ -11,9 +11,9 @@ from harness.planar import planar_pixel_field
 from shapes import torus
 
 from rosy_addon.compositor.hatching import LineModulation, line_coverage
+from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.ink_thresholds import (
     cyclic_places,
-    ink_of_thresholds,
     layer_shares,
     line_thresholds,
     ordered_thresholds,

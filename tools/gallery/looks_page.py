@@ -205,6 +205,8 @@ def _values(setting: Setting) -> str:
             )
         case Color(has_alpha=has_alpha):
             text = "a color, `#rrggbb`" + " or `#rrggbbaa`" * has_alpha
+        case Number(low=low, high=high, is_integer=True):
+            text = f"{low:,} to {high:,}"
         case Number(low=low, high=high, unit=unit):
             text = f"{low:g} to {high:g}{' radians' if unit == 'angle' else ''}"
         case Numbers(parts=parts):

@@ -465,18 +465,6 @@ def test_union_of_boxes():
 
 
 @pytest.fixture(scope="module")
-def device():
-    """A plain OpenGL context."""
-    pytest.importorskip("moderngl", reason="no moderngl")
-    from harness.egl_device import EglDevice
-
-    try:
-        return EglDevice()
-    except Exception as error:
-        pytest.skip(f"no OpenGL context through EGL: {error}")
-
-
-@pytest.fixture(scope="module")
 def card(device):
     return GpuRenderer(device)
 

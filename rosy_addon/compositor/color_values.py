@@ -81,7 +81,7 @@ def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]
 
 
 def scaled_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
-    """(P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
+    """Return the (P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
     return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
 
 

@@ -122,7 +122,7 @@ def line_thresholds(
 def _streak_thresholds(
     streak: np.ndarray, break_streak: np.ndarray | None, look: Look, table: np.ndarray
 ) -> np.ndarray:
-    """`line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
+    """Compute `line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
     if break_streak is None:
         return _coverage_from(streak, table)
     difference = break_streak - streak
@@ -138,7 +138,7 @@ def _streak_thresholds(
 def _even_line_thresholds(
     line: int, break_streak: np.ndarray | None, look: Look, modulation: LineModulation
 ) -> np.ndarray:
-    """`line_thresholds` of even lines."""
+    """Compute `line_thresholds` of even lines."""
     # 0 in the middle of a line, 1 between two lines.
     position = 1 - modulation.even_lines.streaks[line]
     paper_grain = modulation.paper_grain
@@ -152,13 +152,13 @@ def _even_line_thresholds(
 
 
 def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Coverages whose thresholds, in a table by coverage, are the given streaks; float32."""
+    """Return the (P,) float32 coverages whose thresholds in a table are the given streaks."""
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     return np.interp(streak, table[::-1], coverages[::-1]).astype(np.float32)
 
 
 def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
-    """(count,) float32 coverages, 0 to 1, from which `excess` of the coverage is above 0."""
+    """Find the (count,) float32 coverages, 0 to 1, at which `excess` becomes positive."""
     low, high = np.zeros((2, count), dtype=np.float32)
     high += 1
     for _ in range(BISECTION_STEPS):
@@ -216,7 +216,7 @@ def ordered_thresholds(
 
 
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
-    """(layers, DENSITY_STEPS) float32 densities of the ink of each layer, for the total `DENSITIES`.
+    """Return the (layers, DENSITY_STEPS) float32 densities of the layers at the total `DENSITIES`.
 
     They rise everywhere, and linearly beyond the table.
     """
@@ -232,7 +232,7 @@ def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
 
 
 def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Densities of layers from which there is ink of lines that swap.
+    """Return the densities of layers from which lines that swap have ink.
 
     Parameters
     ----------

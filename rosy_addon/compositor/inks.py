@@ -101,22 +101,22 @@ class Inks:
         return dark + tone[:, None] * (light - dark)
 
     def transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """(..., 3) ratio of (..., 3) ink to paper, by channel, both complemented for light ink."""
+        """Return the (..., 3) ratio of ink to paper by channel, both complemented for light ink."""
         return self.complement_if_light(ink) / np.maximum(
             self.complement_if_light(self.paper), 1e-3
         )
 
     def luminance_transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """(...,) ratio of the luminances of (..., 3) ink and paper, complemented for light ink."""
+        """Return the (...,) ratio of the luminances of ink and paper, complemented for light ink."""
         paper_luminance = float(self.complement_if_light(self.paper) @ LUMINANCE_WEIGHTS)
         return (self.complement_if_light(ink) @ LUMINANCE_WEIGHTS) / max(paper_luminance, 1e-3)
 
     def target_transmittance(self, relative_transmittance: np.ndarray) -> np.ndarray:
-        """(P,) transmittance from `min_transmittance` to 1, given a relative one from 0 to 1."""
+        """Map relative transmittances, from 0 to 1, to the range from `min_transmittance` to 1."""
         return self.min_transmittance + relative_transmittance * (1 - self.min_transmittance)
 
     def required_coverage(self, target_transmittance: np.ndarray, ink: np.ndarray) -> np.ndarray:
-        """(P,) coverage, 0 to 1, with which (P, 3) ink gives a target luminance transmittance."""
+        """Return the (P,) coverage with which (P, 3) ink has a luminance transmittance."""
         return np.clip(
             (1 - target_transmittance) / np.maximum(1 - self.luminance_transmittance(ink), 1e-3),
             0,
@@ -144,7 +144,7 @@ class Inks:
 
 
 def has_ink_per_line(look: Look) -> bool:
-    """Whether each line, or each family of lines, has its own ink."""
+    """Return whether each line, or each family of lines, has its own ink."""
     return is_hatched(look) and look.hue == "families"
 
 
@@ -183,7 +183,7 @@ def inks_of(look: Look, families: int = 1) -> Inks:
 
 
 def is_light(look: Look) -> bool:
-    """Whether the ink is lighter than the paper, by luminance."""
+    """Return whether the ink is lighter than the paper, by luminance."""
     ink_luminance, paper_luminance = (
         to_linear(from_hex(code)) @ LUMINANCE_WEIGHTS for code in (look.ink_color, look.paper_color)
     )

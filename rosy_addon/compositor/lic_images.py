@@ -60,7 +60,7 @@ def lic_images(
 
 
 def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
-    """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
+    """Return the (P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
     if not look.magnitude_length:
         return None
     ends = magnitude_ends(look, field)
@@ -71,7 +71,7 @@ def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
 
 
 def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarray:
-    """(P,) float32 positions of the magnitudes between `magnitude_ends`, 0 to 1."""
+    """Return the (P,) float32 positions of the magnitudes between `magnitude_ends`, 0 to 1."""
     low, high = np.float32(ends)
     clipped = np.clip(np.abs(field.representation), min(low, high), max(low, high))
     return (clipped - low) / (high - low)

@@ -80,10 +80,6 @@ def _is_lit(look: Any) -> bool:
     return look.shading > 0 and (look.tone == "light" or look.tone_lit)
 
 
-def _uses_ink_color(look: Any) -> bool:
-    return is_hatched(look) and not colors_magnitude(look)
-
-
 def has_tone_inks(look: Look) -> bool:
     """Return whether the color of the ink depends on the tone."""
     return is_hatched(look) and look.hue == "tone"
@@ -440,7 +436,11 @@ class Look:
         option_labels={"even": "Evenly Spaced"},
         **_shading("ink"),
     )
-    ink_color: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
+    ink_color: str = color(
+        "#08080d",
+        "Color of the ink",
+        **_ink(lambda look: is_hatched(look) and not colors_magnitude(look)),
+    )
     ink_color_light: str = color(
         "#b06a3c",
         "Color of the ink in the lights",

@@ -208,7 +208,7 @@ def _lines(
 
 
 def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
-    """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     args = surface_paper_grain_args(look)
     channels = args.pop("channels")
     noise = texel_noise(on, replace(look, **args), channels)
@@ -218,7 +218,7 @@ def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
 
 
 def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
-    """(P,) float32 angles between lines and field at `Look.wobble` 1."""
+    """Return the (P,) float32 angles between lines and field at `Look.wobble` 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
     grain = look.grain * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)

@@ -23,7 +23,7 @@ CHANGES: dict[str, tuple[object, ...]] = {
     "seed": (1, 2),
     "grain": (2.0, 2.5),
     "density": (0.2, 0.3),
-    "noise": ("color", "gray"),
+    "hue": ("noise", "one"),
     "length": (30, 50),
     "guiding_angle": (0.2, 0.4),
     "crease_angle": (0.8, 0.9),

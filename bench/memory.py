@@ -35,7 +35,7 @@ WIDE = 3840, 2160
 #: Triangles, N, and settings of the look, by the name of the case.
 CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "3840 x 2160, N = 4": (12_000, 4, {}),
-    "3840 x 2160, N = 7, color noise": (12_000, 7, {"noise": "color"}),
+    "3840 x 2160, N = 7, color noise": (12_000, 7, {"hue": "noise"}),
     "3840 x 2160, N = 4, 2 x 2 samples a pixel": (12_000, 4, {"supersampling": 2}),
     "3840 x 2160, N = 4, brute": (12_000, 4, {"method": "brute", "length": 4}),
     "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),

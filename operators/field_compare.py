@@ -55,7 +55,7 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             settings.color_attribute = DIFFERENCE_ATTRIBUTE
             # Light where the fields are the same, and lines can be seen.
             settings.look.hue, settings.look.color_map = "values", "magma"
-            settings.look.values_low, settings.look.values_high = 180.0 / result.degree, 0.0
+            settings.look.color_range = 180.0 / result.degree, 0.0
         statistics = result.statistics
         mean, p95, largest = (
             format_degrees(np.degrees(angle))

@@ -20,6 +20,7 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import part_of
 from ..projection.visible_vertices import project_vertices
+from .singularity_settings import shows_hidden_singularities, shows_indices
 
 #: Display colors by the sign of the index, and of the outline of dots.
 COLOR_BY_SIGN, OUTLINE_COLOR = {1: "#eb5a14", -1: "#2864eb"}, "#141414"
@@ -132,7 +133,7 @@ def singularity_marks(
         indices.append(index)
     with progress(0.5, 1.0):
         projected = project_vertices(instances, camera, vertices, clip_planes)
-    kept = projected.is_in_view if settings.singularity_dots == "all" else projected.is_visible
+    kept = projected.is_in_view if shows_hidden_singularities(settings) else projected.is_visible
     marks = SingularityMarks(
         projected.position,
         np.concatenate(indices),
@@ -141,7 +142,7 @@ def singularity_marks(
         projected.is_visible,
         (camera.width, camera.height),
         settings.singularity_size,
-        settings.singularity_labels,
+        shows_indices(settings),
     )
     return marks.part(kept)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.settings import choice, number, switch
+from ..core.settings import choice, number
 
 
 def shows_singularities(settings: Any) -> bool:
@@ -12,16 +12,33 @@ def shows_singularities(settings: Any) -> bool:
     return settings.singularity_dots != "none"
 
 
+def shows_hidden_singularities(settings: Any) -> bool:
+    """Return whether singularities that the camera does not see have dots as well."""
+    return settings.singularity_dots.startswith("all")
+
+
+def shows_indices(settings: Any) -> bool:
+    """Return whether the indices of singularities are written beside their dots."""
+    return settings.singularity_dots.endswith("indices")
+
+
 def singularity_dots_choice(**place: Any) -> Any:
     """Return the setting `singularity_dots`; `place` is its stage and its panel."""
     return choice(
         "none",
         "Which singularities have dots: orange for positive index, blue for negative index. The "
-        "area of a dot is proportional to the index",
+        "area of a dot is proportional to the index. Indices are written beside visible dots, unless there "
+        "are more than 250",
         {
             "none": "None",
             "visible": "Those that the camera sees",
+            "visible_indices": "Those that the camera sees, with their indices",
             "all": "All, with fainter dots for hidden ones",
+            "all_indices": "All, with the indices of visible ones",
+        },
+        option_labels={
+            "visible_indices": "Visible, with Indices",
+            "all_indices": "All, with Indices",
         },
         panel_label="Show",
         **place,
@@ -36,17 +53,6 @@ def singularity_size_number(**place: Any) -> Any:
         256.0,
         "Diameter in pixels of the dot of an index of 1/N",
         panel_label="Dot Size",
-        applies=shows_singularities,
-        **place,
-    )
-
-
-def singularity_labels_switch(**place: Any) -> Any:
-    """Return the setting `singularity_labels`."""
-    return switch(
-        False,
-        "Write the indices beside visible dots, unless there are more than 250",
-        panel_label="Indices",
         applies=shows_singularities,
         **place,
     )

@@ -17,7 +17,7 @@ from ..annotation.round_numbers import round_below
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.color_values import value_ends, value_ranges
-from ..compositor.look import Look, colors_magnitude, colors_values
+from ..compositor.look import Look, colors_magnitude, colors_values, magnitude_range, uses_magnitude
 from ..compositor.look_units import scaled_look
 from ..core.cache import Cache
 from ..core.color import color_stops, map_colors
@@ -320,12 +320,11 @@ def _figure_look(
     """Return the look of all panels: its lengths in pixels, and common ranges of the color map."""
     look = scaled_look(look, scale)
     look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
-    if look.magnitude != "none" and not look.magnitude_range:
-        largest = max(float(field.magnitude.max()) for field in fields.values())
-        look = replace(look, magnitude_range=largest or 1.0)
     if colors_values(look):
-        low, high = value_ends(look, value_ranges(instances))
-        look = replace(look, values_low=low, values_high=high)
+        return replace(look, color_range=value_ends(look, value_ranges(instances)))
+    if uses_magnitude(look) and magnitude_range(look) is None:
+        largest = max(float(field.magnitude.max()) for field in fields.values())
+        look = replace(look, color_range=(0.0, largest or 1.0))
     return look
 
 
@@ -339,13 +338,9 @@ def _color_bar(look: Look, label: str) -> ColorBar | None:
     """Return the color bar of the fields; None if neither magnitudes nor numbers are shown as color."""
     from ..external.matplotlib_figure import ColorBar
 
-    if colors_magnitude(look):
-        ends = 0.0, look.magnitude_range
-    elif colors_values(look):
-        ends = look.values_low, look.values_high
-    else:
+    if not (colors_magnitude(look) or colors_values(look)):
         return None
-    return ColorBar(label, *ends, color_stops(look.color_map))
+    return ColorBar(label, *look.color_range, color_stops(look.color_map))
 
 
 def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
@@ -455,9 +450,8 @@ class _Studio:
             self._rgba(
                 replace(instance, color_values=values),
                 hue="values",
-                magnitude="none",
-                values_low=-slope * at_zero,
-                values_high=slope * (1.0 - at_zero),
+                magnitude_length=False,
+                color_range=(-slope * at_zero, slope * (1.0 - at_zero)),
                 color_map=DIFFERENCE_COLORS,
             )
             for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]

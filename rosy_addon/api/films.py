@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compositor.flow import flow_at
-from ..compositor.look import Look
+from ..compositor.look import Look, magnitude_range, uses_magnitude
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..field.carry import vectors_on_rest_shape
@@ -230,8 +230,8 @@ class Film:
             As of `film`. What is wrong with a field is found before the first view.
         """
         survey, look = self._survey, self.look
-        if look.magnitude != "none" and not look.magnitude_range:
-            look = replace(look, magnitude_range=survey.largest_magnitude)
+        if uses_magnitude(look) and magnitude_range(look) is None:
+            look = replace(look, color_range=(0.0, survey.largest_magnitude))
         rest = survey.rest_vertices
         if rest is not None and not self.keeps_anchor:
             look = replace(look, anchor="surface")

@@ -182,7 +182,7 @@ def render(
         Numbers of the faces, vertices or corners, such as the angle between two fields, which the hue of
         the lines shows through the `color_map`; NaN where there is none. A string names an array of
         `Surface.face_data` or `Surface.vertex_data`. If there are as many faces as vertices, they are of
-        faces. The settings `values_low` and `values_high` are the ends of the color map.
+        faces. The setting `color_range` holds the ends of the color map.
     tone_values : str or (V,) or (C,) array_like, optional
         For hatching: tones of the vertices or corners, linear, 0 is dark and 1 is light, such as
         `ambient_occlusion`. A string names an array of `Surface.vertex_data`; "Color" is the

@@ -17,7 +17,7 @@ from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..core.file_io import check_writable
-from ..core.settings import settings_of
+from ..core.settings import Numbers, settings_of
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from ..projection.up_axis import UP_AXIS_MATRIX
@@ -292,6 +292,8 @@ def _parse_setting(text: str) -> tuple[str, Any]:
         return name, settings[name].parse(value)
     except ValueError:
         expected = "a whole number" if isinstance(settings[name].default, int) else "a number"
+        if isinstance(settings[name], Numbers):
+            expected = "numbers with commas between them"
         raise RosyError(f"--set {text}: expected {expected}") from None
 
 

@@ -58,12 +58,12 @@ def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
     Parameters
     ----------
     look : Look
-        If its `values_low` and `values_high` are both 0, they are those of the numbers.
+        If both ends of its `color_range` are 0, they are those of the numbers.
     ranges : iterable of (float, float) or None
         From `value_range`, of the mesh instances that have a field and numbers.
     """
-    if not look.values_low == look.values_high == 0:
-        return look.values_low, look.values_high
+    if any(look.color_range):
+        return look.color_range
     known = [entry for entry in ranges if entry is not None] or [(0.0, 0.0)]
     return min(low for low, _ in known), max(high for _, high in known)
 
@@ -81,7 +81,7 @@ def value_scale(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]
 
 
 def scaled_positions(values: np.ndarray, low: float, scale: float) -> np.ndarray:
-    """(P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
+    """Return the (P,) float32 positions of (P,) numbers in the color map, 0 to 1; see `value_scale`."""
     return np.clip((values.astype(np.float64) - low) * scale, 0, 1).astype(np.float32)
 
 

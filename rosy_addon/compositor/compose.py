@@ -16,7 +16,7 @@ from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines, has_even_lines
+from .even_lines import EvenLines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
 from .flow import with_cycle_distance
@@ -32,8 +32,14 @@ from .hatching import (
 from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
-from .lic_images import LicImages, lic_images, relative_magnitude, with_magnitude_range
-from .look import Look, colors_magnitude, colors_values, is_hatched
+from .lic_images import (
+    LicImages,
+    lic_images,
+    magnitude_ends,
+    relative_magnitude,
+    with_magnitude_range,
+)
+from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
@@ -131,7 +137,7 @@ def compose(
             with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
                 pictures.append(canvas.picture(strip))
     rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
-    color_range = common_color_range({layer.look.magnitude_range for layer in layers})
+    color_range = common_color_range({layer.look.color_range for layer in layers})
     if not colors_magnitude(look):
         color_range = None
     if canvas.map_position is not None:
@@ -275,7 +281,7 @@ def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: L
         field = stages.pixel_field(degree, pixel_look)
     look = look_for_symmetry(pixel_look, field.symmetry)
     even_lines = paper_grain = outline = None
-    if has_even_lines(look):
+    if is_even(look):
         with progress(0.3, 0.6):
             even_lines = stages.even_lines(field, look)
     if colors_magnitude(look):
@@ -417,7 +423,8 @@ def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look)
     """
     hue, position = None, None
     if colors_magnitude(look):
-        hue = map_colors(relative_magnitude(field, look), look.color_map)
+        ends = magnitude_ends(look, field)
+        hue = map_colors(relative_magnitude(field, ends), look.color_map)
     elif field.map_position is not None:
         position = field.map_position
         hue = map_colors(np.nan_to_num(position), look.color_map)

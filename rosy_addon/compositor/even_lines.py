@@ -26,7 +26,7 @@ from ..field.frames import transform_components
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_values import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
-from .look import Look, is_hatched
+from .look import Look
 from .look_units import instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
@@ -62,11 +62,6 @@ MAX_BREAK_AMOUNT = 0.85
 
 #: Label of all steps.
 STEP_LABEL = "spacing lines"
-
-
-def has_even_lines(look: Look) -> bool:
-    """Whether lines are evenly spaced instead of streaks of noise."""
-    return is_hatched(look) and look.lines == "even"
 
 
 @dataclass(frozen=True, eq=False)

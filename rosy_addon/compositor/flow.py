@@ -25,7 +25,7 @@ from dataclasses import replace
 import numpy as np
 
 from .image_noise import NOISE_MEAN
-from .look import Look, has_flow
+from .look import Look, has_colored_noise, has_flow
 
 #: Channels of noise. Three is the least number for which the squares of the weights have a constant sum.
 FLOW_CHANNELS = 3
@@ -46,7 +46,7 @@ def noise_channel_count(look: Look) -> int:
     """Return the number of noise channels that a look convolves."""
     if has_flow(look):
         return FLOW_CHANNELS
-    return 3 if look.noise == "color" else 1
+    return 3 if has_colored_noise(look) else 1
 
 
 def cycle_distance(look: Look) -> float:

@@ -25,7 +25,7 @@ from .even_lines import EvenLines, uneven_width
 from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
-from .lic_images import LicImages, relative_magnitude
+from .lic_images import LicImages, magnitude_ends, relative_magnitude
 from .look import Look, colors_magnitude, is_hatched
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
@@ -133,9 +133,9 @@ def render_hatching(
     Returns
     -------
     color : (P, 3) float32 ndarray
-        Linear color of ink and paper, or of the ink alone if `look.clear_paper`.
+        Linear color of ink and paper, not premultiplied.
     alpha : (P,) float32 ndarray
-        1, or the coverage by ink if `look.clear_paper`.
+        1 if the paper is opaque, the coverage by ink if the paper is transparent.
     """
     tone = np.clip(tone, 0, 1)
     ink_indices = line_ink_indices(field, look)
@@ -143,20 +143,18 @@ def render_hatching(
         ink, coverage = _render_one_ink(field, images, look, tone, modulation)
     else:
         ink, coverage = _render_many_inks(field, images, look, tone, modulation, ink_indices)
-    if look.clear_paper:
-        return ink, coverage
-    paper = inks_of(look).paper
-    return paper + coverage[:, None] * (ink - paper), np.ones_like(coverage)
+    return inks_of(look).on_paper(ink, coverage)
 
 
 def _render_one_ink(
     field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
+    """Return the (P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
     inks = inks_of(look)
     by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
-        ink = to_linear(map_colors(relative_magnitude(field, look), look.color_map))
+        magnitude = relative_magnitude(field, magnitude_ends(look, field))
+        ink = to_linear(map_colors(magnitude, look.color_map))
     else:
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
     if position is not None:
@@ -183,7 +181,7 @@ def _render_many_inks(
     modulation: LineModulation,
     ink_indices: list[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(P, 3) linear color of the ink, and (P,) coverage, with an ink per family of lines.
+    """Return the (P, 3) linear color of the ink, and (P,) coverage, with an ink per family of lines.
 
     Inks are transparent: the transmittances of crossing lines are multiplied.
     """
@@ -213,7 +211,7 @@ def _render_many_inks(
 
 
 def _line_tones(tone: np.ndarray, modulation: LineModulation) -> np.ndarray:
-    """(M, P) target tones of the lines, or (1, P) if all lines have the same."""
+    """Return the (M, P) target tones of the lines, or (1, P) if all lines have the same."""
     return tone[None] if modulation.line_tones is None else modulation.line_tones
 
 
@@ -272,7 +270,7 @@ def line_coverage(
 def standard_streak(
     images: LicImages, line: int, std: float
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Streaks of a line with mean 0 and standard deviation 1, and their slopes if these are known."""
+    """Return the streaks of a line with mean 0 and variance 1, and their slopes if known."""
     streak = (images.members[line].mean(axis=1) - NOISE_MEAN) / std
     return streak, None if images.slopes is None else images.slopes[line] / std
 
@@ -284,7 +282,7 @@ def _above_threshold(
     look: Look,
     slope: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Coverage where streaks exceed the threshold of the target coverage, with soft edges.
+    """Return 1 where streaks exceed the threshold of the target coverage, with soft edges.
 
     With slopes, edges are at least as soft as the mean over a pixel.
     """
@@ -301,12 +299,12 @@ def _above_threshold(
 
 
 def has_breaks(look: Look) -> bool:
-    """Whether lines are broken into pieces, or vary in width as drawn by hand."""
+    """Return whether lines are broken into pieces, or vary in width as drawn by hand."""
     return is_hatched(look) and (look.breaks > 0 or look.wobble > 0)
 
 
 def has_overshoot(look: Look) -> bool:
-    """Whether lines continue past the borders of tones."""
+    """Return whether lines continue past the borders of tones."""
     return is_hatched(look) and look.overshoot > 0
 
 
@@ -316,17 +314,17 @@ def overshoot_steps(look: Look) -> int:
 
 
 def has_outline(look: Look) -> bool:
-    """Whether lines are drawn along silhouettes and creases."""
+    """Return whether lines are drawn along silhouettes and creases."""
     return is_hatched(look) and look.outline > 0
 
 
 def has_paper_grain(look: Look) -> bool:
-    """Whether the grain of the paper breaks up the ink."""
+    """Return whether the grain of the paper breaks up the ink."""
     return is_hatched(look) and look.paper_grain > 0
 
 
 def is_shaded_by_pixel(look: Look) -> bool:
-    """Whether a pixel with several samples is shaded once, not at every sample.
+    """Return whether a pixel with several samples is shaded once, not at every sample.
 
     The streaks of other methods do not have the slopes that smooth the edges of the ink.
     """
@@ -430,7 +428,7 @@ def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) ->
 def _onset_darkness(
     field: PixelField, look: Look, even_lines: EvenLines | None
 ) -> list[np.ndarray]:
-    """(P,) darkness at which each line joins. Above 1 for ranks beyond `look.layers`."""
+    """Return the (P,) darkness at which each line joins. Above 1 for ranks beyond `look.layers`."""
     onsets = []
     for line, rank in enumerate(line_ranks(field, look)):
         onset = soft_rank_of(rank, look.layers) * np.float32(look.layering)

@@ -27,7 +27,6 @@ from .hatching import (
     soft_rank_of,
     standard_streak,
 )
-from .inks import Inks, inks_of
 from .lic_images import LicImages
 from .look import Look
 from .pixel_field import PixelField
@@ -35,44 +34,20 @@ from .streak_statistics import (
     COVERAGE_STEPS,
     break_amount,
     look_streak_statistics,
-    softness,
 )
 
 #: Number of lines whose thresholds are stored.
 MAX_LAYERS = 3
 
-#: The density of normally distributed streaks is about this times c (1 - c) at the threshold of the
-#: coverage c.
-DENSITY_FACTOR = 1.6
-
-#: Spread of thresholds that is due to their storage with 8 bits.
-ROUNDING_SPREAD = 0.001
-
-#: Square of half the width of an even distribution of thresholds t over the variance of 2 t - 1.
-EDGE_VARIANCE = 0.75
-
-#: Half the width of the sharpest edges, in thresholds.
-MIN_EDGE = 0.002
-
-#: Coverages that differ from 0 or 1 by less than this fade to it.
-EXACT_ENDS = 0.02
-
-#: Correction of coverages where a filter averages a few thresholds, which are not evenly distributed about
-#: their mean. Fitted to means of 2 to 64 thresholds, and to lines at least 4 pixels apart: the mean coverage is
-#: right to 0.02.
-FILTER_CORRECTION = 3.0
-
 #: Nodes across an antialiased pixel, in half widths of it, with their weights: Gauss quadrature.
 PIXEL_NODES = ((-(0.6**0.5), 5 / 18), (0.0, 8 / 18), (0.6**0.5, 5 / 18))
 
-#: Crowding from which coarser lines replace even ones, at each of these nodes.
+#: Crowding from which coarser lines replace even ones, at each of these nodes: the middles of thirds.
 PIXEL_LEVELS = (1 / 6, 1 / 2, 5 / 6)
 
-#: Half the width of a pixel for streaks, in pixels. Its variance is that of the edges of `hatching`.
+#: Half the width w of a pixel for streaks, in pixels. Its variance w^2 / 3 is 1/5, that of the edges of
+#: `hatching`.
 STREAK_REACH = 0.6**0.5
-
-#: Smallest transmittance, and smallest difference to it.
-MIN_TRANSMITTANCE = 1e-3
 
 #: Steps of the bisection that finds the thresholds of uneven lines: to 1 / 1024.
 BISECTION_STEPS = 10
@@ -147,7 +122,7 @@ def line_thresholds(
 def _streak_thresholds(
     streak: np.ndarray, break_streak: np.ndarray | None, look: Look, table: np.ndarray
 ) -> np.ndarray:
-    """`line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
+    """Compute `line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
     if break_streak is None:
         return _coverage_from(streak, table)
     difference = break_streak - streak
@@ -163,7 +138,7 @@ def _streak_thresholds(
 def _even_line_thresholds(
     line: int, break_streak: np.ndarray | None, look: Look, modulation: LineModulation
 ) -> np.ndarray:
-    """`line_thresholds` of even lines."""
+    """Compute `line_thresholds` of even lines."""
     # 0 in the middle of a line, 1 between two lines.
     position = 1 - modulation.even_lines.streaks[line]
     paper_grain = modulation.paper_grain
@@ -177,13 +152,13 @@ def _even_line_thresholds(
 
 
 def _coverage_from(streak: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Coverages whose thresholds, in a table by coverage, are the given streaks; float32."""
+    """Return the (P,) float32 coverages whose thresholds in a table are the given streaks."""
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     return np.interp(streak, table[::-1], coverages[::-1]).astype(np.float32)
 
 
 def _bisect(excess: Callable[[np.ndarray], np.ndarray], count: int) -> np.ndarray:
-    """(count,) float32 coverages, 0 to 1, from which `excess` of the coverage is above 0."""
+    """Find the (count,) float32 coverages, 0 to 1, at which `excess` becomes positive."""
     low, high = np.zeros((2, count), dtype=np.float32)
     high += 1
     for _ in range(BISECTION_STEPS):
@@ -241,7 +216,7 @@ def ordered_thresholds(
 
 
 def _layer_densities(layers: int, layering: float) -> np.ndarray:
-    """(layers, DENSITY_STEPS) float32 densities of the ink of each layer, for the total `DENSITIES`.
+    """Return the (layers, DENSITY_STEPS) float32 densities of the layers at the total `DENSITIES`.
 
     They rise everywhere, and linearly beyond the table.
     """
@@ -257,7 +232,7 @@ def _layer_density(table: np.ndarray, total: np.ndarray) -> np.ndarray:
 
 
 def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray) -> np.ndarray:
-    """Densities of layers from which there is ink of lines that swap.
+    """Return the densities of layers from which lines that swap have ink.
 
     Parameters
     ----------
@@ -445,69 +420,3 @@ def _even_sample(
         spread_between = (1 - position) / np.maximum(between, np.float32(1e-6))
         position = np.minimum(position / (1 - between), spread_between)
     return EvenLines(1 - position, lines.period, growth=None), period
-
-
-def layer_inks(look: Look, line_count: int) -> tuple[int, Inks]:
-    """Return the number of lines that cross at most, and their inks: one each, or one for all."""
-    layers = min(look.layers, line_count, MAX_LAYERS)
-    return layers, inks_of(look, layers if look.hue == "families" else 1)
-
-
-def ink_of_thresholds(
-    pixels: np.ndarray, tone: np.ndarray, look: Look, line_count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Draw the ink of a tone, as the node group *RoSy Hatching* does.
-
-    Parameters
-    ----------
-    pixels : (P, 4) float32 ndarray
-        From `threshold_pixels`, or means of them.
-    tone : (P,) ndarray
-        Linear, 0 to 1.
-    look : Look
-        Its settings of the ink are used.
-    line_count : int
-        Number of lines through a point.
-
-    Returns
-    -------
-    color : (P, 3) float32 ndarray
-        Linear color of ink on paper, or of the ink alone if `look.clear_paper`.
-    coverage : (P,) float32 ndarray
-        0 to 1.
-    """
-    layers, inks = layer_inks(look, line_count)
-    required = inks.target_transmittance(inks.complement_if_light(tone))
-    colors = [
-        inks.ink_at_tone(np.full(len(tone), min(layer, len(inks.dark) - 1)), tone)
-        for layer in range(layers)
-    ]
-    left = [1 - inks.required_coverage(required, ink) for ink in colors]
-    shares = layer_shares(1 - left[0], layers, look.layering)
-    centered = 2 * pixels[:, :3] - 1
-    spread = pixels[:, 3] - (centered * centered).mean(axis=1) - np.float32(ROUNDING_SPREAD)
-    spread = np.maximum(spread, 0)
-    # Half the width of an even distribution with this spread, which is that of 2 t - 1 for thresholds t.
-    filtered_edge = np.sqrt(EDGE_VARIANCE * spread)
-    evenness = np.minimum(3 * spread, 1)
-    correction = FILTER_CORRECTION * evenness * evenness * (1 - evenness)
-    color = colors[-1] if look.clear_paper else np.broadcast_to(inks.paper, (len(tone), 3))
-    bare = np.ones(len(tone), dtype=np.float32)
-    # The lines that come first are on top of the others.
-    for layer in reversed(range(layers)):
-        coverage = 1 - np.maximum(left[layer], MIN_TRANSMITTANCE) ** shares[layer]
-        room = np.minimum(coverage, 1 - coverage)
-        inner = coverage * (1 - coverage)
-        edge = DENSITY_FACTOR * softness(look.crispness) * inner
-        edge = np.maximum(np.maximum(np.minimum(edge, room), filtered_edge), MIN_EDGE)
-        corrected = coverage + correction * inner * (1 - 2 * coverage)
-        covered = np.clip((corrected - pixels[:, layer]) / (2 * edge) + 0.5, 0, 1)
-        # What is narrower than the edge covers no point of it entirely, be it ink or paper.
-        missed = 1 - np.minimum(room / edge, 1)
-        is_dark = coverage > 0.5
-        covered = np.clip(covered, is_dark * missed, 1 - ~is_dark * missed)
-        covered = is_dark + np.minimum(room / EXACT_ENDS, 1) * (covered - is_dark)
-        bare *= 1 - covered
-        part = covered / np.maximum(1 - bare, np.float32(1e-6)) if look.clear_paper else covered
-        color = color + part[:, None] * (colors[layer] - color)
-    return color.astype(np.float32), 1 - bare

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.color import LUMINANCE_WEIGHTS, from_hex, to_linear
-from .look import Look, colors_magnitude, is_hatched
+from ..core.color import LUMINANCE_WEIGHTS, alpha_from_hex, from_hex, to_linear
+from .look import Look, has_tone_inks, is_hatched
 
 #: Maximum number of inks.
 MAX_INKS = 12
@@ -56,10 +56,10 @@ class Inks:
     ----------
     paper : (3,) float32 ndarray
         Linear color.
-    dark, middle, light : (n, 3) float32 ndarray
-        Linear colors of the n inks in the shadows, at the tone `mid_tone`, and in the lights.
-    mid_tone : float
-        Between 0 and 1.
+    paper_alpha : float
+        Opacity of the paper, 0 to 1.
+    dark, light : (n, 3) float32 ndarray
+        Linear colors of the n inks in the shadows and in the lights.
     is_light : bool
         Whether the ink is lighter than the paper. Lighter tones then need more ink.
     min_transmittance : float
@@ -68,10 +68,9 @@ class Inks:
     """
 
     paper: np.ndarray
+    paper_alpha: float
     dark: np.ndarray
-    middle: np.ndarray
     light: np.ndarray
-    mid_tone: float
     is_light: bool
     min_transmittance: float
 
@@ -90,45 +89,54 @@ class Inks:
         (P, 3) float32 ndarray
             Linear color. Read-only if there is only one.
         """
-        if (
-            len(self.dark) == 1
-            and (self.dark == self.middle).all()
-            and (self.dark == self.light).all()
-        ):
+        if len(self.dark) == 1 and (self.dark == self.light).all():
             return np.broadcast_to(self.dark, (len(tone), 3))
         lower = np.minimum(index.astype(np.intp), len(self.dark) - 1)
         upper = np.minimum(lower + 1, len(self.dark) - 1)
         fraction = (index - lower).astype(np.float32)[:, None]
-        dark, middle, light = (
+        dark, light = (
             colors[lower] + fraction * (colors[upper] - colors[lower])
-            for colors in (self.dark, self.middle, self.light)
+            for colors in (self.dark, self.light)
         )
-        lighter = np.clip((tone - np.float32(self.mid_tone)) / np.float32(1 - self.mid_tone), 0, 1)
-        darker = np.clip(1 - tone / np.float32(self.mid_tone), 0, 1)
-        return middle + lighter[:, None] * (light - middle) + darker[:, None] * (dark - middle)
+        return dark + tone[:, None] * (light - dark)
 
     def transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """(..., 3) ratio of (..., 3) ink to paper, by channel, both complemented for light ink."""
+        """Return the (..., 3) ratio of ink to paper by channel, both complemented for light ink."""
         return self.complement_if_light(ink) / np.maximum(
             self.complement_if_light(self.paper), 1e-3
         )
 
     def luminance_transmittance(self, ink: np.ndarray) -> np.ndarray:
-        """(...,) ratio of the luminances of (..., 3) ink and paper, complemented for light ink."""
+        """Return the (...,) ratio of the luminances of ink and paper, complemented for light ink."""
         paper_luminance = float(self.complement_if_light(self.paper) @ LUMINANCE_WEIGHTS)
         return (self.complement_if_light(ink) @ LUMINANCE_WEIGHTS) / max(paper_luminance, 1e-3)
 
     def target_transmittance(self, relative_transmittance: np.ndarray) -> np.ndarray:
-        """(P,) transmittance from `min_transmittance` to 1, given a relative one from 0 to 1."""
+        """Map relative transmittances, from 0 to 1, to the range from `min_transmittance` to 1."""
         return self.min_transmittance + relative_transmittance * (1 - self.min_transmittance)
 
     def required_coverage(self, target_transmittance: np.ndarray, ink: np.ndarray) -> np.ndarray:
-        """(P,) coverage, 0 to 1, with which (P, 3) ink gives a target luminance transmittance."""
+        """Return the (P,) coverage with which (P, 3) ink has a luminance transmittance."""
         return np.clip(
             (1 - target_transmittance) / np.maximum(1 - self.luminance_transmittance(ink), 1e-3),
             0,
             1,
         )
+
+    def on_paper(self, ink: np.ndarray, coverage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (P, 3) color, not premultiplied, and (P,) opacity of ink that covers the paper.
+
+        Parameters
+        ----------
+        ink : (P, 3) float32 ndarray
+            Linear color.
+        coverage : (P,) float32 ndarray
+            0 to 1.
+        """
+        if self.paper_alpha == 0:
+            return ink, coverage
+        opacity = 1 - (1 - coverage) * (1 - self.paper_alpha)
+        return self.paper + (coverage / opacity)[:, None] * (ink - self.paper), opacity
 
     def complement_if_light(self, light: np.ndarray) -> np.ndarray:
         """Return 1 - `light` if the ink is lighter than the paper, and `light` otherwise."""
@@ -136,8 +144,8 @@ class Inks:
 
 
 def has_ink_per_line(look: Look) -> bool:
-    """Whether each line, or each family of lines, has its own ink."""
-    return is_hatched(look) and look.hue == "families" and not colors_magnitude(look)
+    """Return whether each line, or each family of lines, has its own ink."""
+    return is_hatched(look) and look.hue == "families"
 
 
 def ink_count(look: Look, line_count: int, family_count: int) -> int:
@@ -166,18 +174,16 @@ def inks_of(look: Look, families: int = 1) -> Inks:
         Number of inks (see `ink_count`).
     """
     paper = to_linear(from_hex(look.paper_color))
-    light_code = look.ink_color_light if look.ink_ramp else look.ink_color
-    dark, light = (_ink_series(code, families) for code in (look.ink_color, light_code))
-    middle, mid_tone = (dark + light) / 2, 0.5
-    if look.ink_ramp and look.ink_middle > 0:
-        middle, mid_tone = _ink_series(look.ink_color_middle, families), look.ink_middle
-    inks = Inks(paper, dark, middle, light, mid_tone, is_light(look), 0.0)
+    dark = light = _ink_series(look.ink_color, families)
+    if has_tone_inks(look):
+        light = _ink_series(look.ink_color_light, families)
+    inks = Inks(paper, alpha_from_hex(look.paper_color), dark, light, is_light(look), 0.0)
     solid_ink = inks.light if inks.is_light else inks.dark
     return replace(inks, min_transmittance=float(np.max(inks.luminance_transmittance(solid_ink))))
 
 
 def is_light(look: Look) -> bool:
-    """Whether the ink is lighter than the paper, by luminance."""
+    """Return whether the ink is lighter than the paper, by luminance."""
     ink_luminance, paper_luminance = (
         to_linear(from_hex(code)) @ LUMINANCE_WEIGHTS for code in (look.ink_color, look.paper_color)
     )

@@ -7,9 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from .look import Look
+from .look import Look, magnitude_range
 from .pixel_field import PixelField
 from .reported_blocks import reported_blocks
+
+#: Smallest difference between the ends of a range of magnitudes, relative to them. Single precision
+#: resolves 1e-7.
+MIN_RANGE_RATIO = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,33 +60,43 @@ def lic_images(
 
 
 def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
-    """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
-    if look.magnitude not in ("length", "both"):
+    """Return the (P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
+    if not look.magnitude_length:
         return None
-    look = with_magnitude_range(look, field)
+    ends = magnitude_ends(look, field)
     limits = np.empty(len(field.pixel), dtype=np.int32)
     for block in reported_blocks(len(limits), "tracing streamlines"):
-        limits[block] = np.rint(look.length * relative_magnitude(field.part(block), look))
+        limits[block] = np.rint(look.length * relative_magnitude(field.part(block), ends))
     return limits
 
 
-def relative_magnitude(field: PixelField, look: Look) -> np.ndarray:
-    """(P,) float32: rho relative to `Look.magnitude_range`, at most 1."""
-    limit = np.float32(with_magnitude_range(look, field).magnitude_range)
-    return np.minimum(np.abs(field.representation), limit) / limit
+def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarray:
+    """Return the (P,) float32 positions of the magnitudes between `magnitude_ends`, 0 to 1."""
+    low, high = np.float32(ends)
+    clipped = np.clip(np.abs(field.representation), min(low, high), max(low, high))
+    return (clipped - low) / (high - low)
+
+
+def magnitude_ends(look: Look, field: PixelField) -> tuple[float, float]:
+    """Return the magnitudes at the bottom and at the top of the range of a look.
+
+    If the look sets none, they are 0 and the largest magnitude of the field.
+    """
+    ends = magnitude_range(look)
+    if ends is None:
+        ends = 0.0, float(np.abs(field.representation).max(initial=0.0)) or 1.0
+    return distinct_ends(*ends)
 
 
 def with_magnitude_range(look: Look, field: PixelField) -> Look:
-    """Return a look with the range of magnitudes of a field, if it has none of its own.
+    """Return a look that colors magnitudes, with its range set to `magnitude_ends`.
 
     Parts of the field can then be drawn one by one.
     """
-    largest = look.magnitude_range
-    if not largest:
-        largest = float(np.abs(field.representation).max(initial=0.0)) or 1.0
-    return replace(look, magnitude_range=fixed_magnitude_range(largest))
+    return replace(look, color_range=magnitude_ends(look, field))
 
 
-def fixed_magnitude_range(largest: float) -> float:
-    """Return the magnitude with the last color, given the largest one, or a range that a look sets."""
-    return max(largest, MIN_COMPONENT)
+def distinct_ends(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a range of magnitudes. If they are equal, the upper one is raised a little."""
+    least = max(MIN_COMPONENT, MIN_RANGE_RATIO * max(abs(low), abs(high)))
+    return (low, high) if abs(high - low) >= least else (low, low + least)

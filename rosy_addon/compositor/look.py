@@ -8,17 +8,18 @@ from typing import Any
 
 from ..annotation.singularity_settings import (
     singularity_dots_choice,
-    singularity_labels_switch,
     singularity_size_number,
 )
 from ..core.errors import RosyError
 from ..core.settings import (
+    Numbers,
     Stage,
     always,
     check_settings,
     choice,
     color,
     number,
+    numbers,
     settings_of,
     stage_key,
     switch,
@@ -26,23 +27,44 @@ from ..core.settings import (
 
 
 def colors_magnitude(look: Any) -> bool:
-    """Return whether the magnitude of the field drives the color of the lines."""
-    return look.magnitude in ("color", "both")
+    """Return whether the hue of the lines shows the magnitude of the field."""
+    return look.hue == "magnitude"
+
+
+def uses_magnitude(look: Any) -> bool:
+    """Return whether the magnitude of the field drives the color or the length of the lines."""
+    return colors_magnitude(look) or look.magnitude_length
 
 
 def colors_values(look: Any) -> bool:
-    """Return whether numbers on the surface drive the color of the lines."""
-    return look.hue == "values" and not colors_magnitude(look)
+    """Return whether the hue of the lines shows numbers on the surface."""
+    return look.hue == "values"
+
+
+def magnitude_range(look: Look) -> tuple[float, float] | None:
+    """Return the magnitudes at the ends of the range of a look; None if the fields determine them."""
+    is_set = uses_magnitude(look) and not colors_values(look) and any(look.color_range)
+    return look.color_range if is_set else None
 
 
 def is_hatched(look: Any) -> bool:
     """Return whether lines are drawn with ink on paper."""
-    return look.ink == "hatch"
+    return look.ink != "soft"
+
+
+def is_even(look: Look) -> bool:
+    """Return whether lines of ink are drawn at even distances."""
+    return look.ink == "even"
+
+
+def has_colored_noise(look: Look) -> bool:
+    """Return whether streaks are made of three channels of noise."""
+    return look.hue == "noise" and not is_hatched(look)
 
 
 def _has_streaks(look: Any) -> bool:
     """Return whether streaks of noise are drawn, or break even lines."""
-    return not (is_hatched(look) and look.lines == "even" and not (look.breaks or look.wobble))
+    return not (is_even(look) and not (look.breaks or look.wobble))
 
 
 def has_flow(look: Any) -> bool:
@@ -51,19 +73,16 @@ def has_flow(look: Any) -> bool:
 
 
 def _can_flow(look: Any) -> bool:
-    return _has_streaks(look) and look.method in ("sheets", "ibfv") and look.noise == "gray"
+    return _has_streaks(look) and look.method in ("sheets", "ibfv") and not has_colored_noise(look)
 
 
 def _is_lit(look: Any) -> bool:
     return look.shading > 0 and (look.tone == "light" or look.tone_lit)
 
 
-def _uses_ink_color(look: Any) -> bool:
-    return is_hatched(look) and not colors_magnitude(look)
-
-
-def _uses_ink_ramp(look: Any) -> bool:
-    return _uses_ink_color(look) and look.ink_ramp
+def has_tone_inks(look: Look) -> bool:
+    """Return whether the color of the ink depends on the tone."""
+    return is_hatched(look) and look.hue == "tone"
 
 
 #: Where the settings of singularities are shown, and the stage that they affect.
@@ -265,15 +284,6 @@ class Look:
         panel="streaks",
         applies=lambda look: look.anchor == "surface",
     )
-    noise: str = choice(
-        "gray",
-        "Color of the noise, and so of the streaks",
-        {
-            "gray": "One channel",
-            "color": "Three channels, each convolved separately: a plaid",
-        },
-        panel="color",
-    )
     anchor: str = choice(
         "picture",
         "What the noise stays attached to when something moves",
@@ -289,31 +299,19 @@ class Look:
         "What the hue of the lines shows",
         {
             "one": "Same hue for all",
+            "noise": "Random hues of soft streaks: three channels of noise, each convolved separately, "
+            "which cross like the threads of a plaid",
             "families": "One hue for each line that the field distinguishes: major and minor of "
             "tensors, or dir0, dir1 and so on, if each is the same line on the whole mesh. In "
             "hatching, lines of other fields get inks by their distance to the guiding angle",
             "values": "Numbers on the surface, such as the angle between two fields, through the "
             "color map",
+            "magnitude": "Magnitude of the field, through the color map",
+            "tone": "Tone of hatching: the ink blends from its color in the shadows to the highlight "
+            "color in the lights",
         },
         option_labels={"one": "Single"},
         **_shading("color"),
-    )
-    values_low: float = number(
-        0.0,
-        -1e30,
-        1e30,
-        "Number at the bottom of the color map. Above the number at the top, the map is inverted. Both 0: "
-        "the range of the numbers",
-        label="Bottom Value",
-        **_shading("color", colors_values),
-    )
-    values_high: float = number(
-        0.0,
-        -1e30,
-        1e30,
-        "Number at the top of the color map. Both 0: the range of the numbers",
-        label="Top Value",
-        **_shading("color", colors_values),
     )
     seed: int = number(0, 0, 2**31 - 1, "Random seed of the noise", panel="quality")
     gain: float = number(
@@ -348,27 +346,20 @@ class Look:
         panel="streaks",
         applies=lambda look: not look.cross_creases,
     )
-    magnitude: str = choice(
-        "none",
-        "What the magnitude of the field controls",
-        {
-            "none": "Nothing",
-            "color": "The color, through a color map",
-            "length": "The length of the streaks",
-            "both": "Color and length",
-        },
-        label="Magnitude Drives",
-        option_labels={"none": "Nothing"},
-        panel="color",
+    magnitude_length: bool = switch(
+        False,
+        "Draw streaks whose length is proportional to the magnitude of the field",
+        label="Length by Magnitude",
+        panel="streaks",
+        applies=_has_streaks,
     )
-    magnitude_range: float = number(
-        0.0,
-        0.0,
-        1e30,
-        "Magnitude at the top of the color map and at full length. 0: the largest visible magnitude",
-        panel="color",
-        panel_label="Top Value",
-        applies=lambda look: look.magnitude != "none",
+    color_range: tuple[float, float] = numbers(
+        (0.0, 0.0),
+        "Magnitudes or numbers at the bottom and at the top of the color map, and of streaks without and "
+        "with full length. If the bottom value is above the top value, the map is inverted. Both 0: from 0 to "
+        "the largest visible magnitude, or the range of the numbers",
+        {"Bottom Value": (-1e30, 1e30), "Top Value": (-1e30, 1e30)},
+        **_shading("color", lambda look: uses_magnitude(look) or colors_values(look)),
     )
     color_map: str = choice(
         "viridis",
@@ -423,83 +414,44 @@ class Look:
         label="Multiply by Light",
         **_shading("tone", lambda look: look.tone != "light"),
     )
-    tone_black: float = number(
-        0.0,
-        -1e6,
-        1e6,
-        "Input value that becomes black",
-        panel_label="Black",
-        **_shading("tone"),
-    )
-    tone_white: float = number(
-        1.0,
-        -1e6,
-        1e6,
-        "Input value that becomes white. Below the value for black, the tone is inverted",
-        panel_label="White",
-        **_shading("tone"),
-    )
-    tone_gamma: float = number(
-        1.0,
-        0.05,
-        20.0,
-        "Gamma of the tones between. Above 1 they become lighter, below 1 darker",
-        panel_label="Gamma",
+    tone_levels: tuple[float, float, float] = numbers(
+        (0.0, 1.0, 1.0),
+        "Input values that become black and white, and the gamma of the tones between, as the levels of "
+        "image programs. White below black inverts the tone. A gamma above 1 lightens, one below 1 darkens",
+        {"Black": (-1e6, 1e6), "White": (-1e6, 1e6), "Gamma": (0.05, 20.0)},
         **_shading("tone"),
     )
     ink: str = choice(
         "soft",
-        "Style of the streaks",
+        "Style of the lines",
         {
             "soft": "Lighter and darker streaks around the mean, on the shaded surface",
-            "hatch": "Lines of ink on paper, whose number and width follow the tone",
+            "hatch": "Streaks of ink on paper, broken and uneven as by hand, whose number and width "
+            "follow the tone",
+            "even": "Long lines of ink at even distances on the surface, which swell and thin with the "
+            "tone, as in engravings. The distance is twice the line width",
         },
         label="Ink Style",
         panel_label="Style",
+        option_labels={"even": "Evenly Spaced"},
         **_shading("ink"),
     )
-    lines: str = choice(
-        "streaks",
-        "What the lines of ink are",
-        {
-            "streaks": "Streaks of noise: as broken and uneven as by hand",
-            "even": "Long lines at even distances on the surface, which swell and thin with the "
-            "tone, as in engravings. The distance is twice the line width",
-        },
-        option_labels={"even": "Evenly Spaced"},
-        panel="ink",
-        applies=is_hatched,
-    )
-    ink_color: str = color("#08080d", "Color of the ink", **_ink(_uses_ink_color))
-    ink_ramp: bool = switch(
-        False,
-        "Blend the ink to a second color, the highlight color, from the shadows to the lights",
-        label="Second Color",
-        **_ink(_uses_ink_color),
+    ink_color: str = color(
+        "#08080d",
+        "Color of the ink",
+        **_ink(lambda look: is_hatched(look) and not colors_magnitude(look)),
     )
     ink_color_light: str = color(
         "#b06a3c",
         "Color of the ink in the lights",
         label="Highlight Color",
-        **_ink(_uses_ink_ramp),
+        **_ink(has_tone_inks),
     )
-    ink_middle: float = number(
-        0.0,
-        0.0,
-        0.99,
-        "Tone at which the ink has a third color, between the shadows and the lights. 0: none",
-        label="Midtone Position",
-        **_ink(_uses_ink_ramp),
-    )
-    ink_color_middle: str = color(
-        "#6f2d4f",
-        "Color of the ink at the midtone position",
-        label="Midtone Color",
-        **_ink(lambda look: _uses_ink_ramp(look) and look.ink_middle > 0),
-    )
-    paper_color: str = color("#ffffff", "Color of the paper", **_ink())
-    clear_paper: bool = switch(
-        False, "Leave the paper transparent, so that only the ink is drawn", **_ink()
+    paper_color: str = color(
+        "#ffffff",
+        "Color of the paper, and its opacity. Without opacity, only the ink is drawn",
+        has_alpha=True,
+        **_ink(),
     )
     crispness: float = number(
         0.7, 0.0, 1.0, "Edges of lines, from soft gray streaks to sharp lines", **_ink()
@@ -554,7 +506,6 @@ class Look:
     )
     singularity_dots: str = singularity_dots_choice(**_SINGULARITIES)
     singularity_size: float = singularity_size_number(**_SINGULARITIES)
-    singularity_labels: bool = singularity_labels_switch(**_SINGULARITIES)
     supersampling: int = number(
         1,
         1,
@@ -569,18 +520,20 @@ class Look:
         check_settings(self)
 
     def with_settings(self, settings: dict[str, Any]) -> Look:
-        """Return the look with some settings changed.
+        """Return the look with some settings changed. Numbers may be a list, as in JSON files.
 
         Raises
         ------
         RosyError
             If there is no such setting, or its value is not allowed.
         """
-        known = settings_of(Look)
-        for name in settings:
+        known, changes = settings_of(Look), dict(settings)
+        for name, value in settings.items():
             if name not in known:
                 raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
-        return replace(self, **settings)
+            if isinstance(known[name], Numbers) and isinstance(value, list):
+                changes[name] = tuple(value)
+        return replace(self, **changes)
 
 
 def lic_key(look: Look) -> tuple[Any, ...]:
@@ -588,4 +541,5 @@ def lic_key(look: Look) -> tuple[Any, ...]:
 
     Two looks with equal keys have the same LIC images of the same G-buffer.
     """
-    return stage_key(look, Stage.LIC)
+    length_range = magnitude_range(look) if look.magnitude_length else None
+    return (*stage_key(look, Stage.LIC), has_colored_noise(look), length_range)

@@ -18,7 +18,7 @@ class Picture:
     ----------
     rgba : (H, W, 4) float32 ndarray
         Linear, not premultiplied. Alpha is the fraction of the pixel in which a field is visible
-        or, with clear paper, the coverage by ink.
+        times, if lines are drawn on paper that is not opaque, the opacity of ink and paper.
     spread : (H, W) float32 ndarray or None
         If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
         is the fraction of the pixel in which a field is visible.
@@ -38,6 +38,6 @@ class Picture:
     line_count: int = 0
 
 
-def common_color_range(tops: Collection[float]) -> tuple[float, float] | None:
-    """Return `Picture.color_range`, given the magnitudes with the last color for each degree."""
-    return (0.0, min(tops)) if len(set(tops)) == 1 else None
+def common_color_range(ranges: Collection[tuple[float, float]]) -> tuple[float, float] | None:
+    """Return `Picture.color_range`, given the ranges of the magnitudes of each degree."""
+    return min(ranges) if len(set(ranges)) == 1 else None

@@ -8,8 +8,8 @@ from ..annotation.key_contents import ColorScale, PictureKey, count_indices
 from ..annotation.singularity_settings import shows_singularities
 from ..projection.gbuffer import MeshInstance
 from .color_values import value_ends, value_ranges
-from .lic_images import fixed_magnitude_range
-from .look import Look, colors_magnitude, colors_values
+from .lic_images import distinct_ends
+from .look import Look, colors_magnitude, colors_values, magnitude_range
 from .picture import Picture
 
 
@@ -22,10 +22,11 @@ def color_scale_of(look: Look, color_range: tuple[float, float] | None) -> Color
     color_range : (float, float) or None
         Values of the first and the last color: `Picture.color_range`. None if they are not known.
     """
-    low, high = (None, None) if color_range is None else color_range
     if colors_magnitude(look):
-        return ColorScale("Magnitude", look.color_map, 0.0, high)
-    return ColorScale("", look.color_map, low, high) if colors_values(look) else None
+        return ColorScale("Magnitude", look.color_map, *(color_range or (0.0, None)))
+    if not colors_values(look):
+        return None
+    return ColorScale("", look.color_map, *(color_range or (None, None)))
 
 
 def fixed_color_range(
@@ -41,12 +42,11 @@ def fixed_color_range(
         not known.
     """
     if colors_magnitude(look):
-        top = look.magnitude_range
-        return (0.0, fixed_magnitude_range(top)) if top else None
+        ends = magnitude_range(look)
+        return None if ends is None else distinct_ends(*ends)
     if not colors_values(look):
         return None
-    is_automatic = look.values_low == look.values_high == 0
-    if is_automatic and not instances:
+    if not any(look.color_range) and not instances:
         return None
     return value_ends(look, value_ranges(instances))
 

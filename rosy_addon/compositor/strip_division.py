@@ -11,7 +11,6 @@ import numpy as np
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .even_lines import has_even_lines
 from .hatching import (
     has_breaks,
     has_outline,
@@ -20,7 +19,7 @@ from .hatching import (
     overshoot_steps,
 )
 from .image_noise import MAX_MARGIN, high_pass_margin
-from .look import Look, colors_magnitude
+from .look import Look, is_even, magnitude_range, uses_magnitude
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
 from .paper_grain import surface_paper_grain_args
@@ -99,10 +98,9 @@ def group_strips(
         that only one process should make.
     """
     fields = [instance.field for instance in instances if instance.field is not None]
-    depends_on_all = colors_magnitude(look) or look.magnitude in ("length", "both")
     if (
-        has_even_lines(look)
-        or (depends_on_all and not look.magnitude_range)
+        is_even(look)
+        or (uses_magnitude(look) and magnitude_range(look) is None)
         or high_pass_margin(look.high_pass) > MAX_MARGIN
         or any(field.direction_ratios is not None or field.family_count > 1 for field in fields)
     ):

@@ -69,7 +69,7 @@ class ReferenceRender:
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)
 
     def sample(self, gbuffer: GBuffer) -> np.ndarray:
-        """(P,) float32 luminance at the surface points of a G-buffer."""
+        """Return the (P,) float32 luminance at the surface points of a G-buffer."""
         reprojection = self.reprojection(gbuffer.camera)
         clip = gbuffer.position @ reprojection[[0, 1, 3], :3].T + reprojection[[0, 1, 3], 3]
         u, v = clip[:, :2].T / np.maximum(clip[:, 2], 1e-12) * 0.5 + 0.5
@@ -77,7 +77,7 @@ class ReferenceRender:
         return self.mip_map.sample(u, v, level, repeat=False)
 
     def reprojection(self, camera: Camera) -> np.ndarray:
-        """(4, 4) float64 matrix from the view space of `camera` to clip space of the picture."""
+        """Return the (4, 4) float64 matrix from the view space of `camera` to clip space of the picture."""
         rotation, translation = camera.view[:3, :3], camera.view[:3, 3]
         camera_to_world = np.eye(4)
         camera_to_world[:3, :3], camera_to_world[:3, 3] = rotation.T, -rotation.T @ translation
@@ -168,7 +168,7 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     tone : ndarray
         Of any shape.
     look : Look
-        Its `tone_black` becomes 0 and its `tone_white` becomes 1. The gamma is applied after that.
+        The black of its `tone_levels` becomes 0 and the white 1. The gamma is applied after that.
 
     Returns
     -------
@@ -177,14 +177,16 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     """
     scale, black = tone_curve(look)
     stretched = np.maximum((tone - np.float32(black)) * np.float32(scale), 0)
-    if look.tone_gamma != 1:
-        stretched = stretched ** np.float32(1 / look.tone_gamma)
+    gamma = look.tone_levels[2]
+    if gamma != 1:
+        stretched = stretched ** np.float32(1 / gamma)
     return stretched.astype(np.float32, copy=False)
 
 
 def tone_curve(look: Look) -> tuple[float, float]:
-    """(scale, black) of a look: tones are mapped to (tone - black) * scale before the gamma."""
-    tone_range = look.tone_white - look.tone_black
+    """Return (scale, black) of a look, which maps tones to (tone - black) * scale before the gamma."""
+    black, white, _ = look.tone_levels
+    tone_range = white - black
     if abs(tone_range) < MIN_TONE_RANGE:
         tone_range = MIN_TONE_RANGE if tone_range >= 0 else -MIN_TONE_RANGE
-    return 1 / tone_range, look.tone_black
+    return 1 / tone_range, black

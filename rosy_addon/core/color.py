@@ -50,13 +50,22 @@ def color_stops(name: str) -> np.ndarray:
 
 
 def from_hex(code: str) -> np.ndarray:
-    """Return the (3,) float32 display values of a color ``#rrggbb``."""
-    return np.array(list(bytes.fromhex(code[1:])), dtype=np.float32) / 255
+    """Return the (3,) float32 display values of a color ``#rrggbb`` or ``#rrggbbaa``."""
+    return np.array(list(bytes.fromhex(code[1:7])), dtype=np.float32) / 255
+
+
+def alpha_from_hex(code: str) -> float:
+    """Return the opacity of a color ``#rrggbb`` or ``#rrggbbaa``, 0 to 1."""
+    return int(code[7:] or "ff", 16) / 255
 
 
 def to_hex(display: Sequence[float]) -> str:
-    """Return the code ``#rrggbb`` of three display values, clamped to 0 to 1."""
-    return "#" + bytes(round(255 * min(max(value, 0), 1)) for value in display).hex()
+    """Return the code of three display values and perhaps an opacity, clamped to 0 to 1.
+
+    It is ``#rrggbb``, or ``#rrggbbaa`` if the opacity is below 1.
+    """
+    code = "#" + bytes(round(255 * min(max(value, 0), 1)) for value in display).hex()
+    return code[:7] if code[7:] == "ff" else code
 
 
 def to_linear(display: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
-A settings class is a frozen dataclass whose fields are made by `number`, `choice`, `switch` and
-`color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
+A settings class is a frozen dataclass whose fields are made by `number`, `numbers`, `choice`,
+`switch` and `color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
 the stage of rendering that it affects and when it applies. Properties, panels, validation, command
 line options, tables of the documentation and cache keys are derived from these descriptions.
 """
@@ -135,6 +135,34 @@ class Number(Setting):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Numbers(Setting):
+    """Several numbers that belong together, as a tuple.
+
+    Attributes
+    ----------
+    parts : mapping of str to (float, float)
+        The range of each number, both ends included, by its name in the interface.
+    """
+
+    parts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value is not a tuple of numbers within their ranges."""
+        names = ", ".join(self.parts).lower()
+        if not isinstance(value, tuple) or len(value) != len(self.parts):
+            self._refuse(value, f"{len(self.parts)} numbers: {names}")
+        for (name, (low, high)), part in zip(self.parts.items(), value, strict=True):
+            if isinstance(part, bool) or not isinstance(part, (int, float)):
+                self._refuse(value, f"{len(self.parts)} numbers: {names}")
+            if not low <= part <= high:
+                self._refuse(value, f"{name.lower()} from {low} to {high}")
+
+    def parse(self, text: str) -> Any:
+        """Convert numbers with commas between them."""
+        return tuple(float(part) for part in text.split(","))
+
+
+@dataclass(frozen=True, kw_only=True)
 class Choice(Setting):
     """One of several options.
 
@@ -171,17 +199,36 @@ class Switch(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class Color(Setting):
-    """A color in display values (sRGB), as ``#rrggbb``."""
+    """A color in display values (sRGB), as ``#rrggbb``.
+
+    Attributes
+    ----------
+    has_alpha : bool
+        Whether ``#rrggbbaa`` is allowed as well, with an opacity.
+    """
+
+    has_alpha: bool = False
 
     def check(self, value: Any) -> None:
         """Raise a `RosyError` if a value is not a color."""
-        if not isinstance(value, str) or not re.fullmatch("#[0-9a-fA-F]{6}", value):
-            self._refuse(value, "a color like #08080d")
+        pattern = "#[0-9a-fA-F]{6}" + "([0-9a-fA-F]{2})?" * self.has_alpha
+        if not isinstance(value, str) or not re.fullmatch(pattern, value):
+            self._refuse(value, f"a color like #08080d{' or #08080d80' * self.has_alpha}")
 
 
 def number(default: float, low: float, high: float, text: str, **description: Any) -> Any:
     """Return a dataclass field for a `Number`."""
     return _field(Number(default=default, low=low, high=high, text=text, **description))
+
+
+def numbers(
+    default: tuple[float, ...],
+    text: str,
+    parts: Mapping[str, tuple[float, float]],
+    **description: Any,
+) -> Any:
+    """Return a dataclass field for `Numbers`."""
+    return _field(Numbers(default=default, text=text, parts=parts, **description))
 
 
 def choice(default: str, text: str, options: Mapping[str, str], **description: Any) -> Any:
@@ -233,8 +280,8 @@ def check_settings(settings: Any) -> None:
 
 def pixel_lengths(cls: type) -> list[Number]:
     """Return the settings of a class that are lengths in pixels."""
-    numbers = [setting for setting in settings_of(cls).values() if isinstance(setting, Number)]
-    return [setting for setting in numbers if setting.is_pixel_length]
+    described = settings_of(cls).values()
+    return [item for item in described if isinstance(item, Number) and item.is_pixel_length]
 
 
 def stage_key(settings: Any, stage: Stage) -> tuple[Any, ...]:

@@ -45,15 +45,6 @@ KERNELS: dict[Kernel, int] = {"box": 0, "taper": 1, "ramp": 2}
 #: How streaks drift: not, along the directions of a field, or toward the guiding angle.
 FLOW_NONE, FLOW_ALONG, FLOW_TO_ANGLE = range(3)
 
-#: What the magnitude of the field drives: bit 0 is the color, bit 1 the length of streamlines.
-MAGNITUDE_COLOR, MAGNITUDE_LENGTH = 1, 2
-MAGNITUDE_MODES = {
-    "none": 0,
-    "color": MAGNITUDE_COLOR,
-    "length": MAGNITUDE_LENGTH,
-    "both": MAGNITUDE_COLOR | MAGNITUDE_LENGTH,
-}
-
 #: `Look.tone` in shaders.
 TONE_SOURCES = {"light": 0, "attribute": 1, "image": 2, "picture": 3}
 
@@ -120,8 +111,6 @@ CONSTANTS: dict[str, float | int | Sequence[float]] = {
     "FLOW_NONE": FLOW_NONE,
     "FLOW_ALONG": FLOW_ALONG,
     "FLOW_TO_ANGLE": FLOW_TO_ANGLE,
-    "MAGNITUDE_COLOR": MAGNITUDE_COLOR,
-    "MAGNITUDE_LENGTH": MAGNITUDE_LENGTH,
     "TONE_LIGHT": TONE_SOURCES["light"],
     "TONE_IMAGE": TONE_SOURCES["image"],
     "TONE_PICTURE": TONE_SOURCES["picture"],

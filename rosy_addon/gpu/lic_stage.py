@@ -10,14 +10,14 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any
 
-from ..compositor.even_lines import COARSE_RATIO, SPACING_GRAINS, has_even_lines
+from ..compositor.even_lines import COARSE_RATIO, SPACING_GRAINS
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
-from ..compositor.look import is_hatched
+from ..compositor.look import is_even, is_hatched, magnitude_range, uses_magnitude
 from ..compositor.look_units import instance_line_spacing
 from . import lookup_tables
-from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
+from .defines import REDUCE_BLOCK
 from .frame import Box, Frame
 from .mesh_buffers import FieldKind
 from .passes import WORKGROUP_SIZE, ComputePass
@@ -36,7 +36,7 @@ MAX_DISPATCH_STEPS = 1 << 29
 def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     """Return what looks up the lines of the instances, by the keys of `Frame.prepared`."""
     look = frame.look
-    if not has_even_lines(look):
+    if not is_even(look):
         return {}
     lookups: dict[Hashable, Callable[[], Any]] = {}
     for instance_id, item, _ in frame.fields_in_view():
@@ -54,7 +54,7 @@ def render_even_lines(frame: Frame) -> None:
     The method is that of `even_lines.even_lines`. The lines that replace crowded ones are in the
     layers after the others, whether any are crowded or not. Nothing is rendered for other looks.
     """
-    if not has_even_lines(frame.look):
+    if not is_even(frame.look):
         frame.textures["line_image"] = frame.resources.image("line_image", 1, 1, "RGBA16F", 1)
         return
     line_count = max((kind.line_count for kind in frame.kinds), default=1)
@@ -96,7 +96,7 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
         "color_map": lookup_tables.color_map(resources, look),
         "palette": lookup_tables.palette(resources),
     }
-    if MAGNITUDE_MODES[look.magnitude] and not look.magnitude_range:
+    if uses_magnitude(look) and magnitude_range(look) is None:
         values, compute = frame.textures["field_values"], frame.compute
         textures["max_magnitude"] = largest_magnitude(resources, values, kind.degree, compute)
     if frame.samples is not None:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.even_lines import has_even_lines, look_width_table
+from ..compositor.even_lines import look_width_table
 from ..compositor.family_hues import PALETTE
 from ..compositor.hatching import has_paper_grain
 from ..compositor.image_noise import image_noise
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, is_hatched
+from ..compositor.look import Look, is_even, is_hatched
 from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
@@ -47,7 +47,7 @@ def thresholds(resources: GpuResources, look: Look) -> Any:
     if not is_hatched(look):
         return palette(resources)
     statistics = look_streak_statistics(look)
-    table = look_width_table(look) if has_even_lines(look) else statistics.threshold
+    table = look_width_table(look) if is_even(look) else statistics.threshold
     rows = np.stack([table, statistics.disc_threshold])
     return resources.lookup_texture("thresholds", rows.tobytes(), lambda: rows[..., None])
 
@@ -62,9 +62,9 @@ def undirected_offsets(resources: GpuResources, look: Look) -> Any:
 
 
 def ink_table(resources: GpuResources, kind: FieldKind, look: Look) -> Any:
-    """Return the inks of `inks.Inks`: the dark ones, then the middle ones, then the light ones."""
+    """Return the inks of `inks.Inks`: the dark ones, then the light ones."""
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
-    stops = np.concatenate([inks.dark, inks.middle, inks.light])
+    stops = np.concatenate([inks.dark, inks.light])
     return resources.lookup_texture("inks", stops.tobytes(), lambda: stops[None])
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
-from ..compositor.look import Look, colors_magnitude
+from ..compositor.look import Look, colors_magnitude, magnitude_range
 from ..compositor.look_units import look_in_pixels, supersampled_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
@@ -235,7 +235,7 @@ class GpuRenderer:
     def _color_range(self, view: ViewInput) -> tuple[float, float] | None:
         """Return `Picture.color_range` of the last picture."""
         look, camera = view.look, view.camera
-        if not colors_magnitude(look) or look.magnitude_range:
+        if not colors_magnitude(look) or magnitude_range(look):
             return fixed_color_range(look, view.instances)
         field_values = self.resources.image("field_values", camera.width, camera.height)
         degrees = {
@@ -246,4 +246,5 @@ class GpuRenderer:
             compute = self.device.compute
             texture = largest_magnitude(self.resources, field_values, degree, compute)
             tops.add(float(self.read(texture, 1, 1)[0, 0, 0]))
-        return common_color_range(tops - {0.0})  # 0: no field of this degree is visible
+        # 0: no field of this degree is visible
+        return common_color_range({(0.0, top) for top in tops if top})

@@ -15,7 +15,6 @@ from ..compositor.even_lines import (
     SPACING_GRAINS,
     WOBBLE_SHIFT,
     crowded_pixels,
-    has_even_lines,
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count, kernel_of, look_for_symmetry
@@ -31,7 +30,16 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_values, has_flow, is_hatched
+from ..compositor.lic_images import distinct_ends
+from ..compositor.look import (
+    Look,
+    colors_magnitude,
+    colors_values,
+    has_flow,
+    is_even,
+    is_hatched,
+    magnitude_range,
+)
 from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -57,7 +65,6 @@ from .defines import (
     FLOW_TO_ANGLE,
     HEADLIGHT,
     KERNELS,
-    MAGNITUDE_MODES,
     POINT_LIGHT,
     SUN_LIGHT,
 )
@@ -110,11 +117,12 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     _, crossing = streak_moments(*streak_args(look), kind.line_count, kernel=kernel)
     inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
     statistics = look_streak_statistics(look) if is_hatched(look) else None
+    ends = magnitude_range(look)
     return {
         **covering_uniforms(kind),
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, look),
-        "half_length": 0 if has_even_lines(look) else look.length,
+        "half_length": 0 if is_even(look) else look.length,
         "full_samples": full_sample_count(look),
         "step_length": look.step,
         "crossing_correlation": crossing,
@@ -123,11 +131,11 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "family_count": kind.family_count if look.hue == "families" else 1,
         "family_channel": len(kind.channels) - 1,
         "hue_sharpness": SOFTMAX_SHARPNESS / expected_std(look),
-        "magnitude_mode": MAGNITUDE_MODES[look.magnitude],
+        "colors_magnitude": int(colors_magnitude(look)),
+        "magnitude_ends": distinct_ends(*ends) if ends else (0.0, 0.0),
         "colors_values": int(colors_values(look)),
-        "paper_color": (*inks.paper, 1.0),
+        "paper_color": (*inks.paper, inks.paper_alpha),
         "ink_count": len(inks.dark),
-        "ink_mid_tone": inks.mid_tone,
         "min_transmittance": inks.min_transmittance,
         "is_light_ink": int(inks.is_light),
         "softness": softness(look.crispness),
@@ -144,7 +152,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         # Not defines: compilers reorder sums with constants, and the result would change.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
-        "even_lines": int(has_even_lines(look)),
+        "even_lines": int(is_even(look)),
         "min_edge_width": MAX_EDGE_WIDTH * (1 - look.crispness) ** 2,
         "fade_pixels": FADE_PIXELS,
         "crowded_pixels": crowded_pixels(look),
@@ -194,7 +202,7 @@ def tone_uniforms(look: Look, camera: Camera, reference: ReferenceRender | None)
         "curve_light": int(look.tone == "light"),
         "curve_black": black,
         "curve_scale": scale,
-        "curve_power": 1 / look.tone_gamma,
+        "curve_power": 1 / look.tone_levels[2],
         **matrix_rows("to_reference", "xyw", to_reference[[0, 1, 3]]),
     }
 

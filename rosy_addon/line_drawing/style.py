@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from ..annotation.singularity_settings import (
     singularity_dots_choice,
-    singularity_labels_switch,
     singularity_size_number,
 )
 from ..core.settings import check_settings, choice, number, switch
@@ -130,7 +129,6 @@ class StrokeStyle:
     hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")
     singularity_dots: str = singularity_dots_choice(panel="singularities")
     singularity_size: float = singularity_size_number(panel="singularities")
-    singularity_labels: bool = singularity_labels_switch(panel="singularities")
     cross_creases: bool = switch(False, "Continue strokes across sharp creases", panel="ends")
 
     def __post_init__(self) -> None:

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from ..compositor.compose import compose
-from ..compositor.look import Look, is_hatched
+from ..compositor.look import Look, colors_values, is_hatched
 from ..core.color import from_hex, to_linear
 from ..field.curvature import curvature_field
 from ..field.rosy_field import RosyField
@@ -64,8 +64,7 @@ def _fast_look(look: Look) -> Look:
             "supersampling": 1 if look.method == "members" else 2,
             "unit": "pixels",
             "tone": "light",
-            "values_low": 0.0,
-            "values_high": 0.0,
+            "color_range": (0.0, 0.0) if colors_values(look) else look.color_range,
             "length": min(look.length, PREVIEW_SIZE // 2),
             "grain": min(look.grain, PREVIEW_SIZE / 2),
             "high_pass": min(look.high_pass, PREVIEW_SIZE / 4),

@@ -1,6 +1,6 @@
 """The node group *RoSy Hatching*, which draws the hatching of a tone from thresholds.
 
-It compares the thresholds of up to three lines (`compositor.ink_thresholds`) with the coverages that a tone
+It compares the thresholds of up to three lines (`compositor.ink_from_thresholds`) with the coverages that a tone
 requires. Its numbers are those of `compositor.hatching`, so it draws what a picture of the same light
 shows. It has only nodes of Blender, and works where RoSy is not installed.
 """
@@ -14,18 +14,15 @@ from typing import Any, NamedTuple
 import bpy
 
 from ..compositor.hatching import ONSET_LEAD, ONSET_RANGE
-from ..compositor.ink_thresholds import (
+from ..compositor.ink_from_thresholds import (
     DENSITY_FACTOR,
-    EDGE_VARIANCE,
-    EXACT_ENDS,
-    FILTER_CORRECTION,
-    MAX_LAYERS,
-    MIN_EDGE,
     MIN_TRANSMITTANCE,
-    ROUNDING_SPREAD,
+    filtered_edges,
+    layer_coverage,
     layer_inks,
 )
-from ..compositor.look import Look
+from ..compositor.ink_thresholds import MAX_LAYERS
+from ..compositor.look import Look, has_tone_inks
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
 from ..compositor.target_tone import MIN_TONE_RANGE
 from ..core.color import from_hex, to_linear
@@ -98,16 +95,14 @@ def set_hatching_look(node: bpy.types.Node, look: Look, line_count: int) -> None
         Number of lines through a point.
     """
     layers, inks = layer_inks(look, line_count)
-    ramp = look.ink_color_light if look.ink_ramp else look.ink_color
+    ramp = look.ink_color_light if has_tone_inks(look) else look.ink_color
     values = {
         "Shading": look.shading,
-        "Black": look.tone_black,
-        "White": look.tone_white,
-        "Gamma": look.tone_gamma,
+        **dict(zip(("Black", "White", "Gamma"), look.tone_levels, strict=True)),
         "Layers": layers,
         "Layering": look.layering,
         "Crispness": look.crispness,
-        "Highlights": float(look.ink_ramp),
+        "Highlights": float(has_tone_inks(look)),
         "Highlight Color": (*to_linear(from_hex(ramp)).tolist(), 1.0),
         "Paper": (*to_linear(from_hex(look.paper_color)).tolist(), 1.0),
     }
@@ -185,32 +180,14 @@ def _build_hatching(build: NodeBuilder, source: Any) -> None:
     total = reduce(add, begun).at_least(1e-6)
     thresholds = build("ShaderNodeSeparateColor", {"Color": source["Thresholds"]})
     channels = [Number(build, socket) for socket in thresholds.outputs]
-    spread = _filtered_spread(number("Spread"), channels)
-    # Half the width of an even distribution with this spread, which is that of 2 t - 1 for thresholds t.
-    filtered_edge = (spread * EDGE_VARIANCE).square_root()
-    evenness = (spread * 3).at_most(1.0)
-    correction = evenness * evenness * (1 - evenness) * FILTER_CORRECTION
+    filtered = filtered_edges(number("Spread"), channels)
     softness = build.math("POWER", MIN_SOFTNESS / MAX_SOFTNESS, source["Crispness"])
     edge_factor = Number(build, softness) * (DENSITY_FACTOR * MAX_SOFTNESS)
     bare, color, ink_color = None, source["Paper"], inks[-1]
     # The lines that come first are on top of the others.
     for layer, threshold in reversed(list(enumerate(channels))):
         share = begun[layer] / total
-        coverage = 1 - left[layer].at_least(MIN_TRANSMITTANCE) ** share
-        # Edges as wide as this leave the mean coverage of all thresholds unchanged.
-        room = coverage.at_most(1 - coverage)
-        inner = coverage * (1 - coverage)
-        edge = (edge_factor * inner).at_most(room)
-        edge = edge.at_least(filtered_edge).at_least(MIN_EDGE)
-        corrected = coverage + correction * (inner * (1 - coverage * 2))
-        covered = (corrected - threshold) / (edge * 2) + 0.5
-        # What is narrower than the edge covers no point of it entirely, be it ink or paper.
-        missed = 1 - (room / edge).at_most(1.0)
-        is_dark = coverage > 0.5
-        covered = covered.at_least(is_dark * missed).at_most(1 - (1 - is_dark) * missed)
-        # No ink at all, and nothing but ink, are exact.
-        end = (room * (1 / EXACT_ENDS)).at_most(1.0)
-        covered = is_dark + end * (covered - is_dark)
+        covered = layer_coverage(left[layer], share, threshold, filtered, edge_factor)
         color = build.mix("RGBA", covered.socket, color, inks[layer])
         if bare is None:
             bare = 1 - covered
@@ -233,10 +210,3 @@ def _tone(number: Any) -> Number:
     difference = difference * is_small + (1 - is_small) * MIN_TONE_RANGE
     stretched = ((tone - black) / difference).at_least(0.0)
     return (stretched ** (1.0 / number("Gamma"))).at_most(1.0)
-
-
-def _filtered_spread(spread: Number, channels: list[Number]) -> Number:
-    """Return the variance of the thresholds that a filter of the texture has averaged, as 2 t - 1."""
-    centered = [threshold * 2 - 1.0 for threshold in channels]
-    square_sum = reduce(add, [value * value for value in centered])
-    return (spread - square_sum * (1 / MAX_LAYERS) - ROUNDING_SPREAD).at_least(0.0)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from ..compositor.flow import flow_at
 from ..compositor.look import Look
-from ..core.color import from_hex, to_hex
-from ..core.settings import Color, Number, Setting, settings_of
+from ..core.color import alpha_from_hex, from_hex, to_hex
+from ..core.settings import Color, Number, Numbers, Setting, settings_of
 
 if TYPE_CHECKING:
     import bpy
@@ -30,7 +30,15 @@ def apply_look(settings: Any, look: Look) -> None:
     group = getattr(settings, "look", settings)
     for name, setting in settings_of(Look).items():
         value = getattr(look, name)
-        setattr(group, name, from_hex(value) if isinstance(setting, Color) else value)
+        setattr(
+            group, name, color_components(value, setting) if isinstance(setting, Color) else value
+        )
+
+
+def color_components(code: str, setting: Color) -> list[float]:
+    """Return a color as the components of its property: three, or four with the opacity."""
+    color = from_hex(code).tolist()
+    return [*color, alpha_from_hex(code)] if setting.has_alpha else color
 
 
 def look_at_frame(scene: bpy.types.Scene, look: Look, frame: float) -> Look:
@@ -46,9 +54,11 @@ def matches_look(settings: Any, look: Look) -> bool:
 
 
 def _is_equal(one: Any, other: Any) -> bool:
-    """Whether two values of a setting are equal: text in any case, numbers in single precision."""
+    """Return whether two values of a setting are equal: text in any case, numbers in single precision."""
     if isinstance(one, str):
         return one == other.lower()
+    if isinstance(one, tuple):
+        return all(map(_is_equal, one, other))
     return math.isclose(one, other, rel_tol=1e-6)
 
 
@@ -60,10 +70,16 @@ def read_settings(group: Any, cls: type) -> dict[str, Any]:
 
 
 def _from_rna(value: Any, setting: Setting) -> Any:
-    """Convert a property value: a color to hex, a float to 7 digits within the setting's range."""
+    """Convert a property value: a color to hex, floats to 7 digits within the setting's range."""
     if isinstance(setting, Color):
         return to_hex(value)
+    if isinstance(setting, Numbers):
+        return tuple(map(_rounded, value, *zip(*setting.parts.values(), strict=True)))
     if not (isinstance(setting, Number) and isinstance(value, float)):
         return value
-    value = float(f"{value:.7g}")
-    return min(max(value, setting.low), setting.high)
+    return _rounded(value, setting.low, setting.high)
+
+
+def _rounded(value: float, low: float, high: float) -> float:
+    """Return a number with 7 digits, within a range."""
+    return min(max(float(f"{value:.7g}"), low), high)

@@ -90,8 +90,11 @@ class PictureState:
     def from_json(text: str) -> PictureState | None:
         """Return the state that a text holds; None if it is not one of this version of RoSy."""
         try:
-            return PictureState(**json.loads(text))
-        except (TypeError, ValueError):
+            state = PictureState(**json.loads(text))
+            # JSON has lists for the tuples of settings.
+            look = {name: tuple(v) if isinstance(v, list) else v for name, v in state.look.items()}
+            return replace(state, look=look)
+        except (AttributeError, TypeError, ValueError):
             return None
 
 

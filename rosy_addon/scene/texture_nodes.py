@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..compositor.look import Look
+from ..core.color import alpha_from_hex
 from .hatching_nodes import hatching_group, set_hatching_look
 from .node_builder import NodeBuilder, new_empty_material
 
@@ -100,11 +101,14 @@ def hatching_shader(
     inputs = {"Thresholds": image_color, "Spread": image_node.outputs["Alpha"], "Tone": tone}
     ink = build("ShaderNodeGroup", inputs, node_tree=hatching_group(created))
     set_hatching_look(ink, look, hatching.line_count)
-    color = ink.outputs["Ink" if look.clear_paper else "Color"]
+    paper_alpha = alpha_from_hex(look.paper_color)
+    color = ink.outputs["Color" if paper_alpha == 1 else "Ink"]
     surface = build("ShaderNodeEmission", {"Color": color}).outputs["Emission"]
-    if look.clear_paper:
+    if paper_alpha < 1:
+        paper = build("ShaderNodeEmission", {"Color": ink.inputs["Paper"].default_value[:]})
         transparent = build("ShaderNodeBsdfTransparent").outputs["BSDF"]
-        surface = build.mix_shaders(ink.outputs["Coverage"], transparent, surface)
+        behind = build.mix_shaders(paper_alpha, transparent, paper.outputs["Emission"])
+        surface = build.mix_shaders(ink.outputs["Coverage"], behind, surface)
     return build.mix_shaders(0.0, surface, exported.outputs["Emission"])
 
 

@@ -74,9 +74,9 @@ TEXTURE_SETTINGS = (
         "grain",
         "density",
     ),
-    *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
-    *("magnitude", "magnitude_range", "values_low", "values_high", "color_map"),
-    *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
+    *("high_pass", "hue", "seed", "gain", "cross_creases", "crease_angle"),
+    *("magnitude_length", "color_range", "color_map"),
+    *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
 
 #: Texels on each side of a texture: default and range.

@@ -11,23 +11,23 @@ from ..compositor.even_lines import (
     SPACING_GRAINS,
     WOBBLE_SHIFT,
     EvenLines,
-    has_even_lines,
     resolved_share,
 )
 from ..compositor.flow import unconvolved_noise
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
+from ..compositor.ink_from_thresholds import ink_of_thresholds
 from ..compositor.ink_thresholds import (
     cyclic_places,
-    ink_of_thresholds,
     line_thresholds,
     ordered_thresholds,
     sharp_look,
     threshold_pixels,
 )
+from ..compositor.inks import inks_of
 from ..compositor.lic import lic_lengths
 from ..compositor.lic_images import LicImages
-from ..compositor.look import Look
+from ..compositor.look import Look, is_even
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
 from ..compositor.shading import Light
@@ -136,8 +136,9 @@ def lit_ink(
     Returns
     -------
     (P, 4) float32 ndarray
-        Linear color and opacity. All is opaque unless `look.clear_paper`.
+        Linear color and opacity, not premultiplied.
     """
+    inks = inks_of(look)
     colors = np.ones_like(pixels)
     for block in pixel_blocks(len(pixels)):
         report(block.start / len(pixels), LABEL)
@@ -152,9 +153,9 @@ def lit_ink(
         color, coverage = ink_of_thresholds(
             pixels[block], np.minimum(tone, 1), look, on.mesh.family_count
         )
+        if inks.paper_alpha < 1:
+            color, colors[block, 3] = inks.on_paper(color, coverage)
         colors[block, :3] = color
-        if look.clear_paper:
-            colors[block, 3] = coverage
     return colors
 
 
@@ -166,14 +167,14 @@ def _lines(
     cache: Cache | None,
 ) -> tuple[LicImages | None, LineModulation]:
     """Draw the streaks or the even lines of a field, and what makes them uneven."""
-    is_even, is_broken = has_even_lines(look), has_breaks(look)
+    is_spaced, is_broken = is_even(look), has_breaks(look)
     undefined = not field.representation.all()
     images = even_lines = break_images = noise = undirected = paper_grain = None
-    if not is_even or is_broken or undefined:
+    if not is_spaced or is_broken or undefined:
         with progress(0.0, 0.3):
             noise = texel_noise(on, look)
     break_look = replace(look, length=break_steps(look))
-    if is_even:
+    if is_spaced:
         with progress(0.3, 0.6):
             even_lines = _even_lines(on, field, look, wobble_angle, cache)
         if is_broken:
@@ -207,17 +208,17 @@ def _lines(
 
 
 def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
-    """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     args = surface_paper_grain_args(look)
-    args.pop("channels")
-    noise = texel_noise(on, replace(look, noise="color", **args))
+    channels = args.pop("channels")
+    noise = texel_noise(on, replace(look, **args), channels)
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
 
 
 def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
-    """(P,) float32 angles between lines and field at `Look.wobble` 1."""
+    """Return the (P,) float32 angles between lines and field at `Look.wobble` 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
     grain = look.grain * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)

@@ -35,14 +35,16 @@ GRID_BLOCK = 1 << 18
 LABEL = "making noise"
 
 
-def texel_noise(on: TexelSurface, look: Look) -> np.ndarray:
+def texel_noise(on: TexelSurface, look: Look, channels: int | None = None) -> np.ndarray:
     """Make noise that is anchored to the surface, at its texels.
 
     Parameters
     ----------
     on : TexelSurface
     look : Look
-        In steps of streamlines. Its `grain`, `density`, `high_pass`, `noise` and `seed` are used.
+        In steps of streamlines. Its `grain`, `density`, `high_pass` and `seed` are used.
+    channels : int, optional
+        K; by default that of the look (`noise_channel_count`).
 
     Returns
     -------
@@ -52,7 +54,7 @@ def texel_noise(on: TexelSurface, look: Look) -> np.ndarray:
     surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
     # Blender units of the world in one of object space.
     scale = matrix_scale(on.instance.matrix)
-    channels = noise_channel_count(look)
+    channels = noise_channel_count(look) if channels is None else channels
     rest = rest_positions(surface).astype(np.float32)
     triangle_vertex = surface.triangle_vertex
     gradient = (charts.gradient / texels.frame.size).astype(np.complex64)

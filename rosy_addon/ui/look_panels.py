@@ -10,7 +10,7 @@ import bpy
 from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
 from ..compositor.picture_key import fixed_color_range
 from ..core.errors import as_sentence
-from ..core.settings import Setting, Switch, panel_settings, settings_of
+from ..core.settings import Numbers, Setting, Switch, panel_settings, settings_of
 from . import preset_library
 from .sidebar import (
     SidebarPanel,
@@ -144,9 +144,9 @@ def _make_settings_panel(
         settings = context.scene.rosy
         for name in look_names:
             setting = settings_of(Look)[name]
-            row = column.row()
-            row.active = setting.applies(settings.look)
-            _draw_setting(row, settings.look, setting)
+            part = column.column()
+            part.active = setting.applies(settings.look)
+            _draw_setting(part, settings.look, setting)
             if name == "hue":
                 _draw_color_source(column, context)
             if name == "tone":
@@ -178,13 +178,19 @@ def _unused_output(settings: bpy.types.PropertyGroup) -> tuple[str, ...]:
     return ("device", "emission", "diffuse") if settings.relight else ()
 
 
-def _draw_setting(row: bpy.types.UILayout, look: bpy.types.PropertyGroup, setting: Setting) -> None:
+def _draw_setting(
+    column: bpy.types.UILayout, look: bpy.types.PropertyGroup, setting: Setting
+) -> None:
     """Draw a property of the look, with more room for its label if that is long."""
+    if isinstance(setting, Numbers):
+        for index, part in enumerate(setting.parts):
+            column.prop(look, setting.name, index=index, text=part)
+        return
     label = setting.panel_label or setting.label
     if len(label) <= MAX_LABEL_LENGTH or isinstance(setting, Switch):
-        row.prop(look, setting.name, text=label)
+        column.prop(look, setting.name, text=label)
         return
-    split = row.split(factor=LONG_LABEL_FACTOR)
+    split = column.split(factor=LONG_LABEL_FACTOR)
     label_row = split.row()
     label_row.alignment = "RIGHT"
     label_row.label(text=label)
@@ -197,9 +203,7 @@ def _draw_color_source(column: bpy.types.UILayout, context: bpy.types.Context) -
     settings = context.scene.rosy
     if settings.look.hue != "values":
         return
-    row = column.row()
-    row.active = colors_values(settings.look)
-    _draw_name(row, settings, "color_attribute", _active_mesh_object(context))
+    _draw_name(column.row(), settings, "color_attribute", _active_mesh_object(context))
 
 
 def _active_mesh_object(context: bpy.types.Context) -> bpy.types.Object | None:

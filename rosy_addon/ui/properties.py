@@ -8,8 +8,7 @@ from typing import Any
 import bpy
 
 from ..compositor.look import Look
-from ..core.color import from_hex
-from ..core.settings import Choice, Color, Number, Setting, Switch, settings_of, title
+from ..core.settings import Choice, Color, Number, Numbers, Setting, Switch, settings_of, title
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
@@ -18,6 +17,7 @@ from ..scene.backdrop import update_backdrops
 from ..scene.compat import has_rosy_properties, path_property_options
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..scene.keys import update_keys
+from ..scene.look_properties import color_components
 from ..surface_texture.draw import (
     CONTENTS,
     DEFAULT_MARGIN,
@@ -97,12 +97,17 @@ def _setting_property(setting: Setting) -> Any:
             items = [(key, labels.get(key, title(key)), text) for key, text in options.items()]
             return bpy.props.EnumProperty(items=items, **arguments)
         case Color():
-            arguments["default"] = from_hex(setting.default).tolist()
+            default = color_components(setting.default, setting)
+            arguments |= {"default": default, "size": len(default)}
             return bpy.props.FloatVectorProperty(**COLOR_ARGUMENTS | arguments)
         case Switch():
             return bpy.props.BoolProperty(**arguments)
         case Number(low=low, high=high, is_integer=True):
             return bpy.props.IntProperty(min=low, max=high, **arguments)
+        case Numbers(parts=parts):
+            lows, highs = zip(*parts.values(), strict=True)
+            arguments |= {"size": len(parts), "min": min(lows), "max": max(highs)}
+            return bpy.props.FloatVectorProperty(**arguments)
         case Number(low=low, high=high, unit=unit):
             subtype = SUBTYPE_BY_UNIT.get(unit, "NONE")
             return bpy.props.FloatProperty(min=low, max=high, subtype=subtype, **arguments)

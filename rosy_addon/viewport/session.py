@@ -14,7 +14,11 @@ from typing import Any
 import bpy
 
 from ..annotation.arrow_marks import ArrowMarks
-from ..annotation.singularity_settings import shows_singularities
+from ..annotation.singularity_settings import (
+    shows_hidden_singularities,
+    shows_indices,
+    shows_singularities,
+)
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
@@ -350,9 +354,9 @@ class ViewportSession:
             ]
             dots = [one for one in found if one is not None]
             draw_dots(
-                context, dots, look.singularity_size, shows_hidden=look.singularity_dots == "all"
+                context, dots, look.singularity_size, shows_hidden=shows_hidden_singularities(look)
             )
-            if look.singularity_labels:
+            if shows_indices(look):
                 overlay.labeled = dots, look.singularity_size
         self._marks_cache.evict_over_limit()
 

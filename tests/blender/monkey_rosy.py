@@ -208,7 +208,11 @@ def randomize(monkey, group, cls, probability):
         elif isinstance(setting, description.Switch):
             setattr(group, name, monkey.chance(0.5))
         elif isinstance(setting, description.Color):
-            setattr(group, name, [monkey.random.random() for _ in range(3)])
+            count = 3 + setting.has_alpha
+            setattr(group, name, [monkey.random.random() for _ in range(count)])
+        elif isinstance(setting, description.Numbers):
+            ranges = setting.parts.values()
+            setattr(group, name, [monkey.random.uniform(*ends) for ends in ranges])
         else:
             setattr(group, name, random_number(monkey, setting))
 
@@ -256,7 +260,7 @@ def tone(monkey):
     settings = bpy.context.scene.rosy
     settings.look.tone = monkey.pick(["light", "attribute", "image", "picture"])
     settings.tone_attribute = monkey.pick(["", "Occlusion", "position", "rosy", monkey.name()])
-    settings.look.hue = monkey.pick(["one", "families", "values"])
+    settings.look.hue = monkey.pick(["one", "noise", "families", "values", "magnitude", "tone"])
     settings.color_attribute = monkey.pick(["", "Occlusion", "position", "rosy", monkey.name()])
     settings.tone_picture = monkey.pick(["", str(monkey.folder / "none.png"), "//x####.png"])
     obj = select_mesh(monkey)

@@ -99,7 +99,7 @@ def test_a_relit_picture_is_the_picture_of_any_tone(scene, tmp_path):
     for preset in ("engraving", "cross-hatch"):
         bpy.ops.rosy.preset_apply(preset=preset)
         scene.rosy.look.shading, scene.rosy.look.light = 1.0, "headlight"
-        scene.rosy.look.tone_gamma = 1.0
+        scene.rosy.look.tone_levels[2] = 1.0
         scene.rosy.relight = True
         assert bpy.ops.rosy.bake() == {"FINISHED"}
         nodes = material_of(plane).node_tree.nodes
@@ -112,7 +112,7 @@ def test_a_relit_picture_is_the_picture_of_any_tone(scene, tmp_path):
             relit[white] = render(scene, tmp_path)[..., :3].mean(axis=2)
         scene.rosy.relight = False
         for white, drawn in relit.items():
-            scene.rosy.look.tone_white = white
+            scene.rosy.look.tone_levels[1] = white
             bpy.ops.rosy.bake()
             expected = render(scene, tmp_path)[..., :3].mean(axis=2)
             assert abs(drawn.mean() - expected.mean()) < 0.02, (preset, white)

@@ -728,7 +728,7 @@ def test_fields_are_compared(suzanne):
     defined = np.isfinite(values)
     assert defined.mean() > 0.9 and np.allclose(values[defined], np.degrees(0.2), atol=0.01)
     assert (settings.color_attribute, settings.look.hue) == ("Difference", "values")
-    assert (settings.look.values_low, settings.look.values_high) == (90, 0)
+    assert tuple(settings.look.color_range) == (90, 0)
     for other, message in (("turned", "choose 'rosy'"), ("missing", "no attribute 'missing'")):
         with pytest.raises(RuntimeError, match=message):
             bpy.ops.rosy.field_compare(other=other)

@@ -261,7 +261,7 @@ def paper_is_behind_everything():
     yield from fresh_scene(levels=0)
     scene, space = bpy.context.scene, view()[1].spaces.active
     bpy.ops.rosy.preset_apply(preset="cross-hatch")
-    scene.rosy.look.paper_color = (0.8, 0.6, 0.3)
+    scene.rosy.look.paper_color = (0.8, 0.6, 0.3, 1.0)
     hex_color = rosy("rosy_addon.scene.look_properties").read_look(scene.rosy).paper_color
     paper = np.array(list(bytes.fromhex(hex_color[1:]))) / 255
     scene.render.resolution_x = scene.render.resolution_y = 400
@@ -503,7 +503,7 @@ def edits_are_followed():
     switch("ON")
     yield from wait_for_final_pictures()
     scene.rosy.look.gain = 1.2
-    scene.rosy.look.noise = "color"
+    scene.rosy.look.hue = "noise"
     yield from check_is_bake("live-look")
     with in_view():
         bpy.ops.ed.undo_push(message="look")

@@ -292,7 +292,14 @@ def test_warnings(scene, camera, monkey):
 
 def test_settings_of_a_look(scene):
     assert read_look(scene.rosy) == Look()
-    look = Look(method="brute", gain=1.234, density=0.999, seed=2**31 - 1, magnitude="both")
+    look = Look(
+        method="brute",
+        gain=1.234,
+        density=0.999,
+        seed=2**31 - 1,
+        hue="magnitude",
+        magnitude_length=True,
+    )
     apply_look(scene.rosy, look)
     assert read_look(scene.rosy) == look
     for name, setting in ((entry.name, entry.metadata["setting"]) for entry in look_fields()):

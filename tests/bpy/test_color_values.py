@@ -75,12 +75,12 @@ def test_looks_that_color_an_attribute(scene):
     scene.rosy.color_attribute = "Angle"
     assert color_attribute_of(scene, Look()) is None
     assert color_attribute_of(scene, Look(hue="values")) == "Angle"
-    assert color_attribute_of(scene, Look(hue="values", magnitude="both")) is None
+    assert color_attribute_of(scene, Look(hue="magnitude")) is None
 
 
 def test_settings_in_a_file(scene, tmp_path):
     scene.rosy.color_attribute = "Angle"
-    scene.rosy.look.hue, scene.rosy.look.values_low = "values", -2.5
+    scene.rosy.look.hue, scene.rosy.look.color_range = "values", (-2.5, 1.1)
     path = str(tmp_path / "colors.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_empty=True)
@@ -88,22 +88,15 @@ def test_settings_in_a_file(scene, tmp_path):
     settings = bpy.context.scene.rosy
     assert settings.color_attribute == "Angle"
     look = read_look(settings)
-    assert (look.hue, look.values_low, look.values_high) == ("values", -2.5, 0.0)
+    assert (look.hue, look.color_range) == ("values", (-2.5, 1.1))
 
 
 @pytest.mark.parametrize(
-    ("hue", "magnitude", "shown", "active"),
-    [
-        ("one", "none", False, False),
-        ("families", "none", False, False),
-        ("values", "none", True, True),
-        ("values", "length", True, True),
-        ("values", "color", True, False),
-    ],
+    ("hue", "shown"), [("one", False), ("families", False), ("magnitude", False), ("values", True)]
 )
-def test_when_the_panel_shows_the_attribute(scene, wall, hue, magnitude, shown, active):
-    """With a search in the attributes of the active mesh. It is gray if the magnitude is the color."""
-    scene.rosy.look.hue, scene.rosy.look.magnitude = hue, magnitude
+def test_when_the_panel_shows_the_attribute(scene, wall, hue, shown):
+    """With a search in the attributes of the active mesh."""
+    scene.rosy.look.hue = hue
     bpy.context.view_layer.objects.active = wall
     column = Mock()
     _draw_color_source(column, bpy.context)
@@ -113,7 +106,6 @@ def test_when_the_panel_shows_the_attribute(scene, wall, hue, magnitude, shown, 
         row.prop_search.assert_called_once_with(
             scene.rosy, "color_attribute", wall.data, "attributes"
         )
-        assert row.active == active
 
 
 def test_a_live_view_reads_numbers_again_when_they_change(wall):

@@ -19,7 +19,7 @@ from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
 from scenes import add_camera, aim, contents, pixels, read_instances, render
 
-LOOK = Look(magnitude="color", singularity_dots="visible", supersampling=2)
+LOOK = Look(hue="magnitude", singularity_dots="visible", supersampling=2)
 
 
 def keys():
@@ -139,7 +139,7 @@ def test_the_range_is_that_of_the_picture(colored, supersampling):
     largest = float(np.abs(gbuffer.representation).max())
     assert key.color_scale.high == pytest.approx(largest, rel=1e-6)
     # The same range, typed, gives the same picture.
-    colored.rosy.look.magnitude_range = largest
+    colored.rosy.look.color_range = 0.0, largest
     (again,) = bake(colored)
     np.testing.assert_allclose(again.picture.rgba, result.picture.rgba, atol=1e-4)
     counts = {entry.index: entry.count for entry in key.indices}
@@ -152,7 +152,7 @@ def test_animations_have_numbers_only_with_a_range(colored, tmp_path):
     colored.rosy.key = True
     settings = OutputSettings(folder=tmp_path)
     for top, expected in ((0.0, None), (0.5, 0.5)):
-        colored.rosy.look.magnitude_range = top
+        colored.rosy.look.color_range = 0.0, top
         bake_animation(colored, range(1, 3), settings=settings)
         key = PictureKey.from_json(colored.rosy.bakes[0].key)
         assert key.color_scale.high == expected

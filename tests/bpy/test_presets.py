@@ -75,7 +75,7 @@ def test_a_missing_preset(scene, user_folder):
     scene.rosy.preset = "mine"
     assert read_look(scene.rosy) == before
     scene.rosy.preset = "plaid"
-    assert read_look(scene.rosy).noise == "color"
+    assert read_look(scene.rosy).hue == "noise"
     with pytest.raises(TypeError):
         scene.rosy.preset = "mine"
 

@@ -89,7 +89,7 @@ def add_tone(value=0.5):
 
 def colors(scene):
     look = scene.rosy.look
-    look.hue, look.values_high, scene.rosy.color_attribute = "values", 1.0, "dark"
+    look.hue, look.color_range, scene.rosy.color_attribute = "values", (0.0, 1.0), "dark"
     add_tone()
 
 
@@ -437,7 +437,7 @@ TABLE = {
     "look": (put("rosy.look.seed", 7), None, "the look was changed"),
     "light without shading": (put("rosy.look.light", "scene"), put("rosy.look.shading", 0.0), ""),
     "ink without hatching": (put("rosy.look.ink_color", (1.0, 0.0, 0.0)), None, ""),
-    "paper": (put("rosy.look.paper_color", (1.0, 0.0, 0.0)), hatched, "the look was changed"),
+    "paper": (put("rosy.look.paper_color", (1.0, 0.0, 0.0, 1.0)), hatched, "the look was changed"),
     "gain": (put("rosy.look.gain", 1.0), None, "the look was changed"),
     "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
     "unit size in pixels": (put("rosy.look.unit_size", 0.5), None, ""),
@@ -446,8 +446,8 @@ TABLE = {
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),
     "colored attribute": (lambda scene: add_tone(0.2), colors, "field of 'Plain' was changed"),
     "name of the colored attribute": (put("rosy.color_attribute", "light"), colors, None),
-    "range of colors": (put("rosy.look.values_low", 0.4), colors, "the look was changed"),
-    "range of colors unused": (put("rosy.look.values_low", 0.4), None, ""),
+    "range of colors": (put("rosy.look.color_range", (0.4, 1.0)), colors, "the look was changed"),
+    "range of colors unused": (put("rosy.look.color_range", (0.4, 1.0)), None, ""),
     "tone attribute unused": (lambda scene: add_tone(0.2), None, ""),
     "tone picture": (write_reference(0.6), tone_picture, "the picture of the tone was changed"),
     "tone picture of the same name": (write_reference(0.3), tone_picture, ""),

@@ -174,12 +174,12 @@ def _seek(gif, number):
 
 def test_film_has_one_camera_and_one_range(growing):
     """The largest step fills the frame. The range is the largest magnitude of all steps."""
-    look = Look(length=8, magnitude="color")
+    look = Look(length=8, hue="magnitude")
     steps = list_steps(growing)[::-1]
     views = list(Film(SimulationFields(steps), look, (30.0, 20.0), (60, 50)).views())
     assert len({id(view.camera) for view in views}) == 1
     fields = [view.instances[0].field for view in views]
-    assert {view.look.magnitude_range for view in views} == {fields[0].magnitude.max()}
+    assert {view.look.color_range for view in views} == {(0.0, fields[0].magnitude.max())}
     mesh = read_simulation(steps[0].paths[0])
     surface = build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
     arrays = SurfaceArrays(mesh.name, surface, mesh.point_arrays, mesh.cell_arrays)
@@ -189,9 +189,9 @@ def test_film_has_one_camera_and_one_range(growing):
     assert views[0].camera.view == pytest.approx(expected.camera.view, abs=1e-12)
     pictures = [(draw_picture(v)) for v in (views[0], expected)]
     assert pictures[0].rgba == pytest.approx(pictures[1].rgba, abs=1e-4)
-    given = Look(magnitude="length", magnitude_range=3.0)
+    given = Look(magnitude_length=True, color_range=(0.0, 3.0))
     film = Film(SimulationFields(steps[:2]), given, (0.0, 0.0), (60, 50))
-    assert {view.look.magnitude_range for view in film.views()} == {3.0}
+    assert {view.look.color_range for view in film.views()} == {(0.0, 3.0)}
 
 
 def test_film_keeps_one_step_in_memory(growing):

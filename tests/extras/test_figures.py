@@ -58,7 +58,7 @@ def test_pictures_have_one_camera_and_one_range(surface):
     """The magnitude of one field is twice that of the other: both get the color map of the larger one."""
     one = rf.along_axis(surface, (0, 0, 1), degree=2).with_magnitude("unit")
     fields = {"one": one, "two": one.with_magnitude(2.0)}
-    look = {"magnitude": "color", "color_map": "gray", "gain": 0, "shading": 0, "hue": "one"}
+    look = {"hue": "magnitude", "color_map": "gray", "gain": 0, "shading": 0}
     figure = rf.figure(fields, singularity_dots="none", color_label="speed (m/s)", **look, **SMALL)
     bar = next(axes for axes in figure.axes if axes.get_ylabel() == "speed (m/s)")
     assert bar.get_ylim() == (0, 2)

@@ -30,11 +30,16 @@ def draw() -> dict[str, np.ndarray]:
     pictures = {"plane": compose_planar(pair_angle(*pixel_centers(96), 96, 4), 4, look)}
     shapes = {
         "torus": (torus(), "curvature", 4, look),
-        "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="color")),
+        "sphere": (icosphere(3), "axis", 6, Look(method="brute", hue="noise")),
         "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0, flow_phase=0.3)),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
-        "magnitude": (icosphere(3), "axis", 3, Look(magnitude="both", supersampling=2)),
+        "magnitude": (
+            icosphere(3),
+            "axis",
+            3,
+            Look(hue="magnitude", magnitude_length=True, supersampling=2),
+        ),
     }
     for name, (surface, kind, degree, shape_look) in shapes.items():
         size = 160 * shape_look.supersampling

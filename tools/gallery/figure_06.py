@@ -15,7 +15,7 @@ from .plane import PlanarField, channel, compose_field
 from .sheet import Panel, chart, gray
 
 DEGREE, SIZE, FIELD_SIZE = 6, 256, 400
-LOOK = MEASURED.with_settings({"noise": "color"})
+LOOK = MEASURED.with_settings({"hue": "noise"})
 EXPANDED, SEEDS = 2.5, 6
 MEMBER = np.radians(12)
 RANGE = (0.0, 1.0)
@@ -94,7 +94,7 @@ def write() -> None:
         count = degree if degree % 2 else degree // 2
         row = [degree, count, float(np.sqrt(count))]
         for high_pass in (LOOK.high_pass, 0.0):
-            row += _corrected(degree, LOOK.with_settings({"noise": "gray", "high_pass": high_pass}))
+            row += _corrected(degree, LOOK.with_settings({"hue": "one", "high_pass": high_pass}))
         rows.append(row)
     page.table(
         [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.stats import spearmanr
@@ -31,6 +32,15 @@ def field(p: np.ndarray) -> np.ndarray:
     return z
 
 
+#: The settings with which the magnitude is shown, by the names of the panels.
+MAPPINGS: dict[str, dict[str, Any]] = {
+    "not shown": {},
+    "color": {"hue": "magnitude"},
+    "length": {"magnitude_length": True},
+    "both": {"hue": "magnitude", "magnitude_length": True},
+}
+
+
 def write() -> None:
     """Draw and write the page."""
     page = Page("figure-09", "Magnitude")
@@ -41,15 +51,15 @@ def write() -> None:
         Short streaks are means of few samples and would have too much contrast, so their contrast
         is reduced."""
     )
-    names = {
-        "none": "(a) magnitude not shown",
-        "color": "(b) as color",
-        "length": "(c) as length of the streaks",
-        "both": "(d) as both",
-    }
+    labels = (
+        "(a) magnitude not shown",
+        "(b) as color",
+        "(c) as length of the streaks",
+        "(d) as both",
+    )
     panels = [
-        Panel(draw_field(field, DEGREE, SIZE, LOOK.with_settings({"magnitude": mapping})), label)
-        for mapping, label in names.items()
+        Panel(draw_field(field, DEGREE, SIZE, LOOK.with_settings(settings)), label)
+        for label, settings in zip(labels, MAPPINGS.values(), strict=True)
     ]
     page.picture([panels[:2], panels[2:]], "The magnitude of a 4-RoSy field shown in three ways")
     _measure(page)
@@ -69,10 +79,8 @@ def _measure(page: Page) -> None:
     )
     cells = (SIZE // 10, 10, SIZE // 10, 10)
     luminance = {}
-    for mapping in ("none", "color", "length", "both"):
-        rgba = compose_field(
-            field, DEGREE, SIZE, MEASURED.with_settings({"magnitude": mapping})
-        ).rgba
+    for mapping, settings in MAPPINGS.items():
+        rgba = compose_field(field, DEGREE, SIZE, MEASURED.with_settings(settings)).rgba
         luminance[mapping] = rgba[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
     ranks = {
         mapping: float(
@@ -85,14 +93,9 @@ def _measure(page: Page) -> None:
     }
     edges = (0.0, 0.25, 0.5, 0.75, 1.0)
     heads = [f"Half-length, ρ {low:g} to {high:g}" for low, high in pairwise(edges)]
-    rows = []
-    for mapping, label in (
-        ("none", "not shown"),
-        ("color", "color"),
-        ("length", "length"),
-        ("both", "both"),
-    ):
-        rows.append([label, ranks[mapping], *_half_lengths(mapping, z, rho, edges)])
+    rows = [
+        [mapping, ranks[mapping], *_half_lengths(mapping, z, rho, edges)] for mapping in MAPPINGS
+    ]
     page.table(["Magnitude as", "Luminance", *heads], rows)
 
 
@@ -100,7 +103,7 @@ def _half_lengths(
     mapping: str, z: np.ndarray, rho: np.ndarray, edges: tuple[float, ...]
 ) -> list[str]:
     """Return the distance at which the correlation along streaks has halved, by range of magnitude."""
-    look = MEASURED.with_settings({"magnitude": mapping, "weights": "none"})
+    look = MEASURED.with_settings({**MAPPINGS[mapping], "weights": "none"})
     image = compose_field(field, DEGREE, SIZE, look).layer.images.members[0, :, 0]
     image = image.reshape(SIZE, SIZE)
     angle = np.angle(z) / DEGREE

@@ -29,8 +29,8 @@ from .solid import (
 )
 
 WIDTH = 402
-PLAID = SOLID.with_settings({"noise": "color", "grain": 3.0, "gain": 3.0, "length": 60})
-MAGNITUDE = SOLID.with_settings({"magnitude": "color", "gain": 2.0})
+PLAID = SOLID.with_settings({"hue": "noise", "grain": 3.0, "gain": 3.0, "length": 60})
+MAGNITUDE = SOLID.with_settings({"hue": "magnitude", "gain": 2.0})
 
 
 def write() -> None:

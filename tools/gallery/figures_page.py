@@ -26,7 +26,7 @@ DEGREE, SIDE, ANGLES = 4, 396, (-26, 8)
 #: Width and height of the render with a key.
 RENDER_SIZE = 824, 520
 
-LOOK = Look(supersampling=2, singularity_labels=True)
+LOOK = Look(supersampling=2)
 
 #: Of the sheet and of the picture on the page, in inches and dots per inch.
 SHEET_WIDTH, SHEET_DPI, PAGE_WIDTH, PAGE_DPI = 7.0, 150, 6.0, 160
@@ -39,7 +39,7 @@ def write() -> None:
     engraving = replace(load_preset("engraving").look, singularity_dots="all")
     panels = []
     for look, text in (
-        (replace(LOOK, singularity_dots="visible"), "Visible, with indices"),
+        (replace(LOOK, singularity_dots="visible_indices"), "Visible, with indices"),
         (engraving, "All"),
     ):
         panels.append(Panel(display(render_view(head, field, look, ANGLES, SIDE)), text))
@@ -146,7 +146,7 @@ def _render_with_key() -> Image.Image:
     scene.world = bpy.data.worlds.new("World")
     scene.world.color = (1.0, 1.0, 1.0)
     scene.view_settings.view_transform = "Standard"
-    look = replace(LOOK, magnitude="color", singularity_dots="visible", singularity_labels=False)
+    look = replace(LOOK, hue="magnitude", singularity_dots="visible")
     apply_look(scene.rosy, look)
     settings = scene.rosy
     settings.key_counts = True

@@ -44,19 +44,13 @@ HAND = {
 INKS = {
     "hue families, of black ink": ("cross-hatch", {"hue": "families", "layering": 0.15}),
     "hue families, of light ink": ("white-on-black", {"hue": "families"}),
-    "ink_ramp, from blue to ochre": (
+    "hue tone, from blue to ochre": (
         "engraving",
-        {"ink_ramp": True, "ink_color": "#141a3c", "ink_color_light": "#b0703c"},
+        {"hue": "tone", "ink_color": "#141a3c", "ink_color_light": "#b0703c"},
     ),
-    "ink_ramp, through a third ink": (
+    "hue tone, of charcoal": (
         "charcoal",
-        {
-            "ink_ramp": True,
-            "ink_color": "#14213c",
-            "ink_middle": 0.45,
-            "ink_color_middle": "#8c2f45",
-            "ink_color_light": "#d29a3c",
-        },
+        {"hue": "tone", "ink_color": "#14213c", "ink_color_light": "#d2603c"},
     ),
 }
 
@@ -173,7 +167,7 @@ def _tones(bare: list[MeshInstance]) -> list[list[Panel]]:
         [
             _tone_panel(
                 occluded,
-                replace(look, tone="attribute", tone_lit=True, tone_gamma=1.3),
+                replace(look, tone="attribute", tone_lit=True, tone_levels=(0.0, 1.0, 1.3)),
                 "the same, lit",
             ),
             _tone_panel(mapped, replace(look, tone="image", tone_lit=True), "tone: image, lit"),

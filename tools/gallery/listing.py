@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look import Look, uses_magnitude
 from rosy_addon.core.color import from_hex
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
@@ -47,7 +47,7 @@ ENLARGED = 1.6
 
 #: Looks of the picture of fields: gray streaks, and a plaid.
 STREAKS = Look(length=80, grain=2.6, gain=2.8, shading=0.85, supersampling=2)
-WEAVE = STREAKS.with_settings({"noise": "color", "grain": 4.0, "gain": 3.0})
+WEAVE = STREAKS.with_settings({"hue": "noise", "grain": 4.0, "gain": 3.0})
 
 #: Size of the captions, and their color.
 CAPTION, INK = 34, (40, 40, 40)
@@ -101,8 +101,8 @@ def _presets(monkey: Surface, form: RosyField) -> Image.Image:
     for index, name in enumerate(names):
         preset = load_preset(name)
         look = preset.look.with_settings({"supersampling": 2})
-        field = form if look.magnitude == "none" else curved
-        paper = look.paper_color if look.ink == "hatch" else "#ffffff"
+        field = form if not uses_magnitude(look) else curved
+        paper = look.paper_color if look.ink != "soft" else "#ffffff"
         size = (width, height - caption)
         shown = _draw(monkey, field, look, (-26.0, 6.0), size, 0.04, paper)
         left, top = index % columns * width, index // columns * height

@@ -1,14 +1,20 @@
-"""Write docs/looks.md: a table of all settings, and pictures of the main ones."""
+"""Write docs/looks.md: the presets, and all settings with a picture of each."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
-from rosy_addon.core.settings import Choice, Color, Number, Setting, Switch, settings_of
+from rosy_addon.compositor.look import Look, uses_magnitude
+from rosy_addon.core.settings import (
+    Choice,
+    Color,
+    Number,
+    Numbers,
+    Setting,
+    panel_settings,
+    settings_of,
+)
 from rosy_addon.field.analysis import angle_errors
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
@@ -18,7 +24,13 @@ from rosy_addon.projection.project import project
 
 from .figure_11 import smoothed_a_little
 from .page import ROOT
-from .plane import draw_field
+from .setting_pictures import (
+    SETTINGS,
+    WEBP_QUALITY,
+    check_every_setting_is_shown,
+    setting_strip,
+    value_label,
+)
 from .shapes import suzanne
 from .sheet import Panel, display, save, sheet
 from .solid import compose_view, view
@@ -26,25 +38,6 @@ from .solid import compose_view, view
 PAGE = ROOT / "docs" / "looks.md"
 IMAGES = ROOT / "docs" / "images"
 
-#: Settings that are shown at several values, and the text about them.
-SHOWN = {
-    "length": (
-        (10, 40, 160),
-        "Long streaks show where the directions lead, and need more gain. Short streaks show how "
-        "the field turns.",
-    ),
-    "grain": ((1.0, 1.5, 4.0), "Broad streaks are legible from a distance and hide small details."),
-    "density": (
-        (0.02, 0.1, 0.5),
-        "With few bright cells, the streaks are separate. With half of the cells bright, they form "
-        "a weave.",
-    ),
-    "high_pass": ((0.0, 16.0, 4.0), "Without it, crossing streaks form clouds. The paper uses 0."),
-    "gain": (
-        (1.0, 2.5, 6.0),
-        "1 gives the contrast of a single direction. Higher values look like ink.",
-    ),
-}
 SIDE = 256
 
 #: Paragraphs about the user's own presets.
@@ -100,22 +93,22 @@ import rosyfields as rf
 surface = rf.Surface("spot.obj")
 field, other = rf.form(surface, 4), rf.curvature(surface, 4)
 degrees = np.degrees(field.difference(other).angle)
-rf.render(surface, field, color_values=degrees, values_high=45.0).save("spot.png")
+rf.render(surface, field, color_values=degrees, color_range=(0, 45)).save("spot.png")
 ```""",
     "- Numbers of faces are constant on each face; those of points and corners are interpolated.\n"
-    "- `values_low` and `values_high` are the numbers at the bottom and at the top of `color_map`. If "
-    "both are 0, they are the lowest and the highest number on all objects with a field, whether the "
-    "camera sees them or not, so that pictures from several sides have the same colors. If the lower "
-    "end is the greater number, the map is inverted.\n"
+    "- `color_range` holds the numbers at the bottom and at the top of `color_map`. If both are 0, they "
+    "are the lowest and the highest number on all objects with a field, whether the camera sees them or "
+    "not, so that pictures from several sides have the same colors. If the bottom is the greater number, "
+    "the map is inverted.\n"
     "- Where there is no number (NaN, or another object without the attribute), streaks are gray, and "
     "hatching has the color of its ink.\n"
-    "- `magnitude` with `color` or `both` has precedence. Hatching of [textures](textures.md) and "
-    "pictures with *Output > Relight* have the colors of their inks.",
+    "- Hatching of [textures](textures.md) and pictures with *Output > Relight* have the colors of their inks.",
 )
 
 
 def write() -> None:
     """Draw and write the page."""
+    check_every_setting_is_shown()
     pieces = [
         "# Looks",
         "With a *look* you choose how a field is drawn. A look is the set of all settings of a "
@@ -127,13 +120,11 @@ def write() -> None:
         _presets(),
         "## Your own presets",
         *OWN,
-        "## What the main settings do",
-        *(_setting(name, values, text) for name, (values, text) in SHOWN.items()),
         "## Numbers as colors",
         _numbers(),
         *NUMBERS,
         "## All settings",
-        _table(),
+        *_settings(),
     ]
     PAGE.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
 
@@ -147,7 +138,7 @@ def _presets() -> str:
     panels = []
     for preset in presets:
         look = preset.look.with_settings({"supersampling": 2})
-        field = even if look.magnitude == "none" else curved
+        field = even if not uses_magnitude(look) else curved
         camera = view(monkey, (-26, 8), (SIDE, SIDE), look.supersampling)
         shown = display(compose_view(monkey, field, look, camera).rgba)
         panels.append(Panel(shown, preset.name))
@@ -167,7 +158,7 @@ def _numbers() -> str:
     known = np.where(monkey.vertices[monkey.corner_vertex, 0] < 0.2, height, np.nan)
     panels = []
     for text, preset, values, settings in (
-        ("angle to the curvature field", "default", angle, {"values_high": 45.0}),
+        ("angle to the curvature field", "default", angle, {"color_range": (0.0, 45.0)}),
         ("height, magma, as an engraving", "engraving", height, {"color_map": "magma"}),
         ("height, on the left only", "default", known, {}),
     ):
@@ -186,45 +177,42 @@ def _numbers() -> str:
     )
 
 
-def _pair(p: np.ndarray) -> np.ndarray:
-    """Return a field with singularities of index 1 / N and -1 / N, a third of the picture apart."""
-    left, right = p + SIDE / 6, p - SIDE / 6
-    return left / np.abs(left) * (right / np.abs(right)).conj() * np.exp(0.6j)
-
-
-def _setting(name: str, values: tuple[Any, ...], text: str) -> str:
-    """Draw one setting at several values."""
-    panels = []
-    for value in values:
-        look = Look().with_settings({name: value})
-        panels.append(Panel(draw_field(_pair, 4, SIDE, look), f"{name} {value:g}"))
-    path = IMAGES / f"looks-{name.replace('_', '-')}.png"
-    save(sheet([panels]), path)
-    return f"`{name}`: {text}\n\n![{name} at {_listed(values)}](images/{path.name})"
-
-
-def _table() -> str:
-    lines = ["| setting | default | values | what it does |", "| --- | --- | --- | --- |"]
-    for name, setting in settings_of(Look).items():
-        default = setting.default
-        if isinstance(setting, Switch):
-            default = str(default).lower()
-        lines.append(f"| `{name}` | `{default}` | {_values(setting)} | {setting.text} |")
-    return "\n".join(lines)
+def _settings() -> list[str]:
+    """Describe all settings by panel, with a picture of each."""
+    pieces = []
+    panels = dict.fromkeys(setting.panel for setting in settings_of(Look).values())
+    for panel in sorted(panels, key=lambda panel: not panel):
+        pieces.append(f"### {panel.capitalize() or 'Advanced'}")
+        for name in panel_settings(Look, panel):
+            setting = settings_of(Look)[name]
+            pieces.append(f"**`{name}`**: {setting.text}.")
+            pieces.append(_values(setting))
+            path = IMAGES / f"looks-{name.replace('_', '-')}.webp"
+            setting_strip(name).save(path, quality=WEBP_QUALITY, method=6)
+            listed = ", ".join(value_label(name, value) for value in SETTINGS[name].values)
+            pieces.append(f"![{name} at {listed}](images/{path.name})")
+    return pieces
 
 
 def _values(setting: Setting) -> str:
-    """Return the allowed values of a setting, as Markdown."""
+    """Return the allowed values of a setting and its default, as Markdown."""
+    default = value_label(setting.name, setting.default)
     match setting:
         case Choice(options=options):
-            return "<br>".join(f"`{option}`: {text}" for option, text in options.items())
-        case Color():
-            return "a color, `#rrggbb`"
+            return "\n".join(
+                f"- `{option}`{' (default)' * (option == default)}: {text}."
+                for option, text in options.items()
+            )
+        case Color(has_alpha=has_alpha):
+            text = "a color, `#rrggbb`" + " or `#rrggbbaa`" * has_alpha
+        case Number(low=low, high=high, is_integer=True):
+            text = f"{low:,} to {high:,}"
         case Number(low=low, high=high, unit=unit):
-            return f"{low:g} to {high:g}{' radians' if unit == 'angle' else ''}"
+            text = f"{low:g} to {high:g}{' radians' if unit == 'angle' else ''}"
+        case Numbers(parts=parts):
+            text = ", ".join(
+                f"{name.lower()} {low:g} to {high:g}" for name, (low, high) in parts.items()
+            )
         case _:
-            return "`true`, `false`"
-
-
-def _listed(values: tuple[Any, ...]) -> str:
-    return ", ".join(f"{value:g}" for value in values)
+            text = "`on` or `off`"
+    return f"Values: {text}. Default: `{default}`."

@@ -26,6 +26,6 @@ def _small(look: Look) -> Image.Image:
     size = TONES
     if colors_magnitude(look):
         size = MAGNITUDE_COLORS
-    if look.noise == "color":
+    if look.hue == "noise":
         size = NOISE_COLORS
     return shown.quantize(size, Image.Quantize.MEDIANCUT, kmeans=4, dither=Image.Dither.NONE)

@@ -14,7 +14,7 @@ import numpy as np
 from PIL import Image
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look import Look, uses_magnitude
 from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.field.generate import generate
 from rosy_addon.field.mesh_io import read_mesh
@@ -123,11 +123,11 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
     small = np.concatenate([_draw(model, look, SMALL) for model in others], axis=1)
     sheet = Image.fromarray(np.concatenate([_draw(first, look, LARGE), small]))
     path = IMAGES / f"preset-{name}.png"
-    colors = HATCHING_COLORS if look.ink == "hatch" else COLORS
+    colors = HATCHING_COLORS if look.ink != "soft" else COLORS
     sheet.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE).save(
         path, optimize=True
     )
-    kind = "" if look.magnitude == "none" else 'kind="curvature"'
+    kind = 'kind="curvature"' if uses_magnitude(look) else ""
     return "\n\n".join(
         [
             f"## {preset.name}",
@@ -142,7 +142,7 @@ def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
 
 def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
     """Return a picture of a model on the paper of a look, (H, W, 3) uint8."""
-    instance = model.instance if look.magnitude == "none" else model.with_magnitude
+    instance = model.with_magnitude if uses_magnitude(look) else model.instance
     points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
     width, height = (look.supersampling * side for side in size)
     camera = orbit_camera(points, *model.view, width, height, margin=MARGIN)
@@ -152,7 +152,7 @@ def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
 
 def on_paper(rgba: np.ndarray, look: Look) -> np.ndarray:
     """Return an (H, W, 4) picture with the paper of its look as background, if it has paper."""
-    if look.ink != "hatch":
+    if look.ink == "soft":
         return rgba
     alpha = rgba[..., 3:]
     color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_color)) * (1 - alpha)

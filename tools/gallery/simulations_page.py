@@ -28,7 +28,7 @@ def write() -> None:
         path = Path(folder) / "beam.vtu"
         _beam().save(path)
         words = ["render", str(path), "-o", str(PICTURE)]
-        words += ["--array", "stress", "--size", "640x360", "--set", "magnitude=color"]
+        words += ["--array", "stress", "--size", "640x360", "--set", "hue=magnitude"]
         assert main(words) == 0
 
 

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from rosy_addon.compositor.ink_thresholds import ink_of_thresholds
+from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.core.color import to_linear

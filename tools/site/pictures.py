@@ -31,9 +31,11 @@ def on_page_content(html: str, *, page, config, files) -> str:
 
 
 def picture_size(content: bytes) -> tuple[int, int] | None:
-    """Return the width and the height of a .png or .gif in pixels, None for other files."""
+    """Return the width and the height of a .png, .gif or lossy .webp in pixels, None for other files."""
     if content.startswith(b"\x89PNG"):
         return struct.unpack(">II", content[16:24])
     if content.startswith(b"GIF8"):
         return struct.unpack("<HH", content[6:10])
+    if content[8:16] == b"WEBPVP8 ":
+        return struct.unpack("<HH", content[26:30])
     return None

@@ -16,11 +16,11 @@ uniform sampler2D field_values, outline_coverage;
 uniform sampler2DArray line_means;
 uniform float breaks, outline, min_transmittance, streak_std, break_std, disc_std;
 uniform float paper_grain_depth;
-uniform int clear_paper, magnitude_mode, flow_mode, colors_values, break_steps, overshoot_steps;
+uniform int colors_magnitude, flow_mode, colors_values, break_steps, overshoot_steps;
 uniform ivec2 box_origin;
 uniform vec4 flow_weights;
 layout(rgba32f) uniform writeonly image2D picture;
-#pragma constant(flow_mode, magnitude_mode, colors_values, noise_channels, family_count)
+#pragma constant(flow_mode, colors_magnitude, colors_values, noise_channels, family_count)
 #pragma constant(is_light_ink, is_antialiased, even_lines, ink_count)
 
 // The derivatives of the streaks of a line (x) and of its breaks (y), to the left and per pixel, as `fast_lic`.
@@ -46,10 +46,9 @@ void main()
   float line_angle = line_angle_of(pixel, value.xy);
   Families families = families_at(pixel);
   float pixel_tone = tone_at(pixel), value_position = texelFetch(tones, pixel, 0).w;
-  bool is_colored_by_magnitude = (magnitude_mode & MAGNITUDE_COLOR) != 0;
   vec3 one_ink = vec3(0.0), ink_light = vec3(1.0);
   // Without a number, the position in the color map is negative.
-  if (is_colored_by_magnitude) {
+  if (colors_magnitude != 0) {
     one_ink = to_linear(mapped_color(magnitude_share(value.xy)));
   }
   else if (colors_values != 0 && value_position >= 0.0) {
@@ -78,7 +77,7 @@ void main()
       float tone = overshoot_steps > 0 ? means.z : pixel_tone;
       transmittance = is_light_ink != 0 ? 1.0 - tone : tone;
       target = min_transmittance + transmittance * (1.0 - min_transmittance);
-      if (ink_count == 1 && !is_colored_by_magnitude && colors_values == 0) {
+      if (ink_count == 1 && colors_magnitude == 0 && colors_values == 0) {
         transmittance = 1.0 - ink_coverage(target, one_ink);
       }
       onset_sum = 0.0;
@@ -153,7 +152,7 @@ void main()
     drawn_color = paper_color.xyz + (seen_color - paper_color.xyz) / max(1.0 - paper, MIN_COVERAGE);
     drawn_color = clamp(drawn_color, 0.0, 1.0);
   }
-  vec4 color = clear_paper != 0 ? vec4(drawn_color, 1.0 - paper) :
-                                  vec4(mix(drawn_color, paper_color.xyz, paper), 1.0);
-  imageStore(picture, pixel, color);
+  float opacity = 1.0 - paper * (1.0 - paper_color.w);
+  float paper_share = paper * paper_color.w / max(opacity, MIN_COVERAGE);
+  imageStore(picture, pixel, vec4(mix(drawn_color, paper_color.xyz, paper_share), opacity));
 }

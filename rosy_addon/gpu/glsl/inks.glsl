@@ -2,7 +2,7 @@
 
 uniform sampler2D cells, ink_thresholds, disc_offsets, ink_table, paper_grain;
 uniform sampler2DArray line_image;
-uniform float layering, ink_mid_tone, softness, onset_range, onset_lead;
+uniform float layering, softness, onset_range, onset_lead;
 uniform int line_count, sheet_count, layers, ink_count, is_light_ink, is_antialiased;
 uniform int paper_grain_shift, paper_grain_channels, even_lines;
 uniform vec2 crowded_pixels;
@@ -54,7 +54,7 @@ float onset_weight(float delay, float transmittance)
   return smooth_unit_step((1.0 - transmittance - delay + onset_lead) / (onset_range + onset_lead));
 }
 
-// Interpolate between the inks of one table: dark, middle or light.
+// Interpolate between the inks of one table: dark or light.
 vec3 table_ink(float ink, int first_texel)
 {
   int low_index = min(int(ink), ink_count - 1);
@@ -64,14 +64,10 @@ vec3 table_ink(float ink, int first_texel)
   return mix(low, high, ink - float(low_index));
 }
 
-// An ink at a tone, as `inks.Inks.at_tone`.
+// An ink at a tone, as `inks.Inks.ink_at_tone`.
 vec3 ink_of_tone(float ink, float tone)
 {
-  vec3 middle_ink = table_ink(ink, ink_count);
-  float light_weight = clamp((tone - ink_mid_tone) / (1.0 - ink_mid_tone), 0.0, 1.0);
-  float dark_weight = clamp(1.0 - tone / ink_mid_tone, 0.0, 1.0);
-  return middle_ink + light_weight * (table_ink(ink, 2 * ink_count) - middle_ink) +
-         dark_weight * (table_ink(ink, 0) - middle_ink);
+  return mix(table_ink(ink, 0), table_ink(ink, ink_count), tone);
 }
 
 // Light inks on dark paper are computed as the negatives of dark inks on light paper.

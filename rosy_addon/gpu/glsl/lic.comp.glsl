@@ -12,12 +12,12 @@
 
 uniform sampler2D field_values, palette;
 uniform float crossing_correlation, gain, hue_sharpness;
-uniform int colors_values;
+uniform int colors_magnitude, colors_values;
 uniform ivec2 box_origin;
 layout(rgba32f) uniform writeonly image2D picture;
-#pragma constant(degree, line_count, sheet_count, kernel, flow_mode, magnitude_mode)
-#pragma constant(noise_channels, is_antialiased, colors_values, family_count, break_steps)
-#pragma constant(overshoot_steps, even_lines)
+#pragma constant(degree, line_count, sheet_count, kernel, flow_mode)
+#pragma constant(colors_magnitude, magnitude_length, colors_values, noise_channels, is_antialiased)
+#pragma constant(family_count, break_steps, overshoot_steps, even_lines)
 
 void main()
 {
@@ -30,7 +30,8 @@ void main()
     return;
   }
   vec4 value = texelFetch(field_values, pixel, 0);
-  float relative_magnitude = magnitude_mode != 0 ? magnitude_share(value.xy) : 1.0;
+  bool uses_magnitude = colors_magnitude != 0 || magnitude_length != 0;
+  float relative_magnitude = uses_magnitude ? magnitude_share(value.xy) : 1.0;
   float line_angle = line_angle_of(pixel, value.xy);
   Families families = families_at(pixel);
   Reach reach = reach_at(relative_magnitude);
@@ -58,7 +59,7 @@ void main()
   vec4 light_and_position = texelFetch(tones, pixel, 0);
   vec3 color = tone + NOISE_MEAN;
   // Without a number, the position in the color map is negative.
-  if ((magnitude_mode & MAGNITUDE_COLOR) != 0) {
+  if (colors_magnitude != 0) {
     color = mapped_color(relative_magnitude) * (1.0 + COLOR_CONTRAST * tone);
   }
   else if (colors_values != 0 && light_and_position.w >= 0.0) {

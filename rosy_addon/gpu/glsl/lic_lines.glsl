@@ -1,7 +1,7 @@
 // The filtered noise of the lines through a pixel. Included by lic.comp.glsl and streaks.comp.glsl.
 
 uniform float full_samples, break_samples;
-uniform int line_count, sheet_count, magnitude_mode, flow_mode, half_length, break_steps;
+uniform int line_count, sheet_count, magnitude_length, flow_mode, half_length, break_steps;
 uniform int overshoot_steps, even_lines;
 uniform vec4 flow_shifts;
 
@@ -26,7 +26,7 @@ Reach reach_at(float relative_magnitude)
   Reach reach;
   int step_count = half_length, break_step_count = break_steps;
   reach.overshoot_count = overshoot_steps;
-  if ((magnitude_mode & MAGNITUDE_LENGTH) != 0) {
+  if (magnitude_length != 0) {
     step_count = int(round(float(step_count) * relative_magnitude));
     break_step_count = int(round(float(break_step_count) * relative_magnitude));
     reach.overshoot_count = int(round(float(overshoot_steps) * relative_magnitude));

@@ -1,10 +1,13 @@
 uniform sampler2D max_magnitude;
-uniform float magnitude_range;
+uniform vec2 magnitude_ends;
 
-// The magnitude of a representation relative to the largest one or to the range of the look, at most 1.
+// The position of the magnitude of a representation between the ends of the range of the look, 0 to 1.
 float magnitude_share(vec2 z)
 {
-  float max_value =
-      magnitude_range > 0.0 ? magnitude_range : texelFetch(max_magnitude, ivec2(0), 0).x;
-  return min(length(z) / (max_value > 0.0 ? max_value : 1.0), 1.0);
+  float low = magnitude_ends.x, high = magnitude_ends.y;
+  if (low == high) {
+    float largest = texelFetch(max_magnitude, ivec2(0), 0).x;
+    high = largest > 0.0 ? largest : 1.0;
+  }
+  return (clamp(length(z), min(low, high), max(low, high)) - low) / (high - low);
 }

@@ -11,8 +11,8 @@
 uniform sampler2D field_values;
 uniform ivec2 box_origin;
 layout(rgba16f) uniform writeonly image2DArray line_means;
-#pragma constant(degree, line_count, sheet_count, kernel, flow_mode, magnitude_mode)
-#pragma constant(noise_channels, is_antialiased, even_lines)
+#pragma constant(degree, line_count, sheet_count, kernel, flow_mode)
+#pragma constant(magnitude_length, noise_channels, is_antialiased, even_lines)
 
 void main()
 {
@@ -26,7 +26,7 @@ void main()
     return;
   }
   vec4 value = texelFetch(field_values, pixel, 0);
-  float relative_magnitude = magnitude_mode != 0 ? magnitude_share(value.xy) : 1.0;
+  float relative_magnitude = magnitude_length != 0 ? magnitude_share(value.xy) : 1.0;
   float line_angle = flow_mode == FLOW_TO_ANGLE ? line_angle_of(pixel, value.xy) : 0.0;
   FilteredLine filtered =
       filtered_line(pixel, line, cell, reach_at(relative_magnitude), line_angle);

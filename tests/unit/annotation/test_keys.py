@@ -300,13 +300,13 @@ def largest_visible(view_input):
 
 
 def test_the_range_is_the_largest_visible_magnitude():
-    look = Look(magnitude="color", supersampling=1)
+    look = Look(hue="magnitude", supersampling=1)
     view_input = view(look)
     picture = draw_picture(view_input)
     low, high = picture.color_range
     assert low == 0 and high == pytest.approx(largest_visible(view_input), rel=1e-6)
     # A look with this range gives the same picture.
-    fixed = view(replace(look, magnitude_range=high))
+    fixed = view(replace(look, color_range=(0.0, high)))
     again = draw_picture(fixed)
     np.testing.assert_array_equal(again.rgba, picture.rgba)
     assert again.color_range == (0.0, high)
@@ -318,7 +318,7 @@ def test_the_range_does_not_reach_beyond_the_field():
     """Where pixels with several samples see the edge of a face, they do not extend it."""
     largest = view(Look()).instances[0].field.magnitude.max()
     for supersampling in (1, 2, 3):
-        look = Look(magnitude="color", supersampling=supersampling)
+        look = Look(hue="magnitude", supersampling=supersampling)
         picture = draw_picture(view(look))
         assert 0.9 * largest < picture.color_range[1] <= largest * (1 + 1e-4)
 
@@ -331,7 +331,7 @@ def test_fields_with_ranges_of_their_own_have_no_common_one():
     other = MeshInstance(first.surface, matrix, RosyField(2, vectors))
     camera = orthographic_camera(look_at((0.7, -5, 0), (0.7, 0, 0)), 160, 120, scale=4.0)
     for top, expected in ((0.0, None), (0.7, (0.0, 0.7))):
-        look = Look(magnitude="color", magnitude_range=top)
+        look = Look(hue="magnitude", color_range=(0.0, top))
         picture = draw_picture(view(look, (first, other), camera))
         assert picture.color_range == expected
         assert picture_key(look, picture).color_scale.high == (top or None)
@@ -361,7 +361,7 @@ def test_the_range_of_numbers_as_colors(ends):
     instance = view(Look()).instances[0]
     heights = instance.surface.vertices[instance.surface.corner_vertex, 2].astype(np.float32)
     colored = replace(instance, color_values=heights)
-    look = Look(hue="values", values_low=ends[0], values_high=ends[1])
+    look = Look(hue="values", color_range=ends)
     view_input = view(look, (colored,))
     picture = draw_picture(view_input)
     expected = ends if any(ends) else (float(heights.min()), float(heights.max()))

@@ -159,7 +159,7 @@ def test_drawings_have_the_same_dots_as_pictures():
     sphere = MeshInstance(icosphere(3), np.eye(4), None)
     field = generate(sphere.surface, GeneratorSettings("smoothest"), 4)
     instances = [instance, MeshInstance(sphere.surface, np.eye(4), field)]
-    style = StrokeStyle(spacing=40.0, singularity_dots="all", singularity_labels=True)
+    style = StrokeStyle(spacing=40.0, singularity_dots="all_indices")
     drawing = draw_instances(instances, CAMERA, style)
     text = svg_text(drawing.strokes, CAMERA, None, drawing.marks)
     circles = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="([\d.]+)" fill="(#\w+)"', text)

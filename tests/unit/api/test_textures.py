@@ -46,7 +46,7 @@ def test_the_command_draws_the_same_texture(tmp_path, words, options):
 def test_numbers_as_colors(error_of):
     """u, from 0 to 1 between the borders of the chart, is the gray of the texels."""
     square = rf.Surface(*SQUARE, name="square", uv=UV)
-    flat = {"gain": 0.0, "color_map": "gray", "values_high": 1.0, "margin": 0, "size": 64}
+    flat = {"gain": 0.0, "color_map": "gray", "color_range": (0.0, 1.0), "margin": 0, "size": 64}
     texture = rf.texture(square, rf.along_uv(square, 2), color_values=square.vertices[:, 0], **flat)
     gray = np.asarray(texture.tiles[1001])[32, 4:60, 0]
     expected = ((np.arange(4, 60) + 0.5) / 64 - 0.05) / 0.9
@@ -106,7 +106,13 @@ def test_hatching_for_one_light():
         ).tiles[1001]
         assert ink.rgba[..., 0].mean() == pytest.approx(cosine, abs=0.03)
         clear = rf.texture(
-            square, field, size=256, margin=0, light_direction=light, clear_paper=True, **settings
+            square,
+            field,
+            size=256,
+            margin=0,
+            light_direction=light,
+            paper_color="#ffffff00",
+            **settings,
         ).tiles[1001]
         assert clear.rgba[..., 3].mean() == pytest.approx(1 - cosine, abs=0.03)
         assert clear.rgba[..., :3].max() < 0.01

@@ -228,6 +228,10 @@ REFUSED = {
         ["render", "{mesh}", "-o", "{out}", "--set", "length=long"],
         "--set length=long: expected a whole",
     ),
+    "numbers": (
+        ["render", "{mesh}", "-o", "{out}", "--set", "color_range=0;1"],
+        "--set color_range=0;1: expected numbers with commas",
+    ),
     "range": (["render", "{mesh}", "-o", "{out}", "--set", "gain=-1"], "setting 'gain' is -1"),
     "switch": (
         ["render", "{mesh}", "-o", "{out}", "--set", "view_plane=2"],

@@ -27,7 +27,7 @@ SIZE = 240
 CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fov=0.8)
 LOOKS = {
     "default": Look(),
-    "color noise": Look(noise="color"),
+    "color noise": Look(hue="noise"),
     "tapered, on the surface": Look(taper=True, anchor="surface", grain=2.5),
     "short": Look(length=12),
 }

@@ -28,7 +28,7 @@ BALL, GRID = icosphere(4), plane(4, 4)
 #: Streaks without contrast, and no shading: the pixels have the colors of the map.
 FLAT = Look(hue="values", gain=0.0, shading=0.0, length=3)
 #: The ink alone, which covers everything.
-INK = replace(FLAT, ink="hatch", tone_black=2.0, tone_white=3.0, clear_paper=True)
+INK = replace(FLAT, ink="hatch", tone_levels=(2.0, 3.0, 1.0), paper_color="#ffffff00")
 
 
 def camera(width=SIZE, height=SIZE):
@@ -80,7 +80,7 @@ def test_colors_are_those_of_interpolated_numbers(look, name):
 )
 def test_the_range_of_the_look(low, high, position):
     """Numbers beyond it have the colors at its ends."""
-    look = replace(FLAT, values_low=low, values_high=high)
+    look = replace(FLAT, color_range=(low, high))
     colors, x = drawn([of_vertices(BALL, BALL.vertices[:, 0])], look)
     away = np.abs(x - 0.3) > 1e-3
     expected = mapped(np.clip(position(x), 0, 1))
@@ -129,18 +129,10 @@ def test_pixels_without_a_number(look):
 def test_streaks_darken_and_lighten_the_color():
     """The hue is that of the map: the ratios of display values do not change."""
     values = np.full(len(BALL.corner_vertex), 0.5)
-    look = replace(FLAT, gain=1.0, length=12, values_low=0.0, values_high=1.0, color_map="gray")
+    look = replace(FLAT, gain=1.0, length=12, color_range=(0.0, 1.0), color_map="gray")
     colors, _ = drawn([numbered(BALL, values)], look)
     gray = to_linear(color_stops("gray").mean(axis=0))[0]
     assert colors.std() > 0.02 and abs(np.median(colors) - gray) < 0.06
-
-
-def test_the_magnitude_has_precedence():
-    instance = of_vertices(BALL, BALL.vertices[:, 0])
-    with_magnitude = replace(FLAT, magnitude="color")
-    colors, _ = drawn([instance], with_magnitude)
-    expected, _ = drawn([replace(instance, color_values=None)], replace(with_magnitude, hue="one"))
-    np.testing.assert_array_equal(colors, expected)
 
 
 def test_without_numbers_there_is_one_line():

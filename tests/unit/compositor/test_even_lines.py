@@ -25,7 +25,7 @@ from rosy_addon.compositor.look_units import instance_line_spacing, supersampled
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
 from rosy_addon.core.cache import Cache
 from rosy_addon.core.color import from_hex, to_linear
-from rosy_addon.core.settings import Choice, Number, Switch, settings_of
+from rosy_addon.core.settings import Choice, Number, Numbers, Switch, settings_of
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.preset_files.store import load_preset
@@ -35,8 +35,7 @@ from rosy_addon.projection.project import project
 
 SIZE = 256
 LOOK = Look(
-    ink="hatch",
-    lines="even",
+    ink="even",
     anchor="surface",
     light="scene",
     shading=0.5,
@@ -193,6 +192,8 @@ def _other_value(setting):
     if isinstance(setting, Number):
         middle = setting.low + 0.3 * min(setting.high - setting.low, 8.0)
         return round(middle) if setting.is_integer else middle
+    if isinstance(setting, Numbers):
+        return tuple(low + 0.3 * min(high - low, 8.0) for low, high in setting.parts.values())
     return "#3366aa"
 
 

@@ -192,7 +192,9 @@ def test_streamlines_end_where_brute_force_ends_them(kernel, degree):
 def test_magnitude_determines_the_samples_of_a_pixel(kernel):
     x, _ = pixel_centers(SIZE)
     field = planar_pixel_field(np.zeros((SIZE, SIZE)), 1, magnitude=x / SIZE)
-    look = replace(LOOK, magnitude="length", magnitude_range=1.0, length=30, **KERNELS[kernel])
+    look = replace(
+        LOOK, magnitude_length=True, color_range=(0.0, 1.0), length=30, **KERNELS[kernel]
+    )
     samples = fast_images(field, look).effective_samples.reshape(SIZE, SIZE)[:, 40:-40]
     reach = np.rint(30 * x / SIZE)[:, 40:-40]
     np.testing.assert_allclose(

@@ -118,7 +118,7 @@ def test_frames_of_a_loop_are_whole_cycles():
 
 
 def test_looks_without_flow_stay_as_they_are():
-    for look in (Look(), Look(flow=1.0, method="brute"), Look(flow=1.0, noise="color")):
+    for look in (Look(), Look(flow=1.0, method="brute"), Look(flow=1.0, hue="noise")):
         assert not has_flow(look) and flow_at(look, 7) is look
 
 

@@ -52,7 +52,7 @@ pytestmark = pytest.mark.slow
 
 SIZE = 384
 PRESETS = {name: load_preset(name).look for name in preset_keys()}
-HATCHED = [name for name, look in PRESETS.items() if look.ink == "hatch"]
+HATCHED = [name for name, look in PRESETS.items() if look.ink != "soft"]
 
 INK = Look(
     taper=True, ink="hatch", anchor="surface", light="lamp", shading=1.0, grain=2.5, supersampling=2
@@ -206,7 +206,7 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
 def test_crowded_even_lines_are_drawn_last():
     """Where a surface turns away across the first lines, the ink of light tones is in the others."""
     field = planar_pixel_field(np.zeros((1, 3)), 4)
-    look = Look(ink="hatch", lines="even", grain=2.5, layers=2, layering=0.5)
+    look = Look(ink="even", grain=2.5, layers=2, layering=0.5)
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
     first, second = line_shares(field, look, np.full((1, 3), 0.9, dtype=np.float32), lines)
@@ -272,7 +272,7 @@ UNEVEN_LINES = {
 
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
-    look = replace(look, anchor="picture", clear_paper=True)
+    look = replace(look, anchor="picture", paper_color="#ffffff00")
     field = planar_pixel_field(np.full((side, side), angle), degree)
     noise = look_noise(field, look)
     break_images = paper_grain = None
@@ -447,9 +447,9 @@ def test_undefined_faces_keep_the_tone_in_color(kind):
 
 
 COLORED_INKS = {
-    "ramp": {"ink_ramp": True, "ink_color": "#201848"},
+    "ramp": {"hue": "tone", "ink_color": "#201848"},
     "ramp, light": {
-        "ink_ramp": True,
+        "hue": "tone",
         "ink_color": "#c08050",
         "ink_color_light": "#fff0c0",
         "paper_color": "#182028",
@@ -457,27 +457,20 @@ COLORED_INKS = {
     "families": {"hue": "families"},
     "families, colored": {"hue": "families", "ink_color": "#204890", "paper_color": "#f4ecd8"},
     "families, light": {"hue": "families", "ink_color": "#f0e8d0", "paper_color": "#101418"},
-    "families, ramp": {"hue": "families", "ink_ramp": True},
-    "ramp with a third ink": {"ink_ramp": True, "ink_color": "#201848", "ink_middle": 0.35},
 }
 
 
-def test_a_third_ink_is_between_the_other_two():
-    look = Look(ink="hatch", ink_ramp=True, ink_middle=0.25)
-    codes = [look.ink_color, look.ink_color_middle, look.ink_color_light]
-    dark, middle, light = (to_linear(from_hex(code)) for code in codes)
+def test_inks_of_tones_are_interpolated():
+    look = Look(ink="hatch", hue="tone")
+    dark, light = (to_linear(from_hex(code)) for code in (look.ink_color, look.ink_color_light))
     tones = np.array([0.0, 0.125, 0.25, 0.625, 1.0], dtype=np.float32)
     actual = inks_of(look).ink_at_tone(np.zeros(5), tones)
-    expected = [dark, (dark + middle) / 2, middle, (middle + light) / 2, light]
-    np.testing.assert_allclose(actual, expected, atol=1e-6)
-    # Without a third ink, colors are interpolated linearly.
-    actual = inks_of(replace(look, ink_middle=0.0)).ink_at_tone(np.zeros(5), tones)
     np.testing.assert_allclose(actual, dark + tones[:, None] * (light - dark), atol=1e-6)
 
 
 @pytest.mark.parametrize(
     "kind",
-    mainly(["families, light", "families, ramp", "ramp with a third ink"], COLORED_INKS),
+    mainly(["families, light", "ramp, light"], COLORED_INKS),
 )
 def test_colored_inks_reproduce_a_ramp(kind):
     assert ramp_error(replace(INK, layers=3, **COLORED_INKS[kind])) <= 0.04
@@ -521,7 +514,7 @@ def test_inks_swap_ranks_without_a_seam(degree):
         np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
     ).all()
     assert line_ink_indices(field, replace(look, hue="one")) is None
-    assert line_ink_indices(field, replace(look, magnitude="color")) is None
+    assert line_ink_indices(field, replace(look, hue="magnitude")) is None
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
@@ -537,7 +530,7 @@ def test_families_keep_their_inks_at_any_guiding_angle():
 
 def test_ink_is_colored_by_magnitude():
     """Pixels covered by ink have the colors of the color map."""
-    look = replace(INK, magnitude="color", color_map="gray", clear_paper=True, shading=0.5)
+    look = replace(INK, hue="magnitude", color_map="gray", paper_color="#ffffff00", shading=0.5)
     surface = ball()
     field = axis_field(surface, 4, (0.3, 0.2, 1.0))
     height = surface.vertices[surface.corner_vertex[surface.face_start[:-1]], 2]
@@ -689,7 +682,7 @@ def test_streaks_stay_on_the_surface(motion, ink):
 @pytest.mark.parametrize("name", mainly(HATCHED[:1], HATCHED))
 def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
-    if look.lines == "even" and motion == "zoomed":
+    if look.ink == "even" and motion == "zoomed":
         # At distances in pixels, a zoom needs other lines.
         look = replace(look, unit="world", unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
@@ -817,16 +810,26 @@ def test_instances_have_different_noise():
 
 
 def test_clear_paper_shows_only_ink():
-    look = replace(INK, clear_paper=True, ink_color="#204060")
+    look = replace(INK, paper_color="#ffffff00", ink_color="#204060")
     clear, full = (
         render(make_instance(ball()), make_camera(), look),
-        render(make_instance(ball()), make_camera(), replace(look, clear_paper=False)),
+        render(make_instance(ball()), make_camera(), replace(look, paper_color="#ffffff")),
     )
     inked = clear[..., 3] > 0
     np.testing.assert_allclose(
         clear[inked][:, :3], np.tile(to_linear(from_hex("#204060")), (inked.sum(), 1)), rtol=1e-3
     )
     whole = full[..., 3] == 1
+    for alpha in ("40", "c0"):
+        part = render(
+            make_instance(ball()), make_camera(), replace(look, paper_color="#ffffff" + alpha)
+        )
+        opacity = int(alpha, 16) / 255
+        alpha_of_all = 1 - (1 - clear[..., 3]) * (1 - opacity)
+        np.testing.assert_allclose(part[whole][:, 3], alpha_of_all[whole], atol=1e-5)
+        ink = clear[..., :3] * clear[..., 3:]
+        mixed = ink + opacity * (full[..., :3] - ink)
+        np.testing.assert_allclose((part[..., :3] * part[..., 3:])[whole], mixed[whole], atol=1e-5)
     on_white = clear[..., :3] * clear[..., 3:] + 1 - clear[..., 3:]
     np.testing.assert_allclose(on_white[whole], full[whole][:, :3], atol=2e-3)
 

@@ -334,12 +334,12 @@ def test_undefined_pixels_are_gray():
 @pytest.mark.parametrize(
     "settings",
     [
-        {"noise": "color"},
+        {"hue": "noise"},
         {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
         {"anchor": "surface", "flow": 1.0},
-        {"magnitude": "both"},
+        {"hue": "magnitude", "magnitude_length": True},
         {"foreshorten": True, "oriented": True},
-        {"ink": "hatch", "lines": "even", "breaks": 0.5, "flow": 1.0},
+        {"ink": "even", "breaks": 0.5, "flow": 1.0},
         {"length": 1, "step": 0.3},
     ],
     ids=str,

@@ -11,9 +11,9 @@ from harness.planar import planar_pixel_field
 from shapes import torus
 
 from rosy_addon.compositor.hatching import LineModulation, line_coverage
+from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.ink_thresholds import (
     cyclic_places,
-    ink_of_thresholds,
     layer_shares,
     line_thresholds,
     ordered_thresholds,
@@ -160,11 +160,11 @@ def test_undefined_pixels_have_the_ink_of_all_lines():
         assert bare == pytest.approx(transmittance, abs=0.02)
 
 
-@pytest.mark.parametrize("lines", ["streaks", "even"])
+@pytest.mark.parametrize("ink", ["hatch", "even"])
 @pytest.mark.parametrize("supersampling", [1, 2])
-def test_thresholds_of_a_picture_draw_its_ink(lines, supersampling):
+def test_thresholds_of_a_picture_draw_its_ink(ink, supersampling):
     """At any tone: a torus in the light of the camera, whose contour has all of them."""
-    look = replace(INK, lines=lines, layers=2, supersampling=supersampling, light="headlight")
+    look = replace(INK, ink=ink, layers=2, supersampling=supersampling, light="headlight")
     mesh = torus(48, 24)
     instance = MeshInstance(mesh, np.eye(4), axis_field(mesh, 4, (0, 0, 1)))
     camera = orbit_camera(instance.face_points(), 0.0, 50.0, 320, 240)

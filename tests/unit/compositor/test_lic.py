@@ -273,7 +273,7 @@ def test_magnitude_drives_the_length_of_streaks(method):
     size = 256
     angles = np.zeros((size, size))
     rho = np.where(np.arange(size)[:, None] < size // 2, 1.0, 0.2) * np.ones((size, size))
-    look = plain(method=method, magnitude="length", magnitude_range=1.0)
+    look = plain(method=method, magnitude_length=True, color_range=(0.0, 1.0))
     image = tone(angles, 1, look, magnitude=rho)
 
     def along(rows, lag):
@@ -286,7 +286,7 @@ def test_magnitude_drives_the_length_of_streaks(method):
 
 def test_color_noise_has_three_channels():
     angles = pair_angle(*pixel_centers(128), 128, 4)
-    picture = compose_planar(angles, 4, plain(noise="color"))
+    picture = compose_planar(angles, 4, plain(hue="noise"))
     channels = picture.layer.tone
     assert channels.shape == (128 * 128, 3)
     assert abs(correlation(channels[:, 0], channels[:, 1])) < 0.1

@@ -221,26 +221,30 @@ def test_lights_of_the_scene():
     assert not diffuse(gbuffer, look).any()
 
 
-def test_magnitude_is_colored():
+@pytest.mark.parametrize("ends", [(0.0, 1.0), (0.25, 0.75), (1.0, 0.0)], ids=str)
+def test_magnitude_is_colored(ends):
     surface = plane(32, 2)
     rho = (surface.face_center[:, :1] + 1) / 2
     field = RosyField(1, rho * [1.0, 0, 0])
     gbuffer = project_surface(surface, field, 128)
-    picture = compose(gbuffer, plain(magnitude="color", magnitude_range=1.0, gain=0.0))
+    picture = compose(gbuffer, plain(hue="magnitude", color_range=ends, gain=0.0))
     x = gbuffer.position[:, 0]
     actual = to_display(picture.rgba.reshape(-1, 4)[gbuffer.pixel, :3])
-    expected = map_colors((x + 1) / 2, "viridis")
+    expected = map_colors(((x + 1) / 2 - ends[0]) / (ends[1] - ends[0]), "viridis")
     inner = np.abs(x) < 0.9
     assert np.abs(actual - expected)[inner].max() < 0.03
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("magnitude_range", [0.0, 1e-30, 5e-324, 1e9, 1e30])
-def test_magnitudes_of_any_scale(magnitude_range):
+@pytest.mark.parametrize(
+    "ends",
+    [(0.0, 0.0), *((0.0, top) for top in (1e-30, 5e-324, 1e9, 1e30)), (7.0, 7.0), (1e30, -1e30)],
+)
+def test_magnitudes_of_any_scale(ends):
     surface = plane(4, 4)
     rho = 10.0 ** np.linspace(-29, 29, surface.face_count)[:, None]
     gbuffer = project_surface(surface, RosyField(4, rho * [1.0, 0, 0]), 16)
-    look = plain(magnitude="both", magnitude_range=magnitude_range, supersampling=1)
+    look = plain(hue="magnitude", magnitude_length=True, color_range=ends, supersampling=1)
     assert np.isfinite(compose(gbuffer, look).rgba).all()
 
 

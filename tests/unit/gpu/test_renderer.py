@@ -465,18 +465,6 @@ def test_union_of_boxes():
 
 
 @pytest.fixture(scope="module")
-def device():
-    """A plain OpenGL context."""
-    pytest.importorskip("moderngl", reason="no moderngl")
-    from harness.egl_device import EglDevice
-
-    try:
-        return EglDevice()
-    except Exception as error:
-        pytest.skip(f"no OpenGL context through EGL: {error}")
-
-
-@pytest.fixture(scope="module")
 def card(device):
     return GpuRenderer(device)
 
@@ -539,22 +527,32 @@ def test_all_degrees(card, degree, perspective):
 
 LOOKS = {
     "default": {},
-    "color noise": {"noise": "color"},
-    "color noise, three directions": {"noise": "color", "degree": 3},
-    "magnitude as color": {"magnitude": "color"},
-    "magnitude as color, with a range": {"magnitude": "color", "magnitude_range": 0.8},
-    "magnitude as gray": {"magnitude": "color", "color_map": "gray"},
-    "magnitude as length": {"magnitude": "length"},
-    "magnitude as length, with a range": {"magnitude": "length", "magnitude_range": 1.5},
-    "magnitude as both": {"magnitude": "both", "color_map": "magma"},
-    "magnitude as both, with a range": {"magnitude": "both", "magnitude_range": 0.9, "degree": 2},
+    "color noise": {"hue": "noise"},
+    "color noise, three directions": {"hue": "noise", "degree": 3},
+    "magnitude as color": {"hue": "magnitude"},
+    "magnitude as color, with a range": {"hue": "magnitude", "color_range": (0.0, 0.8)},
+    "magnitude as both, with an inverted range": {
+        "hue": "magnitude",
+        "magnitude_length": True,
+        "color_range": (1.1, 0.6),
+    },
+    "magnitude as gray": {"hue": "magnitude", "color_map": "gray"},
+    "magnitude as length": {"magnitude_length": True},
+    "magnitude as length, with a range": {"magnitude_length": True, "color_range": (0.0, 1.5)},
+    "magnitude as both": {"hue": "magnitude", "magnitude_length": True, "color_map": "magma"},
+    "magnitude as both, with a range": {
+        "hue": "magnitude",
+        "magnitude_length": True,
+        "color_range": (0.0, 0.9),
+        "degree": 2,
+    },
     "families, of a field without families": {"hue": "families"},
     "oriented, three directions": {"oriented": True, "degree": 3, "density": 0.03},
     "oriented, of lines without a direction": {"oriented": True},
     "foreshortened": {"foreshorten": True},
     "foreshortened, three directions": {"foreshorten": True, "degree": 3},
     "supersampled": {"supersampling": 2},
-    "supersampled color noise": {"supersampling": 2, "noise": "color", "degree": 3},
+    "supersampled color noise": {"supersampling": 2, "hue": "noise", "degree": 3},
     "guided": {"guiding_angle": 0.7},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
     "flat": {"display": "flat"},
@@ -565,7 +563,7 @@ LOOKS = {
     "coarse noise": {"grain": 5.0, "seed": 7},
     "long": {"length": 200},
     "on the surface": {"anchor": "surface"},
-    "on the surface, color noise": {"anchor": "surface", "noise": "color", "high_pass": 0.0},
+    "on the surface, color noise": {"anchor": "surface", "hue": "noise", "high_pass": 0.0},
     "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
     "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
     "hatched, oriented": {
@@ -601,7 +599,8 @@ LOOKS = {
         "ink": "hatch",
         "breaks": 0.8,
         "shading": 0.9,
-        "magnitude": "both",
+        "hue": "magnitude",
+        "magnitude_length": True,
         "degree": 3,
     },
     "hatched, wobbling": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5},
@@ -638,22 +637,21 @@ LOOKS = {
         "paper_color": "#101020",
         "degree": 4,
         "shading": 0.9,
-        "ink_ramp": True,
-        "ink_color_light": "#fff0f0",
     },
     "hatched, ink ramp": {
         "ink": "hatch",
-        "ink_ramp": True,
+        "hue": "tone",
         "ink_color": "#101848",
         "ink_color_light": "#e08050",
         "shading": 1.0,
     },
-    "hatched, ink ramp with a middle ink": {
+    "hatched, ink ramp, light on dark": {
         "ink": "hatch",
-        "hue": "families",
-        "ink_ramp": True,
-        "ink_middle": 0.3,
-        "shading": 1.0,
+        "hue": "tone",
+        "ink_color": "#ffd060",
+        "ink_color_light": "#fff0f0",
+        "paper_color": "#101020",
+        "shading": 0.9,
     },
     "in Blender units": {"anchor": "surface", "unit": "world", "unit_size": 0.007},
     "in Blender units, anchored to the picture": {
@@ -696,7 +694,7 @@ LOOKS = {
         "paper_color": "#101020",
         "shading": 1.0,
         "overshoot": 20.0,
-        "magnitude": "length",
+        "magnitude_length": True,
     },
     "hatched, all effects": {
         "ink": "hatch",
@@ -712,10 +710,9 @@ LOOKS = {
     },
     "fine on small features": {"anchor": "surface", "detail": 0.7, "grain": 2.5, "degree": 4},
     "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
-    "even lines": {"ink": "hatch", "lines": "even", "shading": 0.9, "grain": 3.0},
+    "even lines": {"ink": "even", "shading": 0.9, "grain": 3.0},
     "even lines, supersampled": {
-        "ink": "hatch",
-        "lines": "even",
+        "ink": "even",
         "shading": 0.9,
         "light": "lamp",
         "grain": 2.8,
@@ -725,8 +722,7 @@ LOOKS = {
         "guiding_angle": 0.5,
     },
     "even lines of an odd degree, soft": {
-        "ink": "hatch",
-        "lines": "even",
+        "ink": "even",
         "shading": 0.8,
         "grain": 4.0,
         "degree": 3,
@@ -734,8 +730,7 @@ LOOKS = {
         "hue": "families",
     },
     "even lines in Blender units, uneven": {
-        "ink": "hatch",
-        "lines": "even",
+        "ink": "even",
         "anchor": "surface",
         "unit": "world",
         "unit_size": 0.012,
@@ -757,17 +752,17 @@ DRIFTING_LOOKS = {
     "drifting, two directions, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
     "drifting, three directions": DRIFTING | {"taper": True, "degree": 3, "flow_distance": 13.0},
     "drifting on the surface": DRIFTING | {"anchor": "surface"},
-    "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
+    "drifting, magnitude as both": DRIFTING | {"hue": "magnitude", "magnitude_length": True},
     "drifting, short streaks": DRIFTING
     | {"length": 9, "flow_distance": 40.0, "step": 0.6, "supersampling": 2},
     "drifting, hatched, with breaks": DRIFTING
     | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
     "drifting, hatched, breaks and length by magnitude": DRIFTING
-    | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude": "length", "degree": 3}
+    | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude_length": True, "degree": 3}
     | {"overshoot": 15.0},
     "drifting breaks of even lines": DRIFTING
-    | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
-    "color noise, which does not drift": DRIFTING | {"noise": "color"},
+    | {"ink": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
+    "color noise, which does not drift": DRIFTING | {"hue": "noise"},
 }
 ALL_LOOKS = LOOKS | DRIFTING_LOOKS
 #: Looks that take long, and of which others have every part.
@@ -889,8 +884,8 @@ def test_a_headlight_ignores_lights(card):
 TONED = {
     "unchanged": {},
     "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
-    "tone curve": {"tone_black": 0.2, "tone_white": 0.7, "tone_gamma": 1.8},
-    "inverted": {"tone_black": 1.0, "tone_white": 0.0},
+    "tone curve": {"tone_levels": (0.2, 0.7, 1.8)},
+    "inverted": {"tone_levels": (1.0, 0.0, 1.0)},
     "hatched": {"ink": "hatch", "grain": 3.0},
 }
 
@@ -947,7 +942,7 @@ def test_tones_of_pictures(card, name, resolution):
 def test_meshes_without_a_tone_use_the_light(card):
     instances = [toned(waves(), matrix=placed(0.5 * np.eye(3), (-0.6, 0, 0)))]
     instances.append(ball(4, placed(0.5 * np.eye(3), (0.6, 0, 0))))
-    look = replace(LOOK, tone="attribute", tone_gamma=1.5, shading=0.8)
+    look = replace(LOOK, tone="attribute", tone_levels=(0.0, 1.0, 1.5), shading=0.8)
     assert_parity(card, instances, view(), look)
 
 
@@ -970,13 +965,11 @@ COLORED = {
         "shading": 0.95,
         "light": "lamp",
         "grain": 3.0,
-        "values_low": -1.0,
-        "values_high": 1.0,
+        "color_range": (-1.0, 1.0),
         "color_map": "gray",
     },
-    "a range, inverted": {"values_low": 0.8, "values_high": 0.2, "color_map": "magma"},
-    "colored noise": {"noise": "color"},
-    "with tones": {"tone": "attribute", "tone_gamma": 1.5},
+    "a range, inverted": {"color_range": (0.8, 0.2), "color_map": "magma"},
+    "with tones": {"tone": "attribute", "tone_levels": (0.0, 1.0, 1.5)},
 }
 
 
@@ -1194,9 +1187,10 @@ def test_free_directions_with_uneven_lines(card, name):
     assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
 
 
+@pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])
 @pytest.mark.parametrize("hue", ["one", "families"])
-def test_ink_on_clear_paper(card, hue):
-    look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, grain=3.0)
+def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
+    look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, grain=3.0)
     pair = draw_pair(ROSY, card, [ball(4)], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
@@ -1223,15 +1217,15 @@ def grid_position(index):
     return (0.75 * (index % 2) - 0.4, 0.2 * index, 0.9 * (index // 2) - 0.45)
 
 
-@pytest.mark.parametrize("magnitude", ["none", "both"])
-def test_several_meshes_of_several_degrees(card, magnitude):
+@pytest.mark.parametrize("settings", [{}, {"hue": "magnitude", "magnitude_length": True}], ids=str)
+def test_several_meshes_of_several_degrees(card, settings):
     """Some are occluded, and some are instances of one mesh."""
     instances = [
         ball(degree, placed((0.3 + 0.05 * index) * rotation(index, 0, 1), grid_position(index)))
         for index, degree in enumerate((1, 4, 3, 4))
     ]
     instances.append(ball(6, placed(0.9 * np.eye(3), (0, 2, 0))))
-    assert_parity(card, instances, view(), replace(LOOK, magnitude=magnitude))
+    assert_parity(card, instances, view(), replace(LOOK, **settings))
 
 
 def test_free_directions_and_a_rosy_of_one_degree(card):
@@ -1275,10 +1269,10 @@ def test_meshes_without_a_field_occlude(card, samples):
 UNDEFINED_LOOKS = {
     "soft": {},
     "families": {"hue": "families"},
-    "magnitude": {"magnitude": "both"},
+    "magnitude": {"hue": "magnitude", "magnitude_length": True},
     "hatched": {"ink": "hatch", "shading": 1.0},
-    "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "color"},
-    "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
+    "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families"},
+    "hatched, even lines": {"ink": "even", "shading": 1.0, "grain": 2.2},
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
     "drifting": DRIFTING,
     "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "taper": True},
@@ -1305,7 +1299,11 @@ def test_where_the_field_is_undefined(card, degree, name):
 def test_a_field_that_is_undefined_everywhere(card):
     field = RosyField(4, np.zeros((BALL.face_count, 3)))
     items = card.upload([MeshInstance(BALL, np.eye(4), field)], "smooth")
-    for look in (LOOK, replace(LOOK, magnitude="both"), replace(LOOK, hue="families")):
+    for look in (
+        LOOK,
+        replace(LOOK, hue="magnitude", magnitude_length=True),
+        replace(LOOK, hue="families"),
+    ):
         rgba = card.read(render_texture(card, items, view(), look), *SIZE)
         assert np.isfinite(rgba).all()
         assert rgba[..., 3].any()
@@ -1347,7 +1345,7 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [MeshInstance(tube, placed(distortion), field)], camera)
 
 
-EVEN_LINES = replace(LOOK, ink="hatch", lines="even", shading=0.9, grain=3.0)
+EVEN_LINES = replace(LOOK, ink="even", shading=0.9, grain=3.0)
 
 
 def partly_undefined():
@@ -1615,7 +1613,7 @@ def test_a_skewed_projection(card):
 @pytest.mark.parametrize("top", [0.0, 0.7])
 def test_the_range_of_the_colors(card, supersampling, top):
     """It is numpy's, and a look with this range gives the same picture."""
-    look = replace(LOOK, magnitude="color", magnitude_range=top, supersampling=supersampling)
+    look = replace(LOOK, hue="magnitude", color_range=(0.0, top), supersampling=supersampling)
     instances = [ball(4), MeshInstance(BALL, placed(shift=(0, 0, -9)), axis_field(BALL, 2))]
     drawn, expected = (
         draw(renderer, ViewInput(tuple(instances), view(), look)) for renderer in (card, None)
@@ -1624,18 +1622,18 @@ def test_the_range_of_the_colors(card, supersampling, top):
     tolerance = 1e-4 if supersampling == 1 else 5e-3
     assert drawn.color_range == pytest.approx(expected.color_range, rel=tolerance)
     assert (drawn.color_range == (0.0, 0.7)) == bool(top)
-    fixed = replace(look, magnitude_range=drawn.color_range[1])
+    fixed = replace(look, color_range=drawn.color_range)
     again = draw(card, ViewInput(tuple(instances), view(), fixed))
     np.testing.assert_allclose(again.rgba, drawn.rgba, atol=1e-6)
 
 
 def test_no_common_range_of_the_colors(card):
     """Fields of several degrees have ranges of their own."""
-    look = replace(LOOK, magnitude="color")
+    look = replace(LOOK, hue="magnitude")
     instances = ball(4), MeshInstance(BALL, placed(shift=(0.7, 0, 0)), axis_field(BALL, 2))
     for renderer in (card, None):
         picture = draw(renderer, ViewInput(instances, view(), look))
         assert picture.color_range is None
-    look = replace(look, magnitude="length")
+    look = replace(look, hue="one", magnitude_length=True)
     picture = draw(card, ViewInput(instances[:1], view(), look))
     assert picture.color_range is None

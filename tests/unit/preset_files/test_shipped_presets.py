@@ -32,7 +32,7 @@ BAD = {
     '{"name": "a", "description": "b", "look": {"length": -3}}': "setting 'length' is -3",
     '{"name": "a", "description": "b", "look": {"length": "long"}}': "setting 'length' is 'long'",
     '{"name": "a", "description": "b", "look": {"gain": NaN}}': "setting 'gain' is nan",
-    '{"name": "a", "description": "b", "look": {"noise": "brown"}}': "setting 'noise' is 'brown'",
+    '{"name": "a", "description": "b", "look": {"hue": "brown"}}': "setting 'hue' is 'brown'",
 }
 
 

@@ -18,7 +18,7 @@ from PIL import Image
 from rosy_addon.cli.parser import main
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.errors import RosyError
-from rosy_addon.core.settings import Choice, Color, Switch
+from rosy_addon.core.settings import Choice, Color, Numbers, Switch
 from rosy_addon.image_io.png import to_srgb_uint8
 from rosy_addon.preset_files import store
 from rosy_addon.preset_files.preview import PREVIEW_SIZE, draw_preview
@@ -46,11 +46,15 @@ def values_of(entry):
     """Return a strategy for all values that a setting may have."""
     setting = entry.metadata["setting"]
     if isinstance(setting, Color):
-        return st.integers(0, 0xFFFFFF).map("#{:06x}".format) | st.just("#AbCdEf")
+        with_alpha = st.integers(0, 0xFFFFFFFF).map("#{:08x}".format)
+        plain = st.integers(0, 0xFFFFFF).map("#{:06x}".format) | st.just("#AbCdEf")
+        return plain | with_alpha if setting.has_alpha else plain
     if isinstance(setting, Choice):
         return st.sampled_from(list(setting.options))
     if isinstance(setting, Switch):
         return st.booleans()
+    if isinstance(setting, Numbers):
+        return st.tuples(*(st.floats(low, high) for low, high in setting.parts.values()))
     if setting.is_integer:
         return st.integers(setting.low, setting.high)
     return st.floats(setting.low, setting.high)
@@ -97,11 +101,12 @@ def test_a_preset_is_read_as_it_was_written(tmp_path, name, description, look):
     write_preset(path, Preset(name, description, look))
     assert read_preset(path) == Preset(name, description, look)
     stored = json.loads(path.read_text(encoding="utf-8"))["look"]
-    assert stored == {
+    changed = {
         entry.name: getattr(look, entry.name)
         for entry in fields(Look)
         if getattr(look, entry.name) != entry.default
     }
+    assert stored == json.loads(json.dumps(changed))
 
 
 def test_files_are_readable_by_people(tmp_path):
@@ -148,10 +153,10 @@ HOSTILE = {
     "infinite": ((HEAD + '"gain": 1e999}}').encode(), "setting 'gain' is inf"),
     "minus infinite": ((HEAD + '"gain": -Infinity}}').encode(), "setting 'gain' is -inf"),
     "list": (
-        (HEAD + '"noise": ["gray"]}}').encode(),
-        "setting 'noise' is ['gray'], expected one of",
+        (HEAD + '"hue": ["one"]}}').encode(),
+        "setting 'hue' is ['one'], expected one of",
     ),
-    "object": ((HEAD + '"noise": {}}}').encode(), "setting 'noise' is {}, expected one of"),
+    "object": ((HEAD + '"hue": {}}}').encode(), "setting 'hue' is {}, expected one of"),
     "null": ((HEAD + '"gain": null}}').encode(), "setting 'gain' is None, expected a number"),
     "bool": (
         (HEAD + '"length": true}}').encode(),
@@ -171,7 +176,7 @@ HOSTILE = {
     "name twice": (b'{"name": "a", "name": "b"}', "'name' appears twice"),
     "newer": ((HEAD + '"sparkle": 1}}').encode(), "unknown setting 'sparkle': check its spelling"),
     "newer, long": ((HEAD + f'"{"x" * 60_000}": 1' + "}}").encode(), "unknown setting 'xxx"),
-    "long text": ((HEAD + f'"noise": "{"x" * 60_000}"' + "}}").encode(), "setting 'noise' is 'xxx"),
+    "long text": ((HEAD + f'"hue": "{"x" * 60_000}"' + "}}").encode(), "setting 'hue' is 'xxx"),
     "lines in a key": ((HEAD + '"a\\nb": 1}}').encode(), "unknown setting 'a\\nb'"),
     "UTF-16": ('{"name": "a"}'.encode("utf-16"), "binary data"),
     "Latin-1": ('{"name": "Schräg"}'.encode("latin-1"), "not UTF-8"),
@@ -315,7 +320,7 @@ def test_a_saved_preset_is_found(user_folder):
 
 def test_previews_of_looks_that_need_a_scene():
     """The tone is the light. The numbers run from left to right, through the whole map."""
-    look = Look(hue="values", values_low=90.0, tone="attribute", shading=0.0)
+    look = Look(hue="values", color_range=(90.0, 0.0), tone="attribute", shading=0.0)
     colors = draw_preview(look).reshape(-1, 4)[:, :3]
     is_purple = (colors[:, 2] > 2 * colors[:, 1]) & (colors[:, 0] > colors[:, 1])
     is_yellow = (colors[:, 1] > 3 * colors[:, 2]) & (colors[:, 0] > 0.3 * colors[:, 1])
@@ -449,10 +454,10 @@ def test_shipped_previews_show_their_looks(name):
     "look",
     [
         Look(method="brute", length=8000),
-        Look(method="members", length=8000, step=0.05, noise="color"),
+        Look(method="members", length=8000, step=0.05, hue="noise"),
         *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
-        Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
-        Look(light="scene", hue="families", display="flat", magnitude="both"),
+        Look(anchor="surface", ink="hatch", paper_color="#ffffff00", layers=12, grain=0.5),
+        Look(light="scene", display="flat", hue="magnitude", magnitude_length=True),
     ],
     ids=["brute", "members", "large", "ink", "others"],
 )
@@ -474,7 +479,7 @@ def test_previews_of_looks_differ():
     ink = Look(ink="hatch", paper_color="#ff0000")
     corner = draw_preview(ink)[0, 0]
     np.testing.assert_allclose(corner, [1, 0, 0, 1], atol=1e-6)
-    assert (draw_preview(replace(ink, clear_paper=True))[0, 0] == corner).all()
+    assert (draw_preview(replace(ink, paper_color="#ff000000"))[0, 0] == corner).all()
 
 
 # --- the command line ------------------------------------------------------------------------

@@ -53,8 +53,8 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     instance = MeshInstance(surface, np.eye(4), RosyField(4, field.vectors * middle))
     points = surface_points(surface, 20_000)
     for changes in (
-        {"noise": "color"},
-        {"magnitude": "both"},
+        {"hue": "noise"},
+        {"hue": "magnitude", "magnitude_length": True},
         {"taper": True},
         {"method": "ibfv"},
     ):
@@ -74,9 +74,9 @@ UNEVEN = {"wobble": 0.5, "breaks": 0.5, "paper_grain": 0.3}
 @pytest.mark.parametrize(
     ("settings", "lights"),
     [
-        ({"lines": "even"}, None),
+        ({"ink": "even"}, None),
         (UNEVEN, [LAMP]),
-        *long(({"lines": "even"}, [LAMP]), (UNEVEN, None)),
+        *long(({"ink": "even"}, [LAMP]), (UNEVEN, None)),
     ],
     ids=str,
 )
@@ -212,7 +212,7 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
     grid = plane(1, 200)
     surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))
-    look = Look(grain=1.0).with_settings({"ink": "hatch", "lines": "even"})
+    look = Look(grain=1.0).with_settings({"ink": "even"})
     draw_texture(instance_of(surface, 2), uv, look, 16)
     assert counts[0] < 2 * hatching.TRIANGLES_PER_TEXEL * 16**2
 

@@ -16,8 +16,9 @@ from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface, orientation_warning
-from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..rosy_addon.scene.guides import (
+    GUIDE_ATTRIBUTE,
+    STROKE_FIRMNESS,
     annotation_strokes,
     corner_uvs,
     guide_objects,

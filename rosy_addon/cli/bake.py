@@ -82,7 +82,7 @@ def run_bake(options: Options) -> None:
     scene = open_scene(options, "bake", options.scene)
     import bpy
 
-    from ..scene.blend_files import save_blend
+    from ..scene.files import save_blend
     from ..scene.pictures import is_beside_blend, read_output_settings
 
     out = None if options.out is None else Path(os.path.realpath(options.out))

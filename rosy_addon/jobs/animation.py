@@ -29,13 +29,14 @@ from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
-from ..scene.backdrop import update_backdrops
 from ..scene.bake_records import DrawnFrom
 from ..scene.blender_images import frame_path, write_frame
+from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, frame_camera
 from ..scene.evaluated_field import temp_attributes
-from ..scene.file_names import picture_stem
+from ..scene.files import picture_stem
 from ..scene.keys import update_keys
+from ..scene.look_inputs import nonfinite_policy
 from ..scene.look_properties import look_at_frame, read_look
 from ..scene.picture_state import PictureState, read_picture_states
 from ..scene.pictures import (
@@ -45,7 +46,6 @@ from ..scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from ..scene.read_request import nonfinite_policy
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
 from ..scene.visible_objects import field_objects

@@ -12,8 +12,8 @@ from ..compositor.look import Look, is_hatched
 from ..compositor.picture_key import picture_key
 from ..core.cache import BAKE_CACHE
 from ..gpu.select import image_steps, select_device
-from ..scene.backdrop import update_backdrops
 from ..scene.bake_records import DrawnFrom
+from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, render_camera
 from ..scene.keys import update_keys
 from ..scene.look_properties import look_at_frame, read_look

@@ -12,12 +12,11 @@ from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
-from ..scene.color_inputs import color_attribute_of
-from ..scene.lights import read_lights
+from ..scene.look_inputs import color_attribute_of
 from ..scene.look_properties import read_look
 from ..scene.picture_state import bakes_light, read_texture_state
 from ..scene.pictures import OutputSettings, check_targets, read_output_settings
-from ..scene.read_view import scene_depsgraph
+from ..scene.read_view import read_lights, scene_depsgraph
 from ..scene.textures import Hatching, apply_texture, read_texture_input, uv_map_name
 from ..surface_texture.draw import (
     TextureSettings,

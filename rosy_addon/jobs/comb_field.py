@@ -11,11 +11,10 @@ from ..field.guide_brush import BrushStroke, GuideBrush
 from ..field.guided_system import guided_system
 from ..field.rosy_field import RosyField
 from ..scene.brush_surface import closest_faces
-from ..scene.combed_guides import check_guides_storable, read_combed_guides, store_combed_guides
 from ..scene.field_attributes import is_face_vector_field
+from ..scene.guides import check_guides_storable, read_combed_guides, store_combed_guides
+from ..scene.mesh_fields import assign_fields, check_writable, overwrite_vectors, read_mesh_field
 from ..scene.meshes import mesh_surface
-from ..scene.read_field import read_mesh_field
-from ..scene.write_field import assign_fields, check_writable, overwrite_vectors
 from ..worker.job import Call, Steps
 
 

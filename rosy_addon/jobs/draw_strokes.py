@@ -19,9 +19,8 @@ from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
-from ..scene.lights import read_lights
-from ..scene.read_request import ReadRequest, nonfinite_policy
-from ..scene.read_view import scene_depsgraph
+from ..scene.look_inputs import ReadRequest, nonfinite_policy
+from ..scene.read_view import read_lights, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
 from ..scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 from ..worker.job import Call, Step, Steps, job

@@ -19,11 +19,11 @@ from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..projection.camera import Camera
-from .backdrop import update_backdrops
+from .camera_planes import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
+from .datablocks import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .keys import update_keys
 from .look_properties import read_look
-from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import (
     has_applied_picture,
     image_of_material,

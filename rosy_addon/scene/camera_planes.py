@@ -1,4 +1,4 @@
-"""Planes in front of cameras that only these see: backdrops and keys."""
+"""Planes in front of cameras that only these see, and the backdrops among them."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..compositor.look import is_hatched
+from ..core.color import from_hex, to_linear
 from ..projection.camera import Camera
-from .cameras import FRAME_CAMERAS
-from .owned_data import delete_owned
+from .cameras import FRAME_CAMERAS, camera_of_object
+from .datablocks import delete_owned, rollback_on_error
+from .look_properties import read_look
+from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
+from .read_view import scene_depsgraph
 
 #: Visibility to rays; only camera rays meet a plane.
 HIDDEN_FROM = (
@@ -123,3 +128,41 @@ def frame_corners(camera: Camera, distance: float, size: float = 1.0) -> np.ndar
     ]
     corners = np.array(clip) @ np.linalg.inv(camera.projection).T
     return corners[:, :3] / corners[:, 3:]
+
+
+#: Custom property on the objects of backdrops.
+BACKDROP_TAG = "rosy_backdrop"
+
+#: Distance of a backdrop from the camera, as a fraction of the end of the clip range.
+DISTANCE = 0.99
+
+#: Size of a backdrop relative to the frame, so that it also fills the frame if the lens or the size of
+#: renders changes a little.
+OVERSIZE = 1.5
+
+
+def update_backdrops(scene: bpy.types.Scene) -> None:
+    """Create the backdrops of a scene anew, and remove those that it should not have.
+
+    If the switch is on and lines are drawn on paper, every camera with a picture has a backdrop with
+    the color of the paper. For animations, it is the active camera of the scene.
+    """
+    remove_camera_planes(scene, BACKDROP_TAG)
+    look = read_look(scene.rosy)
+    if scene.rosy.backdrop and is_hatched(look):
+        for camera in pictured_cameras(scene):
+            _add_backdrop(scene, camera, look.paper_color)
+
+
+def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) -> None:
+    """Add a plane with the color of the paper, parented to a camera."""
+    name = f"RoSy Backdrop {camera.name}"
+    view = camera_of_object(scene, scene_depsgraph(scene), camera)
+    corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)
+    with rollback_on_error() as created:
+        color = (*to_linear(from_hex(paper)).tolist(), 1.0)
+        material = new_emissive_material(name, color, scene.rosy.emission)
+        created.append(material)
+        material.diffuse_color = color  # in views with Solid shading
+        material.use_backface_culling = True
+        add_camera_plane(scene, camera, name, BACKDROP_TAG, corners, material, created)

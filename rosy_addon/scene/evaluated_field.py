@@ -21,19 +21,19 @@ from ..field.validate import (
     project_to_tangent,
     tangent_normals,
 )
-from .compat import is_editable
+from .datablocks import is_editable, user_modifiers
 from .field_attributes import (
     VECTOR_TYPE,
     attribute_name,
     cached_field,
     field_degree,
     field_values,
+    follow_mesh,
     is_face_vector_field,
+    read_rest_shape,
 )
+from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, read_attribute
-from .owned_data import user_modifiers
-from .read_field import read_mesh_field
-from .rest_shape import follow_mesh, read_rest_shape
 
 #: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
 #: field's vectors are tangent. Modifiers copy it to the evaluated mesh.

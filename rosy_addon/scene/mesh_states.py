@@ -12,12 +12,10 @@ import numpy as np
 
 from ..core.cache import content_hash
 from ..field.rosy_field import MAX_DEGREE
-from .color_inputs import color_values_digest
+from .datablocks import user_modifiers
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
+from .look_inputs import ReadRequest, color_values_digest, tone_digest
 from .meshes import read_attribute, shape_digest, vertex_positions
-from .owned_data import user_modifiers
-from .read_request import ReadRequest
-from .tone_inputs import tone_digest
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,9 @@ import numpy as np
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .compat import is_editable
+from .datablocks import KEY_TAG, OWNED_TAG, is_editable, is_rosy_modifier, removable_modifiers
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
-from .owned_data import KEY_TAG, OWNED_TAG, is_rosy_modifier, removable_modifiers
 from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.

@@ -22,14 +22,12 @@ from ..core.settings import settings_of
 from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
-from .color_inputs import color_values_digest
 from .field_attributes import attribute_name, field_degree
-from .lights import rendered_lights
+from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
 from .look_properties import read_look
 from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
 from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
-from .read_request import ReadRequest, read_request
-from .tone_inputs import reference_path
+from .read_view import rendered_lights
 from .visible_objects import field_objects, rendered_instances
 
 #: Properties of ``scene.rosy`` that decide how a picture is stored and shown, and not how it is

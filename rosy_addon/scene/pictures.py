@@ -33,10 +33,15 @@ from .bake_records import (
     store_record,
 )
 from .blender_images import load_sequence, new_image
-from .compat import is_editable
-from .file_names import picture_stem
+from .datablocks import (
+    OWNED_TAG,
+    delete_unused,
+    is_editable,
+    removable_modifiers,
+    rollback_on_error,
+)
+from .files import picture_stem
 from .keys import update_keys
-from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
 from .picture_nodes import (
     new_group,
     new_material,

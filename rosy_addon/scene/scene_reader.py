@@ -23,10 +23,19 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .color_inputs import check_colored, read_color_values
+from .datablocks import remedy_for_absence, user_modifiers
 from .evaluated_field import Errors, FieldLayout, read_evaluated_field, temp_attributes
 from .field_attributes import attribute_name, field_degree, is_face_vector_field, surface_key
-from .libraries import remedy_for_absence
+from .look_inputs import (
+    FIELDS_ONLY,
+    ReadRequest,
+    check_colored,
+    check_tones,
+    read_color_values,
+    read_tone,
+    tone_image_key,
+)
+from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import (
     REST_ATTRIBUTE,
@@ -36,10 +45,6 @@ from .meshes import (
     polygon_arrays,
     read_attribute,
 )
-from .owned_data import user_modifiers
-from .read_field import read_mesh_field
-from .read_request import FIELDS_ONLY, ReadRequest
-from .tone_inputs import check_tones, read_tone, tone_image_key
 from .visible_objects import Instances, field_objects, rendered_instances
 
 #: The mesh instances of the last reading, in the cache.

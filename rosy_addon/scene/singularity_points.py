@@ -12,6 +12,9 @@ from ..field.rosy_field import RosyField
 from ..field.singularities import find_singularities
 from ..field.surface import Surface
 from ..field.validate import vertex_normals
+from .datablocks import OWNED_TAG, user_modifiers
+from .look_inputs import ReadRequest
+from .mesh_fields import read_mesh_field
 from .meshes import (
     evaluated_mesh,
     mesh_surface,
@@ -19,9 +22,6 @@ from .meshes import (
     read_collection,
     vertex_positions,
 )
-from .owned_data import OWNED_TAG, user_modifiers
-from .read_field import read_mesh_field
-from .read_request import ReadRequest
 from .scene_reader import read_scene
 
 #: Attributes of the points: the singularity index in units of 1 / N, and the degree N.

@@ -21,13 +21,17 @@ from ..core.errors import RosyError
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
-from .compat import has_grease_pencil_drawings, is_editable
-from .curves import INK_ATTRIBUTE, new_curves
-from .grease_pencil import new_grease_pencil
+from .datablocks import OWNED_TAG, is_editable, rollback_on_error
 from .look_properties import read_settings
 from .meshes import read_collection
-from .owned_data import OWNED_TAG, rollback_on_error
-from .surface_strokes import follow_surface, stop_following
+from .stroke_data import (
+    INK_ATTRIBUTE,
+    follow_surface,
+    has_grease_pencil_drawings,
+    new_curves,
+    new_grease_pencil,
+    stop_following,
+)
 from .visible_objects import field_objects
 
 #: The function that creates the data of each kind of object.

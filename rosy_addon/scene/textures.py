@@ -18,13 +18,13 @@ from ..image_io.image_data import ImageData
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, recorded_materials, store_record
 from .blender_images import new_image, new_tiled_image
-from .file_names import picture_stem
+from .datablocks import delete_unused, rollback_on_error
+from .files import picture_stem
+from .look_inputs import ReadRequest, nonfinite_policy
 from .meshes import evaluated_mesh, read_uvs
-from .owned_data import delete_unused, rollback_on_error
 from .picture_nodes import new_group, set_picture_modifier
 from .picture_state import PictureState
 from .pictures import OutputSettings
-from .read_request import ReadRequest, nonfinite_policy
 from .scene_reader import read_scene
 from .texture_nodes import (
     Hatching,

@@ -7,10 +7,8 @@ from collections.abc import Collection, Iterable, Iterator
 import bpy
 
 from ..core.errors import RosyError
-from .compat import has_rosy_properties
+from .datablocks import OWNED_TAG, check_object_type, has_rosy_properties, remedy_for_absence
 from .field_attributes import attribute_name, has_field
-from .libraries import check_object_type, remedy_for_absence
-from .owned_data import OWNED_TAG
 
 
 def field_objects(

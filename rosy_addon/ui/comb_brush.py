@@ -19,8 +19,8 @@ from mathutils import Vector
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..scene.brush_surface import BrushSurface
-from ..scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.field_attributes import attribute_name, field_degree, has_field, is_face_vector_field
+from ..scene.guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..scene.meshes import mesh_surface, read_attribute
 from ..viewport import session
 from .view_lines import draw_lines, to_pixels

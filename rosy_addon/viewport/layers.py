@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import bpy
 
 from ..compositor.look import Look
-from ..scene.read_request import ReadRequest, read_request
+from ..scene.look_inputs import ReadRequest, read_request
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 

@@ -12,7 +12,7 @@ from ..compositor.look import Look
 from ..compositor.target_tone import ReferenceRender
 from ..core.errors import REPORTED_ERRORS, RosyError, error_text
 from ..scene.cameras import render_camera
-from ..scene.tone_inputs import load_luminance, load_reference, reference_path
+from ..scene.look_inputs import load_luminance, load_reference, reference_path
 
 
 class ReferenceImages:

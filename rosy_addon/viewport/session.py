@@ -22,9 +22,9 @@ from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.marks import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
-from ..scene.lights import read_lights
+from ..scene.look_inputs import read_request
 from ..scene.look_properties import look_at_frame, read_look
-from ..scene.read_request import read_request
+from ..scene.read_view import read_lights
 from ..scene.scene_reader import check_sources
 from ..worker.helper import Helper
 from .background import view_background

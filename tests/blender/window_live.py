@@ -132,10 +132,10 @@ def bake_of_view(space=None, region=None, method="brute"):
     camera = rosy("rosy_addon.scene.cameras").camera_of_view(region, space.region_3d)
     scene = bpy.context.scene
     look = replace(rosy("rosy_addon.scene.look_properties").read_look(scene.rosy), method=method)
-    depsgraph, tones = bpy.context.evaluated_depsgraph_get(), rosy("rosy_addon.scene.tone_inputs")
-    request = rosy("rosy_addon.scene.read_request").read_request(scene, look)
+    depsgraph, tones = bpy.context.evaluated_depsgraph_get(), rosy("rosy_addon.scene.look_inputs")
+    request = rosy("rosy_addon.scene.look_inputs").read_request(scene, look)
     instances = rosy("rosy_addon.scene.scene_reader").read_scene(depsgraph, None, request).instances
-    lights = rosy("rosy_addon.scene.lights").read_lights(depsgraph, camera.view)
+    lights = rosy("rosy_addon.scene.read_view").read_lights(depsgraph, camera.view)
     reference = tones.load_reference(scene, depsgraph, scene.camera, look)
     gbuffer = rosy("rosy_addon.projection.project").project(instances, camera, look.display)
     compose = rosy("rosy_addon.compositor.compose").compose

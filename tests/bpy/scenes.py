@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
+from rosy.rosy_addon.scene.look_inputs import FIELDS_ONLY
+from rosy.rosy_addon.scene.mesh_fields import write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
-from rosy.rosy_addon.scene.read_request import FIELDS_ONLY
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.visible_objects import shown_instances
-from rosy.rosy_addon.scene.write_field import write_mesh_field
 from rosy.rosy_addon.worker.job import Call
 
 

@@ -14,16 +14,16 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon import animation
 from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.gpu.select import select_device
+from rosy.rosy_addon.jobs import animation
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection import project as projection
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
-from rosy.rosy_addon.scene.file_names import picture_stem
+from rosy.rosy_addon.scene.files import picture_stem
 from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.ui.main_panel import bake_label
 from rosy.rosy_addon.worker.frame_workers import format_frames, parse_frames, run_local

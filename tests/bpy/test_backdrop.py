@@ -9,9 +9,8 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import from_hex, to_linear
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.scene.backdrop import update_backdrops
 from rosy.rosy_addon.scene.bake_records import remove_bakes
-from rosy.rosy_addon.scene.camera_planes import frame_corners
+from rosy.rosy_addon.scene.camera_planes import frame_corners, update_backdrops
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings

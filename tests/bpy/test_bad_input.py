@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon import memory
 from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.core import memory
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField
@@ -18,10 +18,9 @@ from rosy.rosy_addon.scene.guides import (
     guide_strokes_and_empties,
     guide_vectors,
 )
+from rosy.rosy_addon.scene.mesh_fields import assign_fields, read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import marked_edges, mesh_surface
-from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.visible_objects import field_objects
-from rosy.rosy_addon.scene.write_field import assign_fields, write_mesh_field
 from scenes import (
     add_camera,
     add_field,

@@ -13,9 +13,8 @@ from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes
-from rosy.rosy_addon.scene.color_inputs import color_attribute_of
+from rosy.rosy_addon.scene.look_inputs import ReadRequest, color_attribute_of
 from rosy.rosy_addon.scene.look_properties import read_look
-from rosy.rosy_addon.scene.read_request import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
 from rosy.rosy_addon.ui.look_panels import _draw_color_source

@@ -9,10 +9,9 @@ from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
-from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import SceneReader
-from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
     add_field,
     add_monkey,

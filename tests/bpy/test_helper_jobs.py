@@ -13,10 +13,13 @@ from rosy.rosy_addon.jobs.comb_field import CombStroke
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.jobs.render_turntable import render_turntable
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
-from rosy.rosy_addon.scene.field_difference import store_difference
-from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
+from rosy.rosy_addon.scene.computed_attributes import (
+    OCCLUSION_ATTRIBUTE,
+    mesh_tangents,
+    store_difference,
+    store_occlusion,
+)
 from rosy.rosy_addon.scene.pictures import OutputSettings
-from rosy.rosy_addon.scene.tangents import mesh_tangents
 from rosy.rosy_addon.worker.helper import Helper
 from rosy.rosy_addon.worker.job import run
 from rosy.rosy_addon.worker.step_runner import StepRunner
@@ -90,7 +93,7 @@ def difference(run_with, where, scene, monkey):
     monkey.data.attributes["rosy"].data.foreach_get("vector", values)
     attribute.data.foreach_set("vector", values)
     add_field(monkey, kind="axis")
-    return run_with(where, store_difference.begin(monkey.data, "other")).statistics
+    return run_with(where, store_difference.begin(monkey.data, "other"))[2].statistics
 
 
 def combed_field(run_with, where, scene, monkey):

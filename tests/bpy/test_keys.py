@@ -13,8 +13,7 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.bake_records import baked_objects, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.font_shapes import FontShapes
-from rosy.rosy_addon.scene.keys import round_length, update_keys
+from rosy.rosy_addon.scene.keys import FontShapes, round_length, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
 from scenes import add_camera, aim, contents, pixels, read_instances, render

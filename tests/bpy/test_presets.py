@@ -8,8 +8,8 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.preset_files import store
 from rosy.rosy_addon.preset_files.store import Preset, default_user_folder, preset_keys, save_preset
+from rosy.rosy_addon.scene.files import user_presets_folder
 from rosy.rosy_addon.scene.look_properties import read_look
-from rosy.rosy_addon.scene.paths import user_presets_folder
 from rosy.rosy_addon.ui import preset_library
 
 LOOK = Look(ink="hatch", gain=1.23456789, guiding_angle=0.1, ink_color="#ABCDEF", seed=7)

@@ -17,11 +17,10 @@ from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.evaluated_field import TEMP_FIELD_ATTRIBUTE
 from rosy.rosy_addon.scene.field_attributes import has_field
-from rosy.rosy_addon.scene.lights import read_lights
+from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
-from rosy.rosy_addon.scene.read_field import read_mesh_field
+from rosy.rosy_addon.scene.read_view import read_lights
 from rosy.rosy_addon.scene.visible_objects import field_objects
-from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
     add_field,
     add_mesh,

@@ -18,8 +18,8 @@ from rosy.rosy_addon.line_drawing.style import StrokeStyle
 from rosy.rosy_addon.line_drawing.svg import Pen
 from rosy.rosy_addon.line_drawing.visibility import pixel_size, project_to_pixels
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.compat import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.scene_reader import read_scene
+from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
 from scenes import add_camera, add_field, add_mesh, add_plane, contents, each_step, render

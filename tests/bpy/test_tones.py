@@ -12,16 +12,16 @@ from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
-from rosy.rosy_addon.scene.pictures import read_output_settings
-from rosy.rosy_addon.scene.read_request import ReadRequest
-from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from rosy.rosy_addon.scene.tone_inputs import (
+from rosy.rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
+from rosy.rosy_addon.scene.look_inputs import (
+    ReadRequest,
     ToneRequest,
     image_luminance,
     load_reference,
     make_tone_request,
 )
+from rosy.rosy_addon.scene.pictures import read_output_settings
+from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
 from scenes import add_field, add_mesh, add_plane, link, pixels, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -355,6 +355,6 @@ def test_occlusion_of_meshes_with_new_faces(scene, wall):
 
 def test_occlusion_does_not_replace_other_attributes(scene, wall):
     add_attribute(wall.data, OCCLUSION_ATTRIBUTE, "POINT", "FLOAT", np.arange(9))
-    with pytest.raises(RosyError, match="object 'Plane' already has an attribute 'Occlusion'"):
+    with pytest.raises(RosyError, match="mesh 'Plane' already has an attribute 'Occlusion'"):
         store_occlusion(depsgraph(), [wall], direction_count=4)
     assert wall.data.attributes[OCCLUSION_ATTRIBUTE].data[3].value == 3

@@ -8,8 +8,7 @@ import bpy
 import numpy as np
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.rendering.turntable import turntable_views
-from rosy.rosy_addon.scene.lights import read_lights
-from rosy.rosy_addon.scene.read_view import read_turntable
+from rosy.rosy_addon.scene.read_view import read_lights, read_turntable
 from scenes import add_monkey, link
 
 

@@ -1,11 +1,59 @@
-"""Names of the files of pictures, a different one for each camera and scene."""
+"""Files and folders: .blend files, the names of picture files, and the folder of the user's presets."""
 
 from __future__ import annotations
 
+import os
 import unicodedata
 import zlib
+from pathlib import Path
 
 import bpy
+
+from ..core.errors import RosyError
+from ..core.file_io import check_readable
+from ..preset_files.store import default_user_folder
+
+
+def open_blend(path: Path) -> None:
+    """Open a .blend file. It replaces the file that is open.
+
+    Raises
+    ------
+    RosyError
+        If the file is missing or cannot be read.
+    """
+    check_readable(path)
+    try:
+        bpy.ops.wm.open_mainfile(filepath=os.path.realpath(path), load_ui=False)
+    except RuntimeError as reason:
+        raise RosyError(f"{path}: cannot be read: {_one_line(reason)}") from None
+
+
+def save_blend() -> str:
+    """Save the open file under its name, and return its path.
+
+    Raises
+    ------
+    RosyError
+        If the file was never saved, or cannot be written.
+    """
+    path = bpy.data.filepath
+    if not path:
+        raise RosyError(
+            "--save: the open file was never saved and has no name: save it in Blender first"
+        )
+    try:
+        bpy.ops.wm.save_mainfile()
+    except RuntimeError as reason:
+        raise RosyError(f"{path}: cannot be written: {_one_line(reason)}") from None
+    return path
+
+
+def _one_line(error: RuntimeError) -> str:
+    """Return the message of one of Blender's errors as one line."""
+    lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
+    return "; ".join(line for line in lines if line)
+
 
 #: Largest number of bytes of a stem. File systems allow 255 for a whole name, which also has a hash, a
 #: number and suffixes.
@@ -52,3 +100,21 @@ def _clean_stem(name: str, ending: str) -> str:
 def _file_key(stem: str) -> str:
     """Return a text that is the same for stems which some file system takes for the same name."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", stem).casefold())
+
+
+#: Package name of the extension in Blender. This file is two packages below it.
+EXTENSION_ID = __package__.rsplit(".", 2)[0]
+
+
+def user_presets_folder() -> Path:
+    """Return the folder of the user's own presets. It may not exist yet.
+
+    It is in the folder that Blender provides for the files of an extension. If RoSy does not run as
+    an extension, or the environment variable ROSY_PRESETS is set, it is `default_user_folder`.
+    """
+    if not os.environ.get("ROSY_PRESETS"):
+        try:
+            return Path(bpy.utils.extension_path_user(EXTENSION_ID, path="presets"))
+        except ValueError:  # not installed as an extension
+            pass
+    return default_user_folder()

@@ -1,4 +1,8 @@
-"""Reading the inputs of tone: mesh attributes, images on meshes, and reference renders."""
+"""What a look draws from besides fields: tones, numbers for the color map, and reference renders.
+
+A `ReadRequest` says what a look needs of the meshes. Tones come from mesh attributes or from images on
+meshes, numbers from mesh attributes, and reference renders from files.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..compositor.look import Look
+from ..compositor.look import Look, colors_values
 from ..compositor.target_tone import ReferenceRender
 from ..core.cache import Cache, content_hash
 from ..core.color import luminance, to_linear
@@ -18,8 +22,8 @@ from ..core.errors import RosyError
 from ..core.file_io import check_readable
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
-from .compat import has_rosy_properties
-from .face_values import corner_scalars, filled_attribute
+from .datablocks import has_rosy_properties
+from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
 from .meshes import read_uvs
 
 
@@ -253,3 +257,135 @@ def load_luminance(path: Path) -> np.ndarray:
         raise RosyError(f"{path}: is not a picture that Blender can read") from None
     finally:
         bpy.data.images.remove(image)
+
+
+#: Types of attributes that messages list. Booleans are mostly Blender's own.
+LISTED_TYPES = ("FLOAT", "INT", *COLOR_TYPES)
+
+
+def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
+    """Return the name of the attribute whose numbers a look colors; None if it colors none."""
+    return scene.rosy.color_attribute if colors_values(look) else None
+
+
+def read_color_values(
+    mesh: bpy.types.Mesh,
+    name: str | None,
+    label: str,
+    cache: Cache | None = None,
+) -> np.ndarray | None:
+    """Read the numbers of an attribute.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Evaluated.
+    name : str or None
+        Of the attribute.
+    label : str
+        Of the object, in messages.
+    cache : Cache, optional
+        Keeps numbers that have not changed since an earlier call.
+
+    Returns
+    -------
+    (C,) float32 ndarray or None
+        At the corners; NaN where a number is not finite. None if the mesh has no such attribute.
+
+    Raises
+    ------
+    RosyError
+        If the type of the attribute is not supported.
+    """
+    attribute = filled_attribute(mesh, name) if name else None
+    if attribute is None:
+        return None
+    source = f"{label}, attribute '{attribute.name}'"
+    values = corner_scalars(attribute, mesh, source).astype(np.float32)
+    values[~np.isfinite(values)] = np.nan
+    if cache is None:
+        return values
+    return cache.get_or_create(("color values", content_hash(values)), lambda: values)
+
+
+def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
+    """Return a digest of what `read_color_values` reads; empty if the mesh has no such attribute.
+
+    If it cannot be read, it is the digest of the error.
+    """
+    try:
+        values = read_color_values(mesh, name, mesh.name)
+    except RosyError as error:
+        return content_hash(str(error))
+    return b"" if values is None else content_hash(values)
+
+
+def check_colored(
+    name: str | None, found: Sequence[tuple[np.ndarray | None, bpy.types.Object]]
+) -> None:
+    """Check that at least one object has the attribute whose numbers are colored.
+
+    Parameters
+    ----------
+    name : str or None
+        Of the attribute; None if there is none to color.
+    found : sequence of ((C,) ndarray or None, bpy.types.Object)
+        The numbers that were read, and their objects.
+
+    Raises
+    ------
+    RosyError
+        If no object has it. The message lists the attributes that exist.
+    """
+    if name is None or any(values is not None for values, _ in found):
+        return
+    names = ", ".join(f"'{obj.name}'" for obj in dict.fromkeys(owner for _, owner in found))
+    available = dict.fromkeys(
+        attribute.name
+        for _, owner in found
+        for attribute in owner.data.attributes
+        if attribute.data_type in LISTED_TYPES
+        and attribute.domain in ("POINT", "FACE", "CORNER")
+        and not attribute.name.startswith(".")
+    )
+    listing = ", ".join(f"'{other}'" for other in available) or "no suitable one"
+    if not name:
+        raise RosyError(
+            f"{names}: choose an attribute for the colors, under Look > Color: {listing}"
+        )
+    raise RosyError(f"{names}: there is no attribute '{name}' for the colors, only {listing}")
+
+
+@dataclass(frozen=True)
+class ReadRequest:
+    """What is read of meshes, and how.
+
+    Attributes
+    ----------
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    tone : ToneRequest or None
+        The source of the surface tones.
+    color_attribute : str or None
+        Name of the attribute whose numbers are read for the color map.
+    """
+
+    nonfinite: str = "error"
+    tone: ToneRequest | None = None
+    color_attribute: str | None = None
+
+
+#: Shapes and fields alone.
+FIELDS_ONLY = ReadRequest()
+
+
+def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
+    """Return what a look asks of the meshes of a scene, by the settings of the scene."""
+    return ReadRequest(
+        nonfinite_policy(scene), make_tone_request(scene, look), color_attribute_of(scene, look)
+    )
+
+
+def nonfinite_policy(scene: bpy.types.Scene) -> str:
+    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
+    return "zero" if scene.rosy.undefined else "error"

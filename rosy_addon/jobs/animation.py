@@ -14,13 +14,12 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
@@ -29,7 +28,6 @@ from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
-from ..scene.bake_records import DrawnFrom
 from ..scene.blender_images import frame_path, write_frame
 from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, frame_camera
@@ -126,15 +124,16 @@ def bake_animation(
     check_folder(settings.folder)
     remove_leftovers(settings.folder)
     frames = list(frames)
-    frame_results: dict[str, list[_FrameResult]] = {}
-    start_time, rendered_count = time.monotonic(), 0
-    scene_data = None
-    warnings: dict[str, None] = {}
     depsgraph = scene_depsgraph(scene)
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
     if show:
         check_targets(targets, settings)
     cache = Cache()  # of what was read; `_frame_steps` evicts what a frame has not used
+    start_time, rendered_count = time.monotonic(), 0
+    sequences: dict[str, list[_Frame]] = {}
+    scene_data = None
+    warnings: dict[str, None] = {}
+    # Added for each frame, they would cost two more evaluations of the scene: up to half of the time of reading.
     attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
     with _restored_frame(scene), attributes:
         for index, frame in enumerate(frames):
@@ -142,48 +141,41 @@ def bake_animation(
             label = f"frame {frame}{_time_left(start_time, rendered_count, len(frames) - index)}"
             yield Step(start, label)
             scene.frame_set(frame)
+            steps = _frame_steps(
+                scene, frame, cameras, objects, look, size, settings, cache, workers
+            )
             try:
-                steps = _frame_steps(
-                    scene, frame, cameras, objects, look, size, settings, cache, workers
-                )
-                scene_data, results = yield from part(steps, start, stop, label)
+                scene_data, drawn = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
             warnings |= dict.fromkeys(scene_data.warnings)
-            for result in results:
-                frame_results.setdefault(result.name, []).append(result)
+            for one in drawn:
+                sequences.setdefault(one.name, []).append(one)
             # Frames that are up to date take almost no time and do not count.
-            rendered_count += not all(result.up_to_date for result in results)
+            rendered_count += not all(one.up_to_date for one in drawn)
             if not rendered_count:
                 start_time = time.monotonic()
-        key = PictureKey()
+        results = [
+            _sequence_result(drawn, settings, cameras, tuple(warnings))
+            for drawn in sequences.values()
+        ]
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
             key = yield Call(sequence_key, (scene_data.instances, last_look), 1.0)
-        sequence_results = []
-        for index, (name, results) in enumerate(frame_results.items()):
-            path = _path_of_frame(settings, name, cameras, frames[0])
-            camera = results[-1].camera
-            sequence = ImageSequence(name, path, frames[0], frames[-1], camera.width, camera.height)
-            if show:
-                drawn_from = DrawnFrom(
+            for index, (result, drawn) in enumerate(zip(results, sequences.values(), strict=True)):
+                apply_sequence(
+                    scene,
+                    scene_data,
+                    result.sequence,
+                    drawn[-1].camera,
+                    settings,
                     None if cameras is None else cameras[index],
-                    {result.frame: result.state for result in results},
-                    results[-1].device,
+                    {one.frame: one.state for one in drawn},
                     key,
                 )
-                apply_sequence(scene, scene_data, sequence, camera, settings, drawn_from)
-            rendered, skipped = (
-                tuple(result.frame for result in results if result.up_to_date == up_to_date)
-                for up_to_date in (False, True)
-            )
-            sequence_results.append(
-                SequenceResult(name, rendered, skipped, sequence, tuple(warnings))
-            )
-        if show:
             update_backdrops(scene)
             update_keys(scene)
-        return sequence_results
+        return results
 
 
 @contextmanager
@@ -200,19 +192,18 @@ def _restored_frame(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameResult:
+class _Frame:
     """One frame of a sequence.
 
     Attributes
     ----------
     name : str
-        Of the sequence.
+        Name of the sequence.
     frame : int
     camera : Camera
     up_to_date : bool
         Whether the picture existed already.
     state : PictureState
-    device : {"cpu", "gpu"}
     """
 
     name: str
@@ -220,7 +211,24 @@ class _FrameResult:
     camera: Camera
     up_to_date: bool
     state: PictureState
-    device: str
+
+
+def _sequence_result(
+    drawn: Sequence[_Frame],
+    settings: OutputSettings,
+    cameras: Sequence[CameraSource] | None,
+    warnings: tuple[str, ...],
+) -> SequenceResult:
+    """Return the result of the frames of a sequence."""
+    first, last = drawn[0], drawn[-1]
+    path = _path_of_frame(settings, first.name, cameras, first.frame)
+    size = last.camera.width, last.camera.height
+    sequence = ImageSequence(first.name, path, first.frame, last.frame, *size)
+    rendered, skipped = (
+        tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
+        for up_to_date in (False, True)
+    )
+    return SequenceResult(first.name, rendered, skipped, sequence, warnings)
 
 
 def _frame_steps(
@@ -233,14 +241,14 @@ def _frame_steps(
     settings: OutputSettings,
     cache: Cache,
     workers: int,
-) -> Steps[tuple[SceneData, list[_FrameResult]]]:
+) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras."""
     look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)
     # The look may be animated, and its method decides which device can draw it.
     device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
-    scene_views = read_views(
+    views, scene_data = read_views(
         scene,
         depsgraph,
         sources,
@@ -251,10 +259,9 @@ def _frame_steps(
         cache=cache,
     )
     cache.evict_unused()
-    mesh_states = scene_views.scene_data.mesh_states
-    states = read_picture_states(scene, depsgraph, sources, mesh_states, is_frame=True)
-    results = []
-    for index, view in enumerate(scene_views.views):
+    states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states, is_frame=True)
+    drawn = []
+    for index, view in enumerate(views):
         start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
         path = _path_of_frame(settings, name, cameras, frame)
@@ -276,8 +283,9 @@ def _frame_steps(
             sidecar.unlink(missing_ok=True)
             write_frame(path, image_data)
             write_bytes(sidecar, _sidecar_text(input_hash, path))
-        results.append(_FrameResult(name, frame, view.camera, up_to_date, states[index], device))
-    return scene_views.scene_data, results
+        state = replace(states[index], device=device)
+        drawn.append(_Frame(name, frame, view.camera, up_to_date, state))
+    return scene_data, drawn
 
 
 def _path_of_frame(

@@ -54,7 +54,7 @@ class BakeInfo:
     Attributes
     ----------
     camera : str
-        Name of the camera, or ``3D View``; of a texture, the name of the object.
+        Name of the camera, or ``3D View``; for a texture, the name of the object.
     width, height : int
         Pixels.
     image : bpy.types.Image
@@ -88,39 +88,18 @@ class RemovalCounts(NamedTuple):
     images: int
 
 
-@dataclass(frozen=True)
-class DrawnFrom:
-    """What a picture or a sequence was drawn from, for its record.
-
-    Attributes
-    ----------
-    source : bpy.types.Object, Camera or None
-        None for a sequence from the cameras that render the frames. Of a texture, the object.
-    states : dict of int or None to PictureState
-        By frame; for a single picture the only key is None.
-    device : {"cpu", "gpu"}
-    key : PictureKey
-        What the key of the picture says.
-    is_texture : bool
-        Whether it is a texture of an object.
-    """
-
-    source: CameraSource | None
-    states: Mapping[int | None, PictureState]
-    device: str
-    key: PictureKey = NO_KEY
-    is_texture: bool = False
-
-
 def store_record(
     scene: bpy.types.Scene,
     name: str,
     image: bpy.types.Image,
     material: bpy.types.Material,
-    drawn_from: DrawnFrom,
+    source: CameraSource | None,
+    states: Mapping[int | None, PictureState],
     *,
     size: tuple[int, int],
+    key: PictureKey = NO_KEY,
     frame_range: str = "",
+    is_texture: bool = False,
 ) -> None:
     """Store the record of a picture or sequence. An older picture of the same camera is deleted.
 
@@ -128,24 +107,31 @@ def store_record(
     ----------
     scene : bpy.types.Scene
     name : str
-        Name of the camera, or of the scene for a sequence from several cameras.
+        Name of the camera, of the scene for a sequence from several cameras, or of the object of a texture.
     image : bpy.types.Image
     material : bpy.types.Material
-    drawn_from : DrawnFrom
+    source : bpy.types.Object, Camera or None
+        The camera; None for a sequence from the cameras that render the frames. For a texture, the object.
+    states : mapping of int or None to PictureState
+        What was drawn, by frame; the only key of a single picture is None. The device is the one that
+        has drawn it.
     size : (int, int)
         Width and height in pixels.
+    key : PictureKey
+        What the key of the picture says.
     frame_range : str
         First and last frame of a sequence.
+    is_texture : bool
+        Whether it is a texture of an object.
     """
-    record = _find_or_add_record(scene, name, drawn_from)
+    record = _find_or_add_record(scene, name, source, is_texture)
     _replace_datablocks(record, image, material)
     record.frames = frame_range
     record.width, record.height = size
-    record.device = drawn_from.device
-    record.key = drawn_from.key.to_json()
+    record.key = key.to_json()
     record.state = ""
     record.frame_states.clear()
-    for frame, state in drawn_from.states.items():
+    for frame, state in states.items():
         if frame is None:
             record.state = state.to_json()
         else:
@@ -154,12 +140,12 @@ def store_record(
 
 
 def _find_or_add_record(
-    scene: bpy.types.Scene, name: str, drawn_from: DrawnFrom
+    scene: bpy.types.Scene, name: str, source: CameraSource | None, is_texture: bool
 ) -> bpy.types.PropertyGroup:
-    """Return the record of a camera, or of the scene if there is no camera, with its present name."""
-    records, source = scene.rosy.bakes, drawn_from.source
+    """Return the record of a camera, of the scene or of an object with a texture, with its present name."""
+    records = scene.rosy.bakes
     camera, view, record = None, "", None
-    if drawn_from.is_texture:
+    if is_texture:
         view, record = TEXTURE_VIEW, _find_texture_record(scene, source) or records.add()
     elif source is None:
         view = FRAME_CAMERAS
@@ -225,9 +211,9 @@ def find_record(scene: bpy.types.Scene, name: str) -> bpy.types.PropertyGroup | 
 
 
 def camera_name(record: bpy.types.PropertyGroup) -> str:
-    """Return the present name of the camera of a record, or of the scene if it has several.
+    """Return the present name of the camera of a record.
 
-    Of a texture, that of the object.
+    It is the name of the scene if there are several cameras, and the name of the object for a texture.
     """
     if record.view == FRAME_CAMERAS:
         return record.id_data.name
@@ -352,28 +338,22 @@ class _PresentReasons:
             return {"stale_reason": f"camera '{name}' was deleted"}
         is_frame = bool(record.frames)
         present = self.scene_state.picture_state(self.scene, self.depsgraph, source, is_frame)
-        recorded = replace(recorded, device=record.device)
-        present = replace(present, device=self._device(present, record))
+        if present.device == "auto":
+            look = read_look(self.scene.rosy)
+            device = self.automatic_device(look) if self.automatic_device else recorded.device
+            present = replace(present, device=device)
         return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
 
     def _find_of_texture(
         self, record: bpy.types.PropertyGroup, recorded: PictureState
     ) -> dict[str, str]:
-        """Do the same as `find` for a texture."""
+        """Return the reason for a texture."""
         objects = _texture_objects(record)
         if not objects:
             return {"unknown_reason": f"object '{record.name}' does not show it any more"}
         obj = objects[0]
         present = self.scene_state.texture_state(self.scene, self.depsgraph, obj)
         return {"stale_reason": difference(recorded, present, f"the UV map of '{obj.name}'")}
-
-    def _device(self, present: PictureState, record: bpy.types.PropertyGroup) -> str:
-        """Return what would draw a picture now: "cpu" or "gpu"."""
-        if present.device != "auto":
-            return present.device
-        if self.automatic_device is None:
-            return record.device
-        return self.automatic_device(read_look(self.scene.rosy))
 
     def _source(self, record: bpy.types.PropertyGroup) -> CameraSource | None:
         """Return the camera that a picture would be drawn from; None if it was deleted."""

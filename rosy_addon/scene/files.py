@@ -118,3 +118,28 @@ def user_presets_folder() -> Path:
         except ValueError:  # not installed as an extension
             pass
     return default_user_folder()
+
+
+def output_folder(scene: bpy.types.Scene) -> Path:
+    """Return the folder in which the pictures of a scene are saved.
+
+    Raises
+    ------
+    RosyError
+        If there is none, or it is relative to the .blend file, and this was never saved.
+    """
+    directory = scene.rosy.directory
+    if not directory.strip():
+        raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
+    if directory.startswith("//") and not bpy.data.filepath:
+        raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
+    # Blender would take a path that is relative to the working directory for another one later.
+    return Path(bpy.path.abspath(directory)).absolute()
+
+
+def is_beside_blend(folder: Path) -> bool:
+    """Whether a folder is that of the .blend file, or below it. Links are followed."""
+    blend = bpy.data.filepath
+    return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
+        os.path.realpath(Path(blend).parent)
+    )

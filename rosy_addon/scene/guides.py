@@ -161,33 +161,6 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
         raise RosyError(f"object '{obj.name}' has a scale of zero: scale it up") from None
 
 
-def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
-    """Read a UV map of a mesh. By default it is the active one.
-
-    Returns
-    -------
-    (C, 2) float32 ndarray
-
-    Raises
-    ------
-    RosyError
-        If the UV map does not exist, or the mesh is in edit mode.
-    """
-    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
-    if layer is None:
-        if not mesh.uv_layers:
-            raise RosyError(f"{mesh_label(mesh)} has no UV map: add one")
-        available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers)
-        raise RosyError(f"{mesh_label(mesh)} has no UV map '{name}', only {available}")
-    values = read_attribute(mesh, layer.name, np.float32, 2)
-    if values is None:
-        raise RosyError(
-            f"{mesh_label(mesh)}: UV map '{layer.name}' cannot be read in edit mode: leave edit mode "
-            "(Tab) first"
-        )
-    return values
-
-
 def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one vector for each face; see `read_face_vectors`.
 

@@ -95,7 +95,7 @@ def read_tone(
         tone_image = owner.rosy.tone_image if has_rosy_properties() else None
         if tone_image is None:
             return None
-        values = read_uvs(mesh, owner.rosy.tone_uv_map, label, "the image of the tone")
+        values = read_uvs(mesh, owner.rosy.tone_uv_map, label)
         image = image_luminance(tone_image)
     if cache is None:
         return SurfaceTone(values, image)

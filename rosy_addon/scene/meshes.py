@@ -145,29 +145,47 @@ def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     return read_collection(mesh.corner_normals, "vector", np.float32, 3)
 
 
-def read_uvs(mesh: bpy.types.Mesh, name: str, label: str, purpose: str) -> np.ndarray:
-    """Return u and v of the corners, (C, 2) float32, from a UV map.
+def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
+    """Return the name of a UV map of a mesh: `name`, or that of the active one if it is empty.
+
+    Raises
+    ------
+    RosyError
+        If there is no such UV map. `label` is the mesh in the message.
+    """
+    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
+    if layer is not None:
+        return layer.name
+    if not mesh.uv_layers:
+        raise RosyError(f"{label} has no UV map: unwrap its mesh first")
+    available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers)
+    raise RosyError(f"{label} has no UV map '{name}', only {available}")
+
+
+def read_uvs(mesh: bpy.types.Mesh, name: str = "", label: str | None = None) -> np.ndarray:
+    """Return u and v of the corners, (C, 2) float32, from a UV map of a mesh.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
     name : str
-        Of the UV map. Empty: the active one.
-    label, purpose : str
-        The mesh, and what needs the UV map, for the message.
+        Name of the UV map. Empty: the active one.
+    label : str, optional
+        The mesh in messages; by default `mesh_label`.
 
     Raises
     ------
     RosyError
-        If there is no such UV map.
+        If there is no such UV map, or the mesh is in edit mode.
     """
-    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
-    if layer is None:
-        missing = f"no UV map '{name}'" if name else "no UV map"
-        raise RosyError(f"{label}: its mesh has {missing}, which {purpose} needs")
-    values = np.empty(2 * len(mesh.loops), dtype=np.float32)
-    layer.uv.foreach_get("vector", values)
-    return values.reshape(-1, 2)
+    label = mesh_label(mesh) if label is None else label
+    name = uv_map_name(mesh, name, label)
+    values = read_attribute(mesh, name, np.float32, 2)
+    if values is None:
+        raise RosyError(
+            f"{label}: UV map '{name}' cannot be read in edit mode: leave edit mode (Tab) first"
+        )
+    return values
 
 
 def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:

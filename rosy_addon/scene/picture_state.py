@@ -34,16 +34,10 @@ from .visible_objects import field_objects, rendered_instances
 #: drawn.
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
-#: Those that decide what a texture shows, and how it is stored.
+#: Properties that decide what a texture shows, and how it is stored.
 TEXTURE_OUTPUT = (
-    *(
-        "texture_content",
-        "texture_bake_light",
-        "texture_udim",
-        "store",
-        "directory",
-        "image_format",
-    ),
+    *("texture_content", "texture_bake_light", "texture_udim"),
+    *("store", "directory", "image_format"),
 )
 
 
@@ -281,9 +275,7 @@ def read_texture_state(
             if texture_colors_values(look, settings.texture_content.lower()):
                 shape.append(color_values_digest(evaluated, settings.color_attribute))
             try:
-                uv_parts.append(
-                    read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name, "the texture")
-                )
+                uv_parts.append(read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name))
             except RosyError as error:
                 uv_parts.append(str(error))
     output = {name: getattr(settings, name) for name in TEXTURE_OUTPUT}

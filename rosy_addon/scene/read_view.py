@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -15,24 +14,9 @@ from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
-from .look_inputs import load_reference, read_request
+from .look_inputs import ReadRequest, load_reference, nonfinite_policy, read_request
+from .meshes import evaluated_mesh, read_uvs
 from .scene_reader import SceneData, read_scene
-
-
-@dataclass(frozen=True, eq=False)
-class SceneViews:
-    """The views of a scene from one or more cameras, as the input of a renderer.
-
-    Attributes
-    ----------
-    views : tuple of ViewInput
-        One per camera. They share their mesh instances.
-    scene_data : SceneData
-        The mesh instances, and the objects that they came from.
-    """
-
-    views: tuple[ViewInput, ...]
-    scene_data: SceneData
 
 
 def read_views(
@@ -45,7 +29,7 @@ def read_views(
     size: tuple[int, int] | None = None,
     reference_camera: bpy.types.Object | None = None,
     cache: Cache | None = None,
-) -> SceneViews:
+) -> tuple[tuple[ViewInput, ...], SceneData]:
     """Read a scene as the input of a renderer, for one or more cameras. Meshes are read once.
 
     Parameters
@@ -68,7 +52,10 @@ def read_views(
 
     Returns
     -------
-    SceneViews
+    views : tuple of ViewInput
+        One per camera. They share their mesh instances.
+    scene_data : SceneData
+        The mesh instances, and the objects that they come from.
 
     Raises
     ------
@@ -94,7 +81,7 @@ def read_views(
     for camera in resolved_cameras:
         lights = read_lights(depsgraph, camera.view) if look.light == "scene" else ()
         views.append(ViewInput(instances, camera, look, tuple(lights), reference))
-    return SceneViews(tuple(views), scene_data)
+    return tuple(views), scene_data
 
 
 def read_turntable(
@@ -180,3 +167,34 @@ def _temperature_color(data: bpy.types.Light) -> np.ndarray:
     if not getattr(data, "use_temperature", False):
         return np.ones(3)
     return np.array(data.temperature_color)
+
+
+def read_texture_input(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    obj: bpy.types.Object,
+    uv_map: str,
+    cache: Cache,
+    color_attribute: str | None,
+) -> tuple[MeshInstance, np.ndarray]:
+    """Read an object with a field, and the UV map of its texture, as it is evaluated.
+
+    If `color_attribute` is given, the numbers of this attribute are read for the color map.
+
+    Returns
+    -------
+    instance : MeshInstance
+        With a field, in world space. If the object has several instances, one of them.
+    uv : (C, 2) float32 ndarray
+        u and v at its corners.
+
+    Raises
+    ------
+    RosyError
+        If there is no field or no such attribute, or a modifier loses one of them or the UV map.
+    """
+    request = ReadRequest(nonfinite_policy(scene), color_attribute=color_attribute)
+    instance = read_scene(depsgraph, [obj], request, cache).instances[0]
+    with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+        uv = read_uvs(mesh, uv_map, f"object '{obj.name}'")
+    return instance, uv

@@ -149,7 +149,6 @@ class RosyBake(bpy.types.PropertyGroup):
     frames: bpy.props.StringProperty(
         description="Frame range of a sequence, empty for a single picture"
     )
-    device: bpy.props.StringProperty(description="Device that drew the picture: cpu or gpu")
     key: bpy.props.StringProperty(description="What the key of the picture says, as JSON")
     state: bpy.props.StringProperty(
         description="State of the scene when a single picture was drawn, as JSON"

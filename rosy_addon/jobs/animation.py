@@ -15,6 +15,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -129,10 +130,12 @@ def bake_animation(
     if show:
         check_targets(targets, settings)
     cache = Cache()  # of what was read; `_frame_steps` evicts what a frame has not used
+    draw_frame = partial(
+        _frame_steps, scene, cameras, objects, look, size, settings, cache, workers
+    )
     start_time, rendered_count = time.monotonic(), 0
     sequences: dict[str, list[_Frame]] = {}
-    scene_data = None
-    warnings: dict[str, None] = {}
+    scene_data, warnings = None, {}
     # Added for each frame, they would cost two more evaluations of the scene: up to half of the time of reading.
     attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
     with _restored_frame(scene), attributes:
@@ -141,10 +144,8 @@ def bake_animation(
             label = f"frame {frame}{_time_left(start_time, rendered_count, len(frames) - index)}"
             yield Step(start, label)
             scene.frame_set(frame)
-            steps = _frame_steps(
-                scene, frame, cameras, objects, look, size, settings, cache, workers
-            )
             try:
+                steps = draw_frame(frame)
                 scene_data, drawn = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
@@ -162,17 +163,11 @@ def bake_animation(
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
             key = yield Call(sequence_key, (scene_data.instances, last_look), 1.0)
-            for index, (result, drawn) in enumerate(zip(results, sequences.values(), strict=True)):
-                apply_sequence(
-                    scene,
-                    scene_data,
-                    result.sequence,
-                    drawn[-1].camera,
-                    settings,
-                    None if cameras is None else cameras[index],
-                    {one.frame: one.state for one in drawn},
-                    key,
-                )
+            sources = [None] * len(results) if cameras is None else cameras
+            for result, drawn, source in zip(results, sequences.values(), sources, strict=True):
+                states = {one.frame: one.state for one in drawn}
+                camera, sequence = drawn[-1].camera, result.sequence
+                apply_sequence(scene, scene_data, sequence, camera, settings, source, states, key)
             update_backdrops(scene)
             update_keys(scene)
         return results
@@ -233,7 +228,6 @@ def _sequence_result(
 
 def _frame_steps(
     scene: bpy.types.Scene,
-    frame: int,
     cameras: Sequence[CameraSource] | None,
     objects: Sequence[bpy.types.Object] | None,
     look: Look | None,
@@ -241,6 +235,7 @@ def _frame_steps(
     settings: OutputSettings,
     cache: Cache,
     workers: int,
+    frame: int,
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras."""
     look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)

@@ -20,6 +20,7 @@ from ..core.cache import Cache, content_hash
 from ..core.color import luminance, to_linear
 from ..core.errors import RosyError
 from ..core.file_io import check_readable
+from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .cameras import camera_of_object, render_size
 from .datablocks import has_rosy_properties
@@ -42,11 +43,50 @@ class ToneRequest:
     attribute: str = ""
 
 
-def make_tone_request(scene: bpy.types.Scene, look: Look) -> ToneRequest | None:
-    """Return the source of the surface tones for a look; None if it does not use them."""
+@dataclass(frozen=True)
+class ReadRequest:
+    """What is read of meshes, and how.
+
+    Attributes
+    ----------
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    tone : ToneRequest or None
+        The source of the surface tones.
+    color_attribute : str or None
+        Name of the attribute whose numbers are read for the color map.
+    """
+
+    nonfinite: str = "error"
+    tone: ToneRequest | None = None
+    color_attribute: str | None = None
+
+
+#: Shapes and fields alone.
+FIELDS_ONLY = ReadRequest()
+
+
+def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
+    """Return what a look asks of the meshes of a scene, by the settings of the scene."""
+    tone = None
     if look.tone == "attribute":
-        return ToneRequest("attribute", scene.rosy.tone_attribute)
-    return ToneRequest("image") if look.tone == "image" else None
+        tone = ToneRequest("attribute", scene.rosy.tone_attribute)
+    elif look.tone == "image":
+        tone = ToneRequest("image")
+    return ReadRequest(nonfinite_policy(scene), tone, color_attribute_of(scene, look))
+
+
+def nonfinite_policy(scene: bpy.types.Scene) -> str:
+    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
+    return "zero" if scene.rosy.undefined else "error"
+
+
+def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
+    """Return the name of the attribute whose numbers a look colors; None if it colors none."""
+    return scene.rosy.color_attribute if colors_values(look) else None
+
+
+# --- tones and numbers ------------------------------------------------------------------------------
 
 
 def read_tone(
@@ -125,63 +165,117 @@ def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) ->
     return ("" if image is None else image.name_full, owner.rosy.tone_uv_map)
 
 
-def check_tones(
-    tone_request: ToneRequest | None, tones: Sequence[tuple[SurfaceTone | None, bpy.types.Object]]
-) -> None:
-    """Check that at least one object has the requested tone.
+def read_color_values(
+    mesh: bpy.types.Mesh,
+    name: str | None,
+    label: str,
+    cache: Cache | None = None,
+) -> np.ndarray | None:
+    """Read the numbers of an attribute.
 
     Parameters
     ----------
-    tone_request : ToneRequest or None
-    tones : sequence of (SurfaceTone or None, bpy.types.Object)
-        The tones that were read, and their objects.
+    mesh : bpy.types.Mesh
+        Evaluated.
+    name : str or None
+        Of the attribute.
+    label : str
+        Of the object, in messages.
+    cache : Cache, optional
+        Keeps numbers that have not changed since an earlier call.
+
+    Returns
+    -------
+    (C,) float32 ndarray or None
+        At the corners; NaN where a number is not finite. None if the mesh has no such attribute.
 
     Raises
     ------
     RosyError
-        If no object has it. The message lists the attributes that exist.
+        If the type of the attribute is not supported.
     """
-    if tone_request is None or any(tone is not None for tone, _ in tones):
-        return
-    names = ", ".join(f"'{obj.name}'" for obj in dict.fromkeys(owner for _, owner in tones))
-    if tone_request.kind == "image":
-        raise RosyError(f"{names}: choose an image for the tone, in the properties of the object")
-    if not tone_request.attribute:
-        raise RosyError(f"{names}: there is no color attribute: choose an attribute for the tone")
+    attribute = filled_attribute(mesh, name) if name else None
+    if attribute is None:
+        return None
+    source = f"{label}, attribute '{attribute.name}'"
+    values = corner_scalars(attribute, mesh, source).astype(np.float32)
+    values[~np.isfinite(values)] = np.nan
+    if cache is None:
+        return values
+    return cache.get_or_create(("color values", content_hash(values)), lambda: values)
+
+
+def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
+    """Return a digest of what `read_color_values` reads; empty if the mesh has no such attribute.
+
+    If it cannot be read, it is the digest of the error.
+    """
+    try:
+        values = read_color_values(mesh, name, mesh.name)
+    except RosyError as error:
+        return content_hash(str(error))
+    return b"" if values is None else content_hash(values)
+
+
+def check_sources(
+    with_field: Sequence[tuple[MeshInstance, bpy.types.Object]], request: ReadRequest
+) -> None:
+    """Check that at least one mesh with a field has the requested tone, and one the requested numbers.
+
+    Parameters
+    ----------
+    with_field : sequence of (MeshInstance, bpy.types.Object)
+        The instances, and their original objects.
+    request : ReadRequest
+        What was read.
+
+    Raises
+    ------
+    RosyError
+        If none has. The message lists the attributes that exist.
+    """
+    tone, numbers = request.tone, request.color_attribute
+    owners = list(dict.fromkeys(owner for _, owner in with_field))
+    names = ", ".join(f"'{owner.name}'" for owner in owners)
+    if tone is not None and all(instance.tone is None for instance, _ in with_field):
+        if tone.kind == "image":
+            raise RosyError(
+                f"{names}: choose an image for the tone, in the properties of the object"
+            )
+        if not tone.attribute:
+            raise RosyError(
+                f"{names}: there is no color attribute: choose an attribute for the tone"
+            )
+        listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
+        raise RosyError(
+            f"{names}: there is no attribute '{tone.attribute}' for the tone, only {listing}"
+        )
+    if numbers is not None and all(instance.color_values is None for instance, _ in with_field):
+        # Booleans are mostly Blender's own.
+        listing = _attribute_listing(owners, ("FLOAT", "INT", *COLOR_TYPES))
+        if not numbers:
+            raise RosyError(
+                f"{names}: choose an attribute for the colors, under Look > Color: {listing}"
+            )
+        raise RosyError(
+            f"{names}: there is no attribute '{numbers}' for the colors, only {listing}"
+        )
+
+
+def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
+    """Return the names of the attributes of some types that meshes have, for a message."""
     available = dict.fromkeys(
         attribute.name
-        for _, owner in tones
+        for owner in owners
         for attribute in owner.data.attributes
-        if attribute.data_type in ("FLOAT", "FLOAT_COLOR", "BYTE_COLOR")
+        if attribute.data_type in types
+        and attribute.domain in ("POINT", "FACE", "CORNER")
         and not attribute.name.startswith(".")
     )
-    listing = ", ".join(f"'{name}'" for name in available) or "no suitable one"
-    raise RosyError(
-        f"{names}: there is no attribute '{tone_request.attribute}' for the tone, only {listing}"
-    )
+    return ", ".join(f"'{name}'" for name in available) or "no suitable one"
 
 
-def image_luminance(image: bpy.types.Image) -> np.ndarray:
-    """Return the linear luminance of an image, (H, W) float32, composited over white.
-
-    Raises
-    ------
-    RosyError
-        If the image has no pixels.
-    """
-    width, height = image.size
-    if not (width and height and len(image.pixels)):
-        raise RosyError(f"image '{image.name}' has no pixels: check the path of its file")
-    rgba = np.empty(4 * width * height, dtype=np.float32)
-    image.pixels.foreach_get(rgba)
-    rgba = rgba.reshape(height, width, 4)
-    alpha = rgba[..., 3:]
-    if image.is_float:
-        # Float images are premultiplied.
-        np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
-    elif image.colorspace_settings.name != "Non-Color":
-        rgba[..., :3] = to_linear(rgba[..., :3])
-    return luminance(rgba)
+# --- reference renders -------------------------------------------------------------------------------
 
 
 def reference_path(scene: bpy.types.Scene) -> Path:
@@ -259,133 +353,24 @@ def load_luminance(path: Path) -> np.ndarray:
         bpy.data.images.remove(image)
 
 
-#: Types of attributes that messages list. Booleans are mostly Blender's own.
-LISTED_TYPES = ("FLOAT", "INT", *COLOR_TYPES)
-
-
-def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
-    """Return the name of the attribute whose numbers a look colors; None if it colors none."""
-    return scene.rosy.color_attribute if colors_values(look) else None
-
-
-def read_color_values(
-    mesh: bpy.types.Mesh,
-    name: str | None,
-    label: str,
-    cache: Cache | None = None,
-) -> np.ndarray | None:
-    """Read the numbers of an attribute.
-
-    Parameters
-    ----------
-    mesh : bpy.types.Mesh
-        Evaluated.
-    name : str or None
-        Of the attribute.
-    label : str
-        Of the object, in messages.
-    cache : Cache, optional
-        Keeps numbers that have not changed since an earlier call.
-
-    Returns
-    -------
-    (C,) float32 ndarray or None
-        At the corners; NaN where a number is not finite. None if the mesh has no such attribute.
+def image_luminance(image: bpy.types.Image) -> np.ndarray:
+    """Return the linear luminance of an image, (H, W) float32, composited over white.
 
     Raises
     ------
     RosyError
-        If the type of the attribute is not supported.
+        If the image has no pixels.
     """
-    attribute = filled_attribute(mesh, name) if name else None
-    if attribute is None:
-        return None
-    source = f"{label}, attribute '{attribute.name}'"
-    values = corner_scalars(attribute, mesh, source).astype(np.float32)
-    values[~np.isfinite(values)] = np.nan
-    if cache is None:
-        return values
-    return cache.get_or_create(("color values", content_hash(values)), lambda: values)
-
-
-def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
-    """Return a digest of what `read_color_values` reads; empty if the mesh has no such attribute.
-
-    If it cannot be read, it is the digest of the error.
-    """
-    try:
-        values = read_color_values(mesh, name, mesh.name)
-    except RosyError as error:
-        return content_hash(str(error))
-    return b"" if values is None else content_hash(values)
-
-
-def check_colored(
-    name: str | None, found: Sequence[tuple[np.ndarray | None, bpy.types.Object]]
-) -> None:
-    """Check that at least one object has the attribute whose numbers are colored.
-
-    Parameters
-    ----------
-    name : str or None
-        Of the attribute; None if there is none to color.
-    found : sequence of ((C,) ndarray or None, bpy.types.Object)
-        The numbers that were read, and their objects.
-
-    Raises
-    ------
-    RosyError
-        If no object has it. The message lists the attributes that exist.
-    """
-    if name is None or any(values is not None for values, _ in found):
-        return
-    names = ", ".join(f"'{obj.name}'" for obj in dict.fromkeys(owner for _, owner in found))
-    available = dict.fromkeys(
-        attribute.name
-        for _, owner in found
-        for attribute in owner.data.attributes
-        if attribute.data_type in LISTED_TYPES
-        and attribute.domain in ("POINT", "FACE", "CORNER")
-        and not attribute.name.startswith(".")
-    )
-    listing = ", ".join(f"'{other}'" for other in available) or "no suitable one"
-    if not name:
-        raise RosyError(
-            f"{names}: choose an attribute for the colors, under Look > Color: {listing}"
-        )
-    raise RosyError(f"{names}: there is no attribute '{name}' for the colors, only {listing}")
-
-
-@dataclass(frozen=True)
-class ReadRequest:
-    """What is read of meshes, and how.
-
-    Attributes
-    ----------
-    nonfinite : {"error", "zero"}
-        Raise an error if a vector is not finite, or treat it as undefined.
-    tone : ToneRequest or None
-        The source of the surface tones.
-    color_attribute : str or None
-        Name of the attribute whose numbers are read for the color map.
-    """
-
-    nonfinite: str = "error"
-    tone: ToneRequest | None = None
-    color_attribute: str | None = None
-
-
-#: Shapes and fields alone.
-FIELDS_ONLY = ReadRequest()
-
-
-def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
-    """Return what a look asks of the meshes of a scene, by the settings of the scene."""
-    return ReadRequest(
-        nonfinite_policy(scene), make_tone_request(scene, look), color_attribute_of(scene, look)
-    )
-
-
-def nonfinite_policy(scene: bpy.types.Scene) -> str:
-    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
-    return "zero" if scene.rosy.undefined else "error"
+    width, height = image.size
+    if not (width and height and len(image.pixels)):
+        raise RosyError(f"image '{image.name}' has no pixels: check the path of its file")
+    rgba = np.empty(4 * width * height, dtype=np.float32)
+    image.pixels.foreach_get(rgba)
+    rgba = rgba.reshape(height, width, 4)
+    alpha = rgba[..., 3:]
+    if image.is_float:
+        # Float images are premultiplied.
+        np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    elif image.colorspace_settings.name != "Non-Color":
+        rgba[..., :3] = to_linear(rgba[..., :3])
+    return luminance(rgba)

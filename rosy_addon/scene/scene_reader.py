@@ -29,8 +29,7 @@ from .field_attributes import attribute_name, field_degree, is_face_vector_field
 from .look_inputs import (
     FIELDS_ONLY,
     ReadRequest,
-    check_colored,
-    check_tones,
+    check_sources,
     read_color_values,
     read_tone,
     tone_image_key,
@@ -123,7 +122,7 @@ def read_scene(
     if errors and (objects is not None or len(errors) == len(targets)):
         raise errors[0]
     with_field = [entry for entry in entries if entry.instance.field is not None]
-    check_sources(with_field, request)
+    check_sources([(entry.instance, entry.owner) for entry in with_field], request)
     occluders = [entry.instance for entry in entries if entry.instance.field is None]
     return SceneData(
         [entry.instance for entry in with_field] + occluders,
@@ -153,21 +152,6 @@ def _field_errors(
         for name, obj in zip(names, targets, strict=True)
         if name in errors or name not in seen
     ]
-
-
-def check_sources(with_field: Sequence[SceneInstance], request: ReadRequest) -> None:
-    """Check that at least one of the instances with a field has the requested tone and numbers.
-
-    Raises
-    ------
-    RosyError
-        If none has.
-    """
-    check_tones(request.tone, [(entry.instance.tone, entry.owner) for entry in with_field])
-    check_colored(
-        request.color_attribute,
-        [(entry.instance.color_values, entry.owner) for entry in with_field],
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,9 @@ from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, erro
 from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
-from ..scene.look_inputs import read_request
+from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import look_at_frame, read_look
 from ..scene.read_view import read_lights
-from ..scene.scene_reader import check_sources
 from ..worker.helper import Helper
 from .flow_clock import FlowClock
 from .layers import LayerState, LayerStates, ReferenceImages
@@ -354,7 +353,8 @@ class ViewportSession:
             raise RosyError(
                 "no object with a field is visible here: make a field, or show its object"
             )
-        check_sources(with_field, read_request(context.scene, look))
+        sources = [(entry.instance, entry.owner) for entry in with_field]
+        check_sources(sources, read_request(context.scene, look))
         reference = self._references.current(context.scene, depsgraph, look)
         if look.tone == "picture" and reference is None:
             self._schedule(0.0, self._load_references)

@@ -18,7 +18,7 @@ from rosy.rosy_addon.scene.look_inputs import (
     ToneRequest,
     image_luminance,
     load_reference,
-    make_tone_request,
+    read_request,
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
@@ -196,7 +196,7 @@ def test_missing_images_and_uv_maps(wall):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     wall.rosy.tone_image = add_image()
     bpy.context.view_layer.update()
-    with pytest.raises(RosyError, match="object 'Plane': its mesh has no UV map"):
+    with pytest.raises(RosyError, match="object 'Plane' has no UV map: unwrap"):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     add_uv(wall.data)
     assert tone_of(ToneRequest("image")).image.shape == (2, 2)
@@ -283,10 +283,10 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
 
 def test_tone_requests_of_looks(scene):
     scene.rosy.tone_attribute = "Ink"
-    assert make_tone_request(scene, Look()) is None
-    assert make_tone_request(scene, Look(tone="attribute")) == ToneRequest("attribute", "Ink")
-    assert make_tone_request(scene, Look(tone="image")) == ToneRequest("image")
-    assert make_tone_request(scene, Look(tone="picture")) is None
+    assert read_request(scene, Look()).tone is None
+    assert read_request(scene, Look(tone="attribute")).tone == ToneRequest("attribute", "Ink")
+    assert read_request(scene, Look(tone="image")).tone == ToneRequest("image")
+    assert read_request(scene, Look(tone="picture")).tone is None
 
 
 def test_a_live_view_reads_tones_again_when_they_change(wall):

@@ -17,6 +17,8 @@ from scenes import (
     add_monkey,
     add_plane,
     aim,
+    assert_same_directions,
+    depsgraph,
     member_vectors,
     read_instances,
     read_live,
@@ -25,10 +27,6 @@ from scenes import (
 
 #: Turned about all axes, so that no symmetry of the objects hides a mistake.
 ANGLES = (0.5, -0.3, 1.1)
-
-
-def depsgraph():
-    return bpy.context.evaluated_depsgraph_get()
 
 
 def projected(camera, instances=None):
@@ -41,16 +39,6 @@ def live_instances():
     read_live(reader)
     reader.resolve_topologies(depsgraph())
     return [entry.instance for entry in read_live(reader)], reader.errors
-
-
-def assert_same_directions(first, second, degrees=0.5, percentile=99.0):
-    """Most directions of two G-buffers are the same."""
-    same = np.intersect1d(first.pixel, second.pixel, return_indices=True)[1:]
-    assert len(same[0]) > 0.99 * len(first.pixel)
-    z, w = first.representation[same[0]], second.representation[same[1]]
-    usable = np.abs(z) > 1e-3 * np.abs(z).max()
-    error = np.degrees(np.abs(np.angle(z * w.conj()))) / 4
-    assert np.percentile(error[usable], percentile) < degrees
 
 
 def select_only(*objects):

@@ -22,13 +22,9 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, add_plane, link, pixels, read_live
+from scenes import add_field, add_mesh, depsgraph, link, pixels, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
-
-def depsgraph():
-    return bpy.context.evaluated_depsgraph_get()
 
 
 def add_attribute(mesh, name, domain, kind, values):
@@ -57,12 +53,6 @@ def save_picture(path, values):
     image.filepath_raw, image.file_format = str(path), "PNG"
     image.save()
     bpy.data.images.remove(image)
-
-
-@pytest.fixture
-def wall(scene, camera):
-    """A square across the view, of four faces."""
-    return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))
 
 
 def tone_of(tone_request, name="Plane"):
@@ -289,19 +279,29 @@ def test_tone_requests_of_looks(scene):
     assert read_request(scene, Look(tone="picture")).tone is None
 
 
-def test_a_live_view_reads_tones_again_when_they_change(wall):
+@pytest.mark.parametrize(
+    ("request_for_ink", "values_of"),
+    [
+        (
+            ReadRequest(tone=ToneRequest("attribute", "Ink")),
+            lambda mesh: mesh.tone and mesh.tone.values,
+        ),
+        (ReadRequest(color_attribute="Ink"), lambda mesh: mesh.color_values),
+    ],
+    ids=["tone", "numbers"],
+)
+def test_a_live_view_reads_values_again_when_they_change(wall, request_for_ink, values_of):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
-    reader, request = SceneReader(), ReadRequest(tone=ToneRequest("attribute", "Ink"))
-    (first,) = read_live(reader, request)
-    (second,) = read_live(reader, request)
-    assert second.instance is first.instance and not first.instance.tone.values.any()
+    reader = SceneReader()
+    first, second = (read_live(reader, request_for_ink)[0].instance for _ in range(2))
+    assert second is first and not values_of(first).any()
     wall.data.attributes["Ink"].data.foreach_set("value", np.ones(9, dtype=np.float32))
     wall.data.update()
     reader.invalidate({"Plane"})
-    (changed,) = read_live(reader, request)
-    assert changed.instance is not first.instance and changed.instance.tone.values.all()
-    (without_tone,) = read_live(reader)
-    assert without_tone.instance.tone is None
+    (changed,) = read_live(reader, request_for_ink)
+    assert changed.instance is not first and values_of(changed.instance).all()
+    (without,) = read_live(reader)
+    assert values_of(without.instance) is None
 
 
 def test_shadows_of_objects_that_renders_show(scene, wall):

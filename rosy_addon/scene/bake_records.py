@@ -26,10 +26,9 @@ from .keys import update_keys
 from .look_properties import read_look
 from .picture_nodes import (
     has_applied_picture,
-    image_of_material,
+    image_node,
     projections_of_group,
     remove_applied_picture,
-    remove_picture_modifiers,
     shown_materials,
 )
 from .picture_state import PictureState, SceneState
@@ -274,7 +273,10 @@ def list_bakes(
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
     if for_panel and not recorded:
         SCENE_STATES.clear()
-    reasons = _PresentReasons(scene, for_panel, automatic_device) if recorded else None
+    state = None
+    if recorded:
+        depsgraph = scene_depsgraph(scene)
+        state = SCENE_STATES.get(scene, depsgraph) if for_panel else SceneState(scene, depsgraph)
     infos = [
         BakeInfo(
             camera_name(record),
@@ -284,85 +286,60 @@ def list_bakes(
             record.material in shown,
             record.frames,
             is_texture=record.view == TEXTURE_VIEW,
-            **reasons.find(record),
+            **_present_reason(scene, record, state, automatic_device),
         )
         for record in recorded
     ]
     for material in shown - {record.material for record in scene.rosy.bakes}:
-        image = image_of_material(material)
-        if image is not None:
+        node = image_node(material)
+        if node is not None and node.image is not None:
+            image = node.image
             name = material.name.removeprefix(NAME_PREFIX)
             note = "baked in another file or scene"
             infos.append(BakeInfo(name, *image.size, image, True, unknown_reason=note))
     return sorted(infos, key=lambda info: info.camera)
 
 
-class _PresentReasons:
-    """Compares records with the present state of a scene, which is read once for all of them."""
+def _present_reason(
+    scene: bpy.types.Scene,
+    record: bpy.types.PropertyGroup,
+    state: SceneState,
+    automatic_device: Callable[[Look], str] | None,
+) -> dict[str, str]:
+    """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one.
 
-    def __init__(
-        self,
-        scene: bpy.types.Scene,
-        for_panel: bool,
-        automatic_device: Callable[[Look], str] | None,
-    ) -> None:
-        self.scene = scene
-        self.automatic_device = automatic_device
-        self.depsgraph = scene_depsgraph(scene)
-        self.scene_state = (
-            SCENE_STATES.get(scene, self.depsgraph)
-            if for_panel
-            else SceneState(scene, self.depsgraph)
-        )
-
-    def find(self, record: bpy.types.PropertyGroup) -> dict[str, str]:
-        """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one."""
-        text = record.state
-        if record.frames and record.frame_states:
-            frame = self.scene.frame_current
-            entry = record.frame_states.get(str(frame))
-            if entry is None or self.scene.frame_subframe:
-                return {"unknown_reason": f"frame {frame} was not drawn"}
-            text = entry.state
-        recorded = PictureState.from_json(text)
-        if recorded is None:
-            return {"unknown_reason": "baked with another version of RoSy"}
-        name = camera_name(record)
-        if record.view == TEXTURE_VIEW:
-            return self._find_of_texture(record, recorded)
-        try:
-            source = self._source(record)
-        except RosyError as error:  # there is no camera at all
-            return {"stale_reason": str(error)}
-        if source is None:
-            return {"stale_reason": f"camera '{name}' was deleted"}
-        is_frame = bool(record.frames)
-        present = self.scene_state.picture_state(self.scene, self.depsgraph, source, is_frame)
-        if present.device == "auto":
-            look = read_look(self.scene.rosy)
-            device = self.automatic_device(look) if self.automatic_device else recorded.device
-            present = replace(present, device=device)
-        return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
-
-    def _find_of_texture(
-        self, record: bpy.types.PropertyGroup, recorded: PictureState
-    ) -> dict[str, str]:
-        """Return the reason for a texture."""
+    `state` is the present state of the scene. The others are those of `list_bakes`.
+    """
+    text, frame = record.state, scene.frame_current
+    if record.frames and record.frame_states:
+        entry = record.frame_states.get(str(frame))
+        if entry is None or scene.frame_subframe:
+            return {"unknown_reason": f"frame {frame} was not drawn"}
+        text = entry.state
+    recorded = PictureState.from_json(text)
+    if recorded is None:
+        return {"unknown_reason": "baked with another version of RoSy"}
+    depsgraph = scene_depsgraph(scene)
+    if record.view == TEXTURE_VIEW:
         objects = _texture_objects(record)
         if not objects:
             return {"unknown_reason": f"object '{record.name}' does not show it any more"}
-        obj = objects[0]
-        present = self.scene_state.texture_state(self.scene, self.depsgraph, obj)
-        return {"stale_reason": difference(recorded, present, f"the UV map of '{obj.name}'")}
-
-    def _source(self, record: bpy.types.PropertyGroup) -> CameraSource | None:
-        """Return the camera that a picture would be drawn from; None if it was deleted."""
-        if record.view == FRAME_CAMERAS:
-            return frame_camera(self.scene, self.scene.frame_current)
+        present = state.texture_state(scene, depsgraph, objects[0])
+        return {"stale_reason": difference(recorded, present, f"the UV map of '{objects[0].name}'")}
+    try:
+        source = record.camera
         if record.view:
-            return _view_from_json(record.view)
-        camera = record.camera
-        return camera if camera is not None and camera.users_collection else None
+            is_frame_camera = record.view == FRAME_CAMERAS
+            source = frame_camera(scene, frame) if is_frame_camera else _view_from_json(record.view)
+    except RosyError as error:  # there is no camera at all
+        return {"stale_reason": str(error)}
+    if not record.view and (source is None or not source.users_collection):
+        return {"stale_reason": f"camera '{camera_name(record)}' was deleted"}
+    present = state.picture_state(scene, depsgraph, source, bool(record.frames))
+    if present.device == "auto":
+        device = automatic_device(read_look(scene.rosy)) if automatic_device else recorded.device
+        present = replace(present, device=device)
+    return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
 
 
 def has_pictures(scene: bpy.types.Scene) -> bool:
@@ -409,7 +386,8 @@ def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
     objects = baked_objects(scene)
     with _object_mode(objects):
         for obj in objects:
-            remove_picture_modifiers(obj)
+            for modifier in removable_modifiers(obj):
+                obj.modifiers.remove(modifier)
             remove_applied_picture(obj.data)
     _clean_unused_meshes()
     image_count = _remove_records(scene)

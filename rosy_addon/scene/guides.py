@@ -259,11 +259,6 @@ GUIDE_ATTRIBUTE, FIELD_CHECK_ATTRIBUTE = "rosy_guides", ".rosy_guides_field"
 STROKE_FIRMNESS = 0.25
 
 
-def has_combed_guides(mesh: bpy.types.Mesh) -> bool:
-    """Whether a mesh has combed guides."""
-    return is_face_vector_field(mesh, GUIDE_ATTRIBUTE)
-
-
 def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
     """Read the guides of a mesh.
 
@@ -282,7 +277,8 @@ def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
     values = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
     checks = read_attribute(mesh, FIELD_CHECK_ATTRIBUTE, np.float32, 1)
     field = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
-    if not has_combed_guides(mesh) or checks is None or not is_face_vector_field(mesh):
+    are_stored = is_face_vector_field(mesh, GUIDE_ATTRIBUTE) and is_face_vector_field(mesh)
+    if not are_stored or checks is None:
         return guides
     values = follow_mesh(read_rest_shape(mesh, GUIDE_ATTRIBUTE), values.astype(np.float64), surface)
     length = np.abs(field).max(axis=1)

@@ -134,7 +134,9 @@ def _read_shape(mesh: bpy.types.Mesh, *, occluder_only: bool) -> dict[str, np.nd
     }
     if not occluder_only:
         flat_faces = read_attribute(mesh, "sharp_face", bool, 1)
-        shape["sharp_edges"] = _sharp_edges(mesh)
+        sharp_edges = read_attribute(mesh, "sharp_edge", bool, 1)
+        if sharp_edges is not None and sharp_edges.any():
+            shape["sharp_edges"] = _edge_vertices(mesh)[sharp_edges]
         shape["flat_faces"] = flat_faces if flat_faces is not None and flat_faces.any() else None
         shape["corner_normal"] = _corner_normals(mesh) if mesh.has_custom_normals else None
     return shape
@@ -193,7 +195,13 @@ def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     corner_vertex = _attribute_or_collection(
         mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
     )
-    return corner_vertex, _face_starts(mesh)
+    face_count, corner_count = len(mesh.polygons), len(mesh.loops)
+    if corner_count == 3 * face_count:
+        return corner_vertex, np.arange(0, corner_count + 1, 3, dtype=np.int32)
+    face_start = np.empty(face_count + 1, dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", face_start[:-1])
+    face_start[-1] = corner_count
+    return corner_vertex, face_start
 
 
 def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -235,9 +243,7 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
         raise NoFeaturesError(
             f"{mesh_label(mesh)} has no edges of this kind ({label}): mark some, or choose another kind"
         )
-    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[
-        is_marked
-    ]
+    return _edge_vertices(mesh)[is_marked]
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
@@ -259,17 +265,6 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -
     return read_collection(attribute.data, key, dtype, columns)
 
 
-def _face_starts(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return the first corner of each face and the number of corners: (F + 1,) int32."""
-    face_count, corner_count = len(mesh.polygons), len(mesh.loops)
-    if corner_count == 3 * face_count:
-        return np.arange(0, corner_count + 1, 3, dtype=np.int32)
-    starts = np.empty(face_count + 1, dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", starts[:-1])
-    starts[-1] = corner_count
-    return starts
-
-
 def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     """Return Blender's own triangulation, for the same pictures; empty if there is none yet."""
     face_count = len(mesh.polygons)
@@ -284,12 +279,9 @@ def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     }
 
 
-def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray | None:
-    """Return the vertices of the edges marked sharp, (K, 2) int32; None if there are none."""
-    sharp = read_attribute(mesh, "sharp_edge", bool, 1)
-    if sharp is None or not sharp.any():
-        return None
-    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[sharp]
+def _edge_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the vertices of all edges, (E, 2) int32."""
+    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)
 
 
 def _edge_flags(mesh: bpy.types.Mesh, property_name: str) -> np.ndarray:

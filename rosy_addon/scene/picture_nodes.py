@@ -12,7 +12,7 @@ import numpy as np
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .datablocks import KEY_TAG, OWNED_TAG, is_editable, is_rosy_modifier, removable_modifiers
+from .datablocks import KEY_TAG, OWNED_TAG, is_editable, is_rosy_modifier
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
 from .texture_nodes import Hatching, hatching_shader
@@ -185,14 +185,8 @@ def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
     return None
 
 
-def image_of_material(material: bpy.types.Material) -> bpy.types.Image | None:
-    """Return the image that a material of `new_material` shows; None if it shows none."""
-    node = _image_node(material)
-    return None if node is None else node.image
-
-
-def _image_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """Return the node of the image of a material; None if there is none."""
+def image_node(material: bpy.types.Material) -> bpy.types.Node | None:
+    """Return the node of the image of a material of `new_material`; None if there is none."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
@@ -229,12 +223,6 @@ def set_picture_modifier(
     node_group.name = f"RoSy {obj.name}"
 
 
-def remove_picture_modifiers(obj: bpy.types.Object) -> None:
-    """Remove RoSy's modifiers from an object. Their node groups may have no use then."""
-    for modifier in removable_modifiers(obj):
-        obj.modifiers.remove(modifier)
-
-
 def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
     """Return the pictures in the material slots of a mesh, or of other data of an object.
 
@@ -258,7 +246,7 @@ def _is_picture(material: bpy.types.Material | None) -> bool:
         material is not None
         and bool(material.get(OWNED_TAG))
         and not material.get(KEY_TAG)
-        and _image_node(material) is not None
+        and image_node(material) is not None
     )
 
 

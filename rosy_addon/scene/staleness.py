@@ -132,48 +132,52 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
         return f"the size was changed to {present.size[0]} x {present.size[1]}"
     if recorded.camera != present.camera:
         return f"{source} was changed"
-    return (
-        _object_difference(recorded.objects, present.objects, "the mesh or field of ")
+    reason = (
+        _object_difference(recorded.objects, present.objects, of_mesh="the mesh or field of ")
         or _object_difference(recorded.occluders, present.occluders)
-        or _light_difference(recorded.lights, present.lights)
-        or ("the picture of the tone was changed" * (recorded.reference != present.reference))
-        or _output_difference(recorded.output, present.output)
-        or ("the device was changed" * (recorded.device != present.device))
+        or _object_difference(recorded.lights, present.lights, kind="light ")
     )
-
-
-def _output_difference(recorded: Mapping[str, Any], present: Mapping[str, Any]) -> str:
-    """Return which property of the output has changed; empty if none has."""
-    for name, value in present.items():
-        if recorded.get(name) != value:
+    if reason:
+        return reason
+    if recorded.reference != present.reference:
+        return "the picture of the tone was changed"
+    for name, value in present.output.items():
+        if recorded.output.get(name) != value:
             return f"the {_OUTPUT_LABELS.get(name, name)} was changed"
-    return ""
+    return "" if recorded.device == present.device else "the device was changed"
 
 
 def _object_difference(
-    recorded: Mapping[str, list[str]], present: Mapping[str, list[str]], of_mesh: str = ""
+    recorded: Mapping[str, list[str]],
+    present: Mapping[str, list[str]],
+    *,
+    kind: str = "",
+    of_mesh: str = "",
 ) -> str:
-    """Return how objects have changed; empty if they have not. Their names do not matter."""
-    if sorted(recorded.values()) == sorted(present.values()):
-        return ""
-    before, after = _without_renamed(recorded, present)
-    for name in sorted(before.keys() & after.keys()):
-        if before[name][1] != after[name][1]:
-            return f"{of_mesh}'{name}' was changed"
-        if before[name][0] != after[name][0]:
-            return f"'{name}' was moved"
-    return _presence_difference(before, after)
+    """Return how objects or lights have changed; empty if they have not. Their names do not matter.
 
-
-def _light_difference(recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]) -> str:
-    """Return how lights have changed; empty if they have not. Their names do not matter."""
+    Parameters
+    ----------
+    recorded, present : mapping of str to list of str
+        Attributes of `PictureState`.
+    kind : str
+        What precedes the names. Without it, objects may also have been moved.
+    of_mesh : str
+        What precedes the names of objects whose meshes have changed.
+    """
     if sorted(recorded.values()) == sorted(present.values()):
         return ""
     before, after = _without_renamed(recorded, present)
     for name in sorted(before.keys() & after.keys()):
         if before[name] != after[name]:
-            return f"light '{name}' was changed"
-    return _presence_difference(before, after, "light ")
+            is_moved = not kind and before[name][1] == after[name][1]
+            return f"'{name}' was moved" if is_moved else f"{kind}{of_mesh}'{name}' was changed"
+    for name in sorted(before.keys() - after.keys()):
+        is_there = any(obj.name_full == name and obj.users_collection for obj in bpy.data.objects)
+        return f"{kind}'{name}' {'is not visible any more' if is_there else 'was deleted'}"
+    for name in sorted(after.keys() - before.keys()):
+        return f"{kind}'{name}' was added"
+    return ""
 
 
 def _without_renamed(
@@ -187,15 +191,3 @@ def _without_renamed(
                 before[new_name] = before.pop(name)
                 break
     return before, after
-
-
-def _presence_difference(
-    before: Mapping[str, list[str]], after: Mapping[str, list[str]], kind: str = ""
-) -> str:
-    """Return which object is missing or new; empty if none is."""
-    for name in sorted(before.keys() - after.keys()):
-        is_there = any(obj.name_full == name and obj.users_collection for obj in bpy.data.objects)
-        return f"{kind}'{name}' {'is not visible any more' if is_there else 'was deleted'}"
-    for name in sorted(after.keys() - before.keys()):
-        return f"{kind}'{name}' was added"
-    return ""

@@ -1,4 +1,4 @@
-"""The main job over a range of frames: read, draw and write each frame that is not up to date.
+"""The job of animations: read, draw and write each frame that is not up to date.
 
 The picture of a frame is a file in a folder. A sidecar file next to it holds two hashes: of
 everything that the picture was drawn from (the look, the camera, the meshes and fields, and the
@@ -103,7 +103,7 @@ def bake_animation(
         One image sequence for each. By default there is one sequence, from the camera that renders
         each frame; markers may change it.
     objects, look, size, workers : optional
-        As for `bake`. Settings of the scene's own look may be animated.
+        See `bake`. Settings of the scene's own look may be animated.
     settings : OutputSettings, optional
         By default the scene's. Must have a folder.
     show : bool
@@ -117,7 +117,7 @@ def bake_animation(
     Raises
     ------
     RosyError
-        As `bake`, with the frame number; if there is no folder; if a picture cannot be written.
+        See `bake`; the message has the frame number. Also if there is no folder, or a picture cannot be written.
     """
     settings = read_output_settings(scene) if settings is None else settings
     if settings.folder is None:

@@ -52,7 +52,7 @@ def bake(
     depsgraph : bpy.types.Depsgraph, optional
         By default `scene_depsgraph`.
     objects : sequence of bpy.types.Object, optional
-        Objects whose fields are drawn; by default all that have one. All other objects only occlude.
+        Objects with fields to draw; by default all that have one. All other objects only occlude.
     cameras : sequence of bpy.types.Object or Camera, optional
         By default the scene's active camera. A `Camera` keeps its own size, as for a 3D view
         (`camera_of_view`).

@@ -80,7 +80,7 @@ def draw_strokes(
         `polyline_file`. In an .obj file, y points up, as Blender exports it. ``//`` is the folder of
         the .blend file. By default ``scene.rosy.strokes.filepath``.
     objects : sequence of bpy.types.Object, optional
-        Objects whose fields are drawn. By default all that have one. Other objects only occlude.
+        Objects with fields to draw; by default all that have one. Other objects only occlude.
     camera : bpy.types.Object or Camera, optional
         By default the camera of renders.
     collection : bpy.types.Collection, optional

@@ -1,7 +1,7 @@
 """Records of baked pictures in ``scene.rosy.bakes``: store, list and remove them.
 
-A record holds the image, the material, the camera, and the state that the picture was drawn from. A
-picture may also have no record in a scene, as on objects that were appended from another file.
+A record holds the image, the material, the camera, and the state of the scene when the picture was drawn.
+Objects that were appended from another file may show a picture without a record.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ NAME_PREFIX = "RoSy "
 TEXTURE_VIEW = "texture"
 
 
-#: The key of a picture that needs none.
+#: The key of a picture that has nothing to explain.
 NO_KEY = PictureKey()
 
 
@@ -81,7 +81,7 @@ class BakeInfo:
 
 
 class RemovalCounts(NamedTuple):
-    """Numbers of objects whose modifier was removed, and of images that were deleted."""
+    """The number of objects that lost their modifier, and of images that were deleted."""
 
     objects: int
     images: int
@@ -233,7 +233,7 @@ def _view_from_json(text: str) -> Camera:
 
 
 def _is_recorded(datablock: bpy.types.ID | None) -> bool:
-    """Whether a record of any scene has an image or material. Copies of a scene share them."""
+    """Whether a record of any scene uses an image or material. Copies of a scene share them."""
     return any(
         datablock in (record.image, record.material)
         for scene in bpy.data.scenes
@@ -242,7 +242,7 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
 
 
 def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
-    """Return the materials of all records of all scenes, also those of textures."""
+    """Return the materials of all records of all scenes, by default including textures."""
     return {
         record.material
         for scene in bpy.data.scenes
@@ -308,7 +308,7 @@ def _present_reason(
 ) -> dict[str, str]:
     """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one.
 
-    `state` is the present state of the scene. The others are those of `list_bakes`.
+    `state` is the present state of the scene. See `list_bakes` for the other parameters.
     """
     text, frame = record.state, scene.frame_current
     if record.frames and record.frame_states:
@@ -352,14 +352,14 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
 
 
 def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects of a scene with pictures, and those that are in no scene.
+    """Return the objects with pictures that are in a scene, or in no scene at all.
 
-    Objects of collections that the scene instances are included.
+    Objects of instanced collections are included.
     """
     baked = [
         obj for obj in bpy.data.objects if removable_modifiers(obj) or has_applied_picture(obj.data)
     ]
-    if not baked:  # as at most redraws of a panel before the first bake
+    if not baked:  # the common case when a panel is redrawn before the first bake
         return []
     own = _reached_objects(scene)
     others = {obj for other in bpy.data.scenes if other != scene for obj in _reached_objects(other)}
@@ -421,7 +421,7 @@ def _remove_records(scene: bpy.types.Scene) -> int:
 
 @contextmanager
 def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Leave edit mode for a moment if the data of objects have to be changed."""
+    """Leave edit mode during a block if the meshes of objects have to be changed."""
     is_editing = bpy.context.mode == "EDIT_MESH" and any(
         obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
     )

@@ -1,4 +1,4 @@
-"""Planes in front of cameras that only these see, and the backdrops among them."""
+"""Planes in front of cameras, which only camera rays see, and backdrops, which are such planes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
 from .read_view import scene_depsgraph
 
-#: Visibility to rays; only camera rays meet a plane.
+#: Kinds of rays that do not see a plane. Only camera rays do.
 HIDDEN_FROM = (
     "visible_diffuse",
     "visible_glossy",
@@ -27,9 +27,9 @@ HIDDEN_FROM = (
 
 
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
-    """Return the cameras that have pictures, with a record of each: of a picture that is shown, if any.
+    """Return the cameras that have pictures, with the record of one picture each.
 
-    For animations, it is the active camera of the scene.
+    A picture that is shown goes first. An animation counts for the active camera of the scene.
     """
     shown = set[bpy.types.Material]().union(*(shown_materials(obj) for obj in scene.objects))
     cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
@@ -48,7 +48,7 @@ def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Ima
     Returns
     -------
     list of bpy.types.Image
-        The images of these materials that nothing else uses.
+        The images of these materials, if nothing else uses them.
     """
     images = []
     for obj in [obj for obj in scene.objects if obj.get(tag)]:
@@ -142,10 +142,10 @@ OVERSIZE = 1.5
 
 
 def update_backdrops(scene: bpy.types.Scene) -> None:
-    """Create the backdrops of a scene anew, and remove those that it should not have.
+    """Replace the backdrops of a scene by the ones that its settings ask for.
 
-    If the switch is on and lines are drawn on paper, every camera with a picture has a backdrop with
-    the color of the paper. For animations, it is the active camera of the scene.
+    If backdrops are switched on and the look draws lines on paper, every camera with a picture gets a
+    backdrop in the color of the paper. For an animation, the active camera of the scene gets one.
     """
     remove_camera_planes(scene, BACKDROP_TAG)
     look = read_look(scene.rosy)

@@ -131,7 +131,7 @@ def store_difference(
     other : str
         Attribute of the other field.
     degree : int
-        Of both fields.
+        Degree of both fields.
     comparison : FieldComparison
 
     Raises

@@ -43,7 +43,7 @@ def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Return the modifiers of an object without those that RoSy added."""
+    """Return the modifiers of an object that RoSy did not add."""
     return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
 
 

@@ -1,4 +1,4 @@
-"""Fields on evaluated meshes: temporary attributes that modifiers copy, and reading them again."""
+"""Fields on evaluated meshes, read from attributes that modifiers have copied."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ from .field_attributes import (
 from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, read_attribute
 
-#: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
-#: field's vectors are tangent. Modifiers copy it to the evaluated mesh.
+#: Temporary attribute while a scene is read: the normals of the original faces, to which the field's vectors
+#: are perpendicular. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 
 #: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
@@ -107,11 +107,11 @@ def read_evaluated_field(
     label: str,
     cache: Cache | None = None,
 ) -> RosyField:
-    """Read the field of an evaluated mesh, whose faces a modifier may have created.
+    """Read the field of an evaluated mesh, which may have new faces.
 
-    Modifiers copy the vector of an original face without changing it. `Surface.rest_vertices` gives
-    the new face before any deformation, but its plane can still differ from that of the original
-    face, for example if the polygon was not planar. If the mesh has the original normals
+    Modifiers copy the vector of an original face unchanged to its new faces. A new face may lie in another
+    plane than the original face even before any deformation (`Surface.rest_vertices`), for example if the
+    polygon was not planar. If the mesh has the original normals
     (`FACE_NORMAL_ATTRIBUTE`), each vector is transported by the minimal rotation between the two
     normals. Otherwise it is projected to the tangent plane.
 
@@ -121,7 +121,7 @@ def read_evaluated_field(
         Evaluated.
     layout : FieldLayout
     surface : Surface
-        Of the mesh.
+        Surface of the mesh.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     label : str

@@ -166,7 +166,7 @@ def surface_key(surface: Surface, *key_parts: object) -> Hashable:
     return "field", id(surface), content_hash(*key_parts)
 
 
-#: Coefficients of a vector's components in its check. A sum of products stays right when Blender
+#: Coefficients of a vector's components in its check. The check is linear, so it stays right when Blender
 #: interpolates attributes.
 CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
 
@@ -196,7 +196,7 @@ def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
         get_or_create_attribute(mesh, check_name, ANGLE_TYPE)
     except RosyError:
         return
-    # Only now: a new attribute may move the others in memory.
+    # Written after both exist: a new attribute may move the others in memory.
     mesh.attributes[rest_name].data.foreach_set("vector", positions.ravel())
     mesh.attributes[check_name].data.foreach_set("value", vector_checks(vectors).astype(np.float32))
 
@@ -220,22 +220,22 @@ def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
 
 
 def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surface) -> np.ndarray:
-    """Turn stored vectors as the faces were turned since they were stored.
+    """Rotate stored vectors as the faces have been rotated since they were stored.
 
     Parameters
     ----------
     rest_shape : (ndarray, ndarray) or None
-        Of `read_rest_shape`.
+        Result of `read_rest_shape`.
     vectors : (F, 3) or (F, N, 3) ndarray
-        The values of the attribute, or of several whose first it is.
+        The values of the attribute; or of ``dir0`` ... ``dir{N-1}``, if the attribute is ``dir0``.
     surface : Surface
-        The surface of the mesh. If it is deformed, the vectors are turned to its rest shape.
+        The surface of the mesh. If it is deformed, the vectors are rotated to its rest shape.
 
     Returns
     -------
     ndarray
-        `vectors` itself if there is nothing to turn. Vectors that were changed since, by a script
-        for example, stay as they are; see `carried_vectors` for others that do.
+        `vectors` itself if nothing has moved. Vectors that were changed since, for example by a script, stay
+        as they are. See `carried_vectors` for other vectors that stay.
     """
     if rest_shape is None:
         return vectors
@@ -265,5 +265,5 @@ def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
 
 
 def vector_checks(vectors: np.ndarray) -> np.ndarray:
-    """(F,) float64 checks of (F, 3) vectors."""
+    """Return the checks of (F, 3) vectors, (F,) float64."""
     return vectors.astype(np.float64) @ CHECK_COEFFICIENTS

@@ -59,14 +59,14 @@ def _one_line(error: RuntimeError) -> str:
 #: number and suffixes.
 MAX_STEM_BYTES = 180
 
-#: Kinds of pictures whose stems do not say it.
+#: Kinds of pictures that are not named in the stem.
 PLAIN_KINDS = ("camera", "scene")
 
 
 def picture_stem(name: str, kind: str = "camera") -> str:
     """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
 
-    Those of an object are such as ``RoSy_Cube_texture``, with the kind of texture.
+    For an object it names the kind of texture, such as ``RoSy_Cube_texture``.
 
     Characters that file systems do not allow become underscores, and long names are cut. If cameras
     or scenes would then have the same file, also where file systems ignore case, one of them has
@@ -87,7 +87,7 @@ def picture_stem(name: str, kind: str = "camera") -> str:
 
 
 def _label(kind: str, name: str) -> tuple[str, str]:
-    """Return what the stem consists of: a name, and what follows it."""
+    """Return the name in a stem, and the text that follows it."""
     return name, "" if kind in PLAIN_KINDS else f" {kind}"
 
 
@@ -98,7 +98,7 @@ def _clean_stem(name: str, ending: str) -> str:
 
 
 def _file_key(stem: str) -> str:
-    """Return a text that is the same for stems which some file system takes for the same name."""
+    """Return a key that is equal for stems that some file system treats as equal."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", stem).casefold())
 
 

@@ -164,7 +164,7 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
 def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one vector for each face; see `read_face_vectors`.
 
-    Vectors that RoSy has stored are turned as the faces were turned since.
+    Vectors that RoSy has stored are rotated with the faces; see `follow_mesh`.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarr
     name : str
         Name of the attribute.
     surface : Surface
-        Of the mesh.
+        Surface of the mesh.
 
     Returns
     -------
@@ -252,10 +252,10 @@ def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
     return read_collection(collection, key, np.float32, columns).astype(np.float64)
 
 
-#: Name of the attribute, and of that of the checks of the field.
+#: Name of the attribute with the guides, and of the attribute with the checks of the field.
 GUIDE_ATTRIBUTE, FIELD_CHECK_ATTRIBUTE = "rosy_guides", ".rosy_guides_field"
 
-#: Guides of strokes have at least this firmness. Those that only keep the rest of the field have less.
+#: Least firmness of the guides of strokes. Guides that only keep the rest of the field have less.
 STROKE_FIRMNESS = 0.25
 
 
@@ -266,7 +266,7 @@ def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
     ----------
     mesh : bpy.types.Mesh
     surface : Surface
-        Of the mesh.
+        Surface of the mesh.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Keys: what explains a picture, on a plane in front of the camera that it was drawn from."""
+"""Keys, which explain a picture, on a plane in front of its camera: color scale, dots, scale bar, text."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ DARK_BACKGROUND = 0.18
 
 
 def update_keys(scene: bpy.types.Scene) -> None:
-    """Create the keys of a scene anew, and remove those that it should not have.
+    """Replace the keys of a scene by the ones that its settings ask for.
 
-    If the switch is on, every camera with a picture has a key. For animations, it is the active camera
-    of the scene. A key says what the picture was drawn from when it was baked.
+    If keys are switched on, every camera with a picture gets one. For an animation, the active camera of
+    the scene gets one. A key explains the picture as it was baked.
     """
     for image in remove_camera_planes(scene, KEY_TAG):
         delete_owned(image)
@@ -197,7 +197,7 @@ def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
 
 
 def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.types.Material:
-    """Create a material that emits an image, and is transparent where that is, and from behind."""
+    """Create a material that emits an image, with its transparency. It is transparent from behind."""
     material, build = new_empty_material(name)
     material[KEY_TAG] = True
     material.diffuse_color = (1.0, 1.0, 1.0, 0.0)
@@ -222,7 +222,7 @@ CURVE_RESOLUTION = 6
 
 
 class FontShapes:
-    """The triangles of lines of text. Each is read once."""
+    """Lines of text as triangles, in Blender's own font. Each text is read once."""
 
     def __init__(self) -> None:
         self._shapes: dict[str, np.ndarray] = {}

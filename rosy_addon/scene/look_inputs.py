@@ -54,7 +54,7 @@ class ReadRequest:
     tone : ToneRequest or None
         The source of the surface tones.
     color_attribute : str or None
-        Name of the attribute whose numbers are read for the color map.
+        Name of the attribute with the numbers for the color map.
     """
 
     nonfinite: str = "error"
@@ -82,7 +82,7 @@ def nonfinite_policy(scene: bpy.types.Scene) -> str:
 
 
 def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
-    """Return the name of the attribute whose numbers a look colors; None if it colors none."""
+    """Return the name of the attribute with the numbers that a look colors; None if it colors none."""
     return scene.rosy.color_attribute if colors_values(look) else None
 
 
@@ -178,9 +178,9 @@ def read_color_values(
     mesh : bpy.types.Mesh
         Evaluated.
     name : str or None
-        Of the attribute.
+        Name of the attribute.
     label : str
-        Of the object, in messages.
+        The object in messages.
     cache : Cache, optional
         Keeps numbers that have not changed since an earlier call.
 
@@ -307,7 +307,7 @@ def load_reference(
     Parameters
     ----------
     scene : bpy.types.Scene
-        The current frame must be that of the reference render.
+        At the frame of the reference render.
     depsgraph : bpy.types.Depsgraph
     camera : bpy.types.Object
         The camera of the reference render.
@@ -318,7 +318,7 @@ def load_reference(
     Raises
     ------
     RosyError
-        If no file is chosen, it cannot be read, or its aspect ratio is not that of renders.
+        If no file is chosen, it cannot be read, or it does not have the aspect ratio of renders.
     """
     if look.tone != "picture":
         return None

@@ -1,6 +1,6 @@
-"""Digests of evaluated meshes and their fields, by which pictures know that they are out of date.
+"""Digests of evaluated meshes and their fields, which tell whether a picture is out of date.
 
-A digest is much faster than reading a surface, and needs no temporary attributes.
+Computing a digest is much faster than reading a surface, and needs no temporary attributes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MeshStates = dict[tuple, MeshState | None]
 def mesh_state_key(
     obj: bpy.types.Object, owner: bpy.types.Object, request: ReadRequest | None
 ) -> tuple:
-    """Return the key in `MeshStates` of an evaluated object; the first part is that of its owner.
+    """Return the key in `MeshStates` of an evaluated object. Its first part identifies the owner.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def read_mesh_state(
     Parameters
     ----------
     mesh : bpy.types.Mesh or None
-        Of `evaluated_mesh`.
+        From `evaluated_mesh`.
     owner, request
         See `mesh_state_key`.
     """

@@ -148,7 +148,7 @@ def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
 
 
 def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
-    """Return the name of a UV map of a mesh: `name`, or that of the active one if it is empty.
+    """Return the name of a UV map of a mesh: `name`, or the active one if it is empty.
 
     Raises
     ------

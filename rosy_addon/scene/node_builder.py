@@ -13,7 +13,7 @@ class NodeBuilder:
     """Adds nodes to a tree, laid out in rows from left to right.
 
     Calling it adds a node of a type, sets its properties, and connects its inputs to sockets or
-    constants. Inputs are given by their numbers, or by the names of those that the properties enable.
+    constants. Inputs are given by number, or by name among the inputs that the properties enable.
     """
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:

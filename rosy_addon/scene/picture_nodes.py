@@ -1,6 +1,6 @@
 """Nodes that show a picture: a material per camera, a node group and a modifier per object.
 
-The user may have applied the modifier. Then the data of the object have the material and attribute.
+If the user has applied the modifier, the mesh of the object itself has the material and the attributes.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ MODIFIER_NAME = "RoSy"
 #: Point attribute: the clip-space (x, y, w) of each vertex for the camera of the bake.
 CLIP_ATTRIBUTE = "rosy_projection"
 
-#: Face attribute: the material index that each face had. It matters only if the user applies the
-#: modifier.
+#: Face attribute: the material index that each face had. Restored if the user applies the modifier and then
+#: removes the picture.
 MATERIAL_ATTRIBUTE = "rosy_material"
 
 _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
@@ -109,7 +109,7 @@ def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> 
 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
-    """Return a node whose outputs X, Y and Z are the clip-space x, y and w."""
+    """Add a node with the clip-space x, y and w as its outputs X, Y and Z, and return it."""
     baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE).outputs["Vector"]
     world_position = build("ShaderNodeNewGeometry").outputs["Position"]
     live_clip = build.transformed(world_position, _clip_rows(view_projection))

@@ -1,4 +1,4 @@
-"""What a picture of a scene is drawn from: a `PictureState`, which can be compared and stored.
+"""The state of a scene that a picture depends on: a `PictureState`, which can be compared and stored.
 
 Nothing is changed in the file, so a state can be read while Blender draws a panel. Meshes are read as
 they are evaluated, without the temporary attributes of `scene_reader`.
@@ -30,8 +30,7 @@ from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
 from .read_view import rendered_lights
 from .visible_objects import field_objects, rendered_instances
 
-#: Properties of ``scene.rosy`` that decide how a picture is stored and shown, and not how it is
-#: drawn.
+#: Properties of ``scene.rosy`` that change how a picture is stored and shown, but not how it is drawn.
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
 #: Properties that decide what a texture shows, and how it is stored.
@@ -43,7 +42,7 @@ TEXTURE_OUTPUT = (
 
 @dataclass(frozen=True)
 class PictureState:
-    """Everything that a picture of a scene is drawn from, as values and digests.
+    """Everything that a picture of a scene depends on, as values and digests.
 
     Attributes
     ----------
@@ -52,16 +51,16 @@ class PictureState:
     size : list of int
         Width and height in pixels.
     camera : str
-        Of the view and the projection. Empty if no picture can be drawn from the camera.
+        Digest of the view and the projection. Empty if no picture can be drawn from the camera.
     output : dict
         Values of `OUTPUT_PROPERTIES`, and whether the picture is relit.
     device : str
         What draws the picture: "cpu", "gpu" or "auto".
     objects, occluders, lights : dict of str to list of str
-        By the name of an object, the digests of the transforms of its instances and of what they
-        are instances of. Only the occluders and lights that may change the picture are in it.
+        Two digests by the name of an object: of the transforms of its instances, and of their meshes. Only
+        occluders and lights that may change the picture are included.
     reference : str
-        Of the reference render. Empty if the look uses none.
+        Digest of the reference render. Empty if the look uses none.
     """
 
     look: dict
@@ -94,7 +93,7 @@ class _Instances:
     Attributes
     ----------
     digests : list of (str, str)
-        Of the transform and of the mesh of each instance.
+        Digests of the transform and of the mesh of each instance.
     corners : list of (8, 3) ndarray
         The corners of the bounding box of each instance, in world space.
     """
@@ -211,8 +210,8 @@ class SceneState:
     ) -> dict[str, _Instances]:
         """Return the objects without a field that may change the picture.
 
-        They may cast shadows. Otherwise the bounding box of an instance must be at least partly in
-        front of that of a field.
+        If shadows are drawn, all may. Otherwise the bounding box of an instance must be at least partly in
+        front of the bounding box of an object with a field.
         """
         if casts_shadows or camera is None:
             return self._occluders
@@ -247,7 +246,7 @@ def read_picture_states(
 ) -> list[PictureState]:
     """Return the state of the picture from each camera, or of a frame of an animation.
 
-    `mesh_states` are those of the meshes that were read for the pictures (`SceneData`).
+    `mesh_states` are the states that were noted when the scene was read (`SceneData.mesh_states`).
     """
     scene_state = SceneState(scene, depsgraph, mesh_states)
     return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]

@@ -285,10 +285,10 @@ def apply_sequence(
     Parameters
     ----------
     scene, scene_data, settings
-        As for `apply_picture`.
+        See `apply_picture`.
     sequence : ImageSequence
     camera : Camera
-        Of the last frame.
+        The camera of the last frame.
     source : bpy.types.Object, Camera or None
         The camera of all frames; None if each is from the camera that renders it.
     states : mapping of int to PictureState

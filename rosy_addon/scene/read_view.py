@@ -36,13 +36,13 @@ def read_views(
     ----------
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
-        Of a view layer of the scene.
+        Depsgraph of a view layer of the scene.
     cameras : sequence of bpy.types.Object or Camera
         See `resolve_camera`.
     look : Look
         Lights, tones, numbers and the reference render are read only if it uses them.
     objects : sequence of bpy.types.Object, optional
-        Objects whose fields are drawn; by default all that have one. Other objects only occlude.
+        Objects with fields to draw; by default all that have one. Other objects only occlude.
     size : (int, int), optional
         Pixels; by default the size of renders times the scene's percentage for pictures.
     reference_camera : bpy.types.Object, optional

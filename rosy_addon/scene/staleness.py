@@ -1,4 +1,4 @@
-"""Whether a baked picture is out of date: the state that it was drawn from and the present one."""
+"""Compare the recorded state of a picture with the present one: is the picture out of date?"""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import bpy
 
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
-#: For how long a panel uses the state of a scene although something has changed since, so that
-#: playback and sculpting stay fluent: a multiple of the time that reading the state has taken.
+#: Least time between two readings of a scene, as a multiple of the time that a reading takes. Panels spend at
+#: most a tenth of the time on readings, so playback and sculpting stay fluent.
 TTL_READINGS = 10.0
 
 #: Lists of `bpy.app.handlers` that are called when objects may have changed.
@@ -45,7 +45,7 @@ class SceneStateCache:
         self._next_reading = 0.0
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
-        """Return the present state of the depsgraph's view layer, or that of a moment ago."""
+        """Return the present state of the depsgraph's view layer, or a recent one; see `TTL_READINGS`."""
         view_layer = depsgraph.view_layer
         key = scene.session_uid, view_layer.name, settings_key(scene, view_layer)
         if key != self._key or not self._is_watching():
@@ -63,7 +63,7 @@ class SceneStateCache:
         return self._scene_state
 
     def seconds_to_wait(self) -> float:
-        """Return after how many seconds to ask again, because something has changed; 0: not."""
+        """Return the seconds after which to ask again; 0 if nothing has changed since the last reading."""
         is_behind = self._is_watching() and self._is_outdated
         return max(self._next_reading - time.monotonic(), 0.01) if is_behind else 0.0
 
@@ -163,7 +163,7 @@ def _object_difference(
     kind : str
         What precedes the names. Without it, objects may also have been moved.
     of_mesh : str
-        What precedes the names of objects whose meshes have changed.
+        What precedes the name of an object with a changed mesh.
     """
     if sorted(recorded.values()) == sorted(present.values()):
         return ""
@@ -183,7 +183,7 @@ def _object_difference(
 def _without_renamed(
     recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]
 ) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return both with the present name of each object that was only renamed, or hardly changed."""
+    """Return both, in which objects that were only renamed, moved or changed have their present names."""
     before, after = dict(recorded), dict(present)
     for name in recorded.keys() - present.keys():
         for new_name in after.keys() - before.keys():

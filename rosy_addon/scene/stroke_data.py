@@ -38,7 +38,7 @@ def new_curves(
     name : str
     geometry : StrokeGeometry
     frame : int
-        Not used: curves have no frames. The signature is the same as that of `new_grease_pencil`.
+        Not used: curves have no frames. `new_grease_pencil` has the same parameters.
     register : callable
         Called with each new datablock and its name.
     """
@@ -104,7 +104,7 @@ def new_grease_pencil(
     name : str
     geometry : StrokeGeometry
     frame : int
-        The frame from which on the strokes are visible.
+        First frame at which the strokes are visible.
     register : callable
         Called with each new datablock and its name.
     """

@@ -112,9 +112,9 @@ def store_strokes(
     owner : bpy.types.Object, optional
         Parent of the object. The strokes move with it.
     collection : bpy.types.Collection, optional
-        The collection of a new object, by default that of the scene. Also if it cannot be changed.
+        The collection of a new object. By default, or if it is linked, the collection of the scene.
     vertex_count : int
-        Of the evaluated mesh of `owner`, if the geometry has the places of its points on it.
+        Number of vertices of the evaluated mesh of `owner`, if the geometry has places on it.
 
     Returns
     -------
@@ -211,7 +211,7 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
 
 
 def _delete_object(obj: bpy.types.Object) -> None:
-    """Delete an object, and its data if RoSy created them and nothing else uses them."""
+    """Delete an object. Its data are deleted too if RoSy created them and they have no other user."""
     data = obj.data
     stop_following(obj)
     bpy.data.objects.remove(obj)
@@ -219,7 +219,7 @@ def _delete_object(obj: bpy.types.Object) -> None:
 
 
 def _remove_data(data: bpy.types.ID) -> None:
-    """Delete data that RoSy created, and their materials, if nothing else uses them."""
+    """Delete data that RoSy created, and their materials, if they have no users."""
     if data.users or not data.get(OWNED_TAG):
         return
     materials = [material for material in data.materials if material and material.get(OWNED_TAG)]

@@ -1,4 +1,4 @@
-"""Which objects of a view layer are visible in renders, and which of them have a field."""
+"""Find the objects of a view layer that are visible in renders, and the ones with a field."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def rendered_instances(
 ) -> Instances:
     """Return the instances of meshes that are visible in renders.
 
-    `targets` are the original objects whose fields are drawn. The others only occlude.
+    `targets` are the original objects with fields to draw. The others only occlude.
     """
     visible_objects = set(_visible_objects(depsgraph.view_layer))
     with_field = set(targets)
@@ -88,7 +88,7 @@ def _is_rendered(
 
 
 def _draws_field(obj: bpy.types.Object) -> bool:
-    """Whether an object has a field whose drawing is switched on."""
+    """Whether an object has a field, and drawing it is switched on."""
     return has_field(obj) and (not has_rosy_properties() or obj.rosy.include)
 
 

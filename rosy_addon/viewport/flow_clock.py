@@ -1,6 +1,6 @@
-"""The clock by which streaks drift in live views, besides Blender's timeline.
+"""The clock by which streaks drift in live views, in addition to Blender's timeline.
 
-Nothing of it is saved: it begins and ends with the session of the live views.
+It is not saved: it starts and ends with the session of the live views.
 """
 
 from __future__ import annotations

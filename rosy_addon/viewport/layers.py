@@ -25,7 +25,7 @@ from ..scene.look_inputs import (
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
-#: Types of data-blocks whose changes may change a picture.
+#: Types of datablocks that may change a picture if they change.
 RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
 
 #: Seconds of one slice of reading.
@@ -40,15 +40,15 @@ class LayerState:
     ----------
     reader : SceneReader
     instances : list of SceneInstance
-        As they were read last.
+        The instances at the last reading.
     stale : bool
         Whether they must be read again.
     request : ReadRequest or None
         What was read.
     has_occluders : bool
-        Whether they were read with all other meshes, since they may occlude.
+        Whether meshes without a field were read too, as occluders.
     is_starting : bool
-        Whether they were not read completely yet. They are read in slices of time until then.
+        Whether the layer was never read completely. It is read in slices of time until then.
     """
 
     reader: SceneReader = field(default_factory=SceneReader)
@@ -114,9 +114,8 @@ class LayerStates:
         self._layers.clear()
 
     def forget(self) -> None:
-        """Drop everything that was read."""
+        """Read everything again, except what is cached by its contents."""
         self._layers = {
-            # What is cached by its contents is still right.
             key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)
             for key, layer in self._layers.items()
         }

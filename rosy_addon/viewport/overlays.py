@@ -51,8 +51,9 @@ LABEL_SIZE = 4 / 3
 #: Seconds for each triangle of a mesh that finding its singularities takes.
 SINGULARITY_SECONDS = 1.2e-6
 
-#: How far arrowheads are in front of their places, and their outlines behind them, in lengths. Those beside their
-#: places are nearer still, by so many times the distance, so that slanted surfaces do not hide them.
+#: Offsets toward the eye, so that surfaces do not hide arrowheads: of arrowheads, and how much less of their
+#: outlines, in lengths of an arrowhead; and an additional offset as a multiple of the distance of an arrowhead
+#: from its place on the surface, for slanted surfaces.
 NEARNESS, OUTLINE_DISTANCE, SLOPE = 1.5, 0.5, 2.5
 
 #: Largest number of triangles of a view for which hidden places of arrowheads are found exactly. In views with
@@ -71,7 +72,7 @@ class PixelFrames(NamedTuple):
     right, up : (K, 3) float64 ndarray
         World space, parallel to the view.
     nearer : (K, 3) float64 ndarray
-        As far along the axis of the view, toward the eye. The point stays where it is in the view.
+        A step of the same length toward the eye, along which the point stays at its place in the view.
     """
 
     right: np.ndarray
@@ -162,7 +163,7 @@ def look_up_singularities(
 def singularity_dots(
     instance: MeshInstance, cache: Cache, clip_planes: np.ndarray | None
 ) -> SingularityDots | None:
-    """Return the singularities of an instance with a field, without those that are cut away.
+    """Return the singularities of an instance with a field that the view does not cut away.
 
     Parameters
     ----------
@@ -193,7 +194,7 @@ def draw_dots(
     *,
     shows_hidden: bool = False,
 ) -> None:
-    """Draw dots in a view, behind what is in front of them.
+    """Draw dots in a view. Surfaces in front hide them.
 
     Parameters
     ----------
@@ -220,7 +221,7 @@ def draw_singularities(
     overlay: ViewOverlay,
     cache: Cache,
 ) -> None:
-    """Draw the dots of a view, and note those that have labels."""
+    """Draw the dots of a view, and store the dots that get labels in its overlay."""
     found = [
         singularity_dots(instance, cache, view_input.clip_planes)
         for instance in view_input.instances
@@ -310,10 +311,9 @@ def draw_labels(
 
 
 def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
-    """Return whether something is between a point in world space and the camera.
+    """Return whether a surface is between a point in world space and the camera.
 
-    What is closer to the point than a small part of the view does not count, so that the point may be on
-    a surface.
+    Surfaces very close to the point do not count, so that the point may lie on one; see `NEAR_SURFACE`.
     """
     point = Vector(point)
     view_to_world = context.region_data.view_matrix.inverted()
@@ -343,13 +343,13 @@ def draw_view_arrowheads(
 
 
 def draw_arrowheads(context: bpy.types.Context, marks: ArrowMarks) -> None:
-    """Draw arrowheads in a view, behind what is in front of them.
+    """Draw arrowheads in a view. Surfaces in front hide them.
 
     Parameters
     ----------
     context : bpy.types.Context
     marks : ArrowMarks
-        Of this view.
+        Arrowheads of this view.
     """
     gpu.state.depth_test_set("LESS_EQUAL")
     for grown, code, nearness in (
@@ -381,9 +381,9 @@ def _head_triangles(
 
 
 def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
-    """Return the (n, 2) corners of triangles that fill an arrowhead whose outline is moved outward.
+    """Return the (n, 2) corners of triangles that fill an arrowhead, enlarged by a margin with round corners.
 
-    Its corners are round; see `head_outline`.
+    See `head_outline`.
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.

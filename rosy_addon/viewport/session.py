@@ -81,7 +81,7 @@ class ViewportSession:
     fallback_reason : str or None
         Why the CPU draws instead of the graphics card.
     flow_clock : FlowClock
-        By which streaks drift in all views, in addition to the frames of the scene.
+        Frames by which streaks drift in all views, in addition to the frames of the scene.
 
     Raises
     ------
@@ -327,8 +327,7 @@ class ViewportSession:
         Raises
         ------
         RosyError
-            If no field is visible and nothing else says why, or if the tone or the colors have no
-            source.
+            If no field is visible and no other message says why, or if the tone or the colors have no source.
         """
         # Dots and arrowheads are drawn over the picture.
         look = replace(look, singularity_dots="none", arrows=0.0)
@@ -376,7 +375,7 @@ class ViewportSession:
         return look_at_frame(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
-        """Show what is being done, and why a field is not drawn."""
+        """Draw the messages and labels of a view."""
         context = bpy.context
         pointers = _pointers(context)
         if pointers[0] not in self.spaces:
@@ -409,7 +408,7 @@ class ViewportSession:
         return lines + [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
 
     def messages(self, area: bpy.types.Area) -> list[str]:
-        """Return the text in the views of an area, as they were drawn last."""
+        """Return the messages in the views of an area, as they were drawn last."""
         space_pointer = area.spaces.active.as_pointer()
         views = ((space_pointer, region.as_pointer()) for region in area.regions)
         lines = (self._overlays[view].lines for view in views if view in self._overlays)
@@ -451,7 +450,7 @@ def is_live(space: bpy.types.SpaceView3D) -> bool:
 
 
 def messages(area: bpy.types.Area) -> list[str]:
-    """Return what the live views of an area say: what is being done, why a field is not drawn."""
+    """Return the messages in the live views of an area: progress, and why a field is not drawn."""
     return [] if _session is None else _session.messages(area)
 
 

@@ -103,10 +103,10 @@ def view_background(
     Parameters
     ----------
     context : bpy.types.Context
-        Of the region that is drawn.
+        Context of the region that is drawn.
     depsgraph : bpy.types.Depsgraph
     camera : Camera
-        Of the view.
+        Camera of the view.
     look : Look
     """
     if not context.scene.rosy.backdrop or not is_hatched(look):

@@ -233,7 +233,7 @@ def _view_from_json(text: str) -> Camera:
 
 
 def _is_recorded(datablock: bpy.types.ID | None) -> bool:
-    """Whether a record of any scene uses an image or material. Copies of a scene share them."""
+    """Return whether a record of any scene uses an image or material. Copies of a scene share them."""
     return any(
         datablock in (record.image, record.material)
         for scene in bpy.data.scenes
@@ -343,7 +343,7 @@ def _present_reason(
 
 
 def has_pictures(scene: bpy.types.Scene) -> bool:
-    """Whether there is anything for `remove_bakes` to remove.
+    """Return whether there is anything for `remove_bakes` to remove.
 
     A picture may have no record, as on appended objects, and a record no image, if the user deleted
     it.

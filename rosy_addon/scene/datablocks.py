@@ -25,7 +25,7 @@ KEY_TAG = "rosy_key"
 
 
 def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
-    """Whether RoSy added a modifier that shows a picture."""
+    """Return whether RoSy added a modifier that shows a picture."""
     group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
     return group is not None and bool(group.get(OWNED_TAG)) and not group.get(STROKES_TAG)
 
@@ -121,10 +121,10 @@ def remedy_for_absence(otherwise: str) -> str:
 
 
 def has_rosy_properties() -> bool:
-    """Whether RoSy's properties are registered. They are while the extension is enabled."""
+    """Return whether RoSy's properties are registered. They are while the extension is enabled."""
     return hasattr(bpy.types.Scene, "rosy") and hasattr(bpy.types.Mesh, "rosy")
 
 
 def is_editable(datablock: bpy.types.ID) -> bool:
-    """Whether a datablock can be changed: it is local, or a library override."""
+    """Return whether a datablock can be changed: it is local, or a library override."""
     return datablock.library is None and getattr(datablock, "is_editable", True)

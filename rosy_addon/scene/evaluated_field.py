@@ -271,5 +271,5 @@ def _prepare_field(
 
 
 def _can_modify(mesh: bpy.types.Mesh) -> bool:
-    """Whether attributes can be added to a mesh."""
+    """Return whether attributes can be added to a mesh."""
     return is_editable(mesh) and not mesh.is_editmode

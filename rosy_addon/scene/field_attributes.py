@@ -55,7 +55,7 @@ def field_degree(mesh: bpy.types.Mesh) -> int:
 
 
 def has_field(obj: bpy.types.Object) -> bool:
-    """Whether an object is a mesh with a field attribute, which may be invalid."""
+    """Return whether an object is a mesh with a field attribute, which may be invalid."""
     if obj.type != "MESH" or obj.data is None:
         return False
     attributes = obj.data.attributes
@@ -63,7 +63,7 @@ def has_field(obj: bpy.types.Object) -> bool:
 
 
 def is_face_vector_field(mesh: bpy.types.Mesh, name: str | None = None) -> bool:
-    """Whether the field is stored in the standard form: vectors on faces."""
+    """Return whether the field is stored in the standard form: vectors on faces."""
     attribute = mesh.attributes.get(name or attribute_name(mesh))
     return attribute is not None and (attribute.domain, attribute.data_type) == (
         "FACE",
@@ -255,7 +255,7 @@ def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surf
 
 
 def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
-    """Whether both attributes exist as they were stored. Users can convert them to other types."""
+    """Return whether both attributes exist as they were stored. Users can convert them to other types."""
     types = ("POINT", VECTOR_TYPE), ("FACE", ANGLE_TYPE)
     attributes = (mesh.attributes.get(hidden) for hidden in _attribute_names(name))
     return all(

@@ -138,7 +138,7 @@ def output_folder(scene: bpy.types.Scene) -> Path:
 
 
 def is_beside_blend(folder: Path) -> bool:
-    """Whether a folder is that of the .blend file, or below it. Links are followed."""
+    """Return whether a folder is that of the .blend file, or below it. Links are followed."""
     blend = bpy.data.filepath
     return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
         os.path.realpath(Path(blend).parent)

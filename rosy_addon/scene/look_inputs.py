@@ -45,7 +45,7 @@ class ToneRequest:
 
 @dataclass(frozen=True)
 class ReadRequest:
-    """What is read of meshes, and how.
+    """What a look needs of the meshes of a scene besides their shapes and fields.
 
     Attributes
     ----------

@@ -46,7 +46,7 @@ def matches_look(settings: Any, look: Look) -> bool:
 
 
 def _is_equal(one: Any, other: Any) -> bool:
-    """Whether two values of a setting are equal: text in any case, numbers in single precision."""
+    """Return whether two values of a setting are equal: text in any case, numbers in single precision."""
     if isinstance(one, str):
         return one == other.lower()
     return math.isclose(one, other, rel_tol=1e-6)

@@ -20,7 +20,7 @@ from .meshes import read_attribute, shape_digest, vertex_positions
 
 @dataclass(frozen=True, eq=False)
 class MeshState:
-    """A digest of an evaluated mesh, with its field if that is drawn, and its bounding box.
+    """The digest and the bounding box of an evaluated mesh, with its field if it is drawn.
 
     Attributes
     ----------

@@ -241,7 +241,7 @@ def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
 
 
 def _is_picture(material: bpy.types.Material | None) -> bool:
-    """Whether RoSy created a material for a picture, and not for strokes or a key."""
+    """Return whether RoSy created a material for a picture, and not for strokes or a key."""
     return (
         material is not None
         and bool(material.get(OWNED_TAG))
@@ -251,7 +251,7 @@ def _is_picture(material: bpy.types.Material | None) -> bool:
 
 
 def has_applied_picture(data: bpy.types.ID | None) -> bool:
-    """Whether a mesh, or other data, have the results of `new_group`: the modifier was applied."""
+    """Return whether a mesh, or other data, have the results of `new_group`: the modifier was applied."""
     return bool(applied_materials(data) or _applied_attributes(data))
 
 

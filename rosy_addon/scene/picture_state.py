@@ -301,7 +301,7 @@ def read_texture_state(
 
 
 def _uses_lights(look: Look) -> bool:
-    """Whether a look is lit by the lights of the scene."""
+    """Return whether a look is lit by the lights of the scene."""
     return look.light == "scene" and look.shading > 0
 
 
@@ -388,6 +388,6 @@ def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:
 
 
 def _may_hide(box: np.ndarray, other: np.ndarray) -> bool:
-    """Whether something in a box of `_picture_box` may hide something in another."""
+    """Return whether something in a box of `_picture_box` may hide something in another."""
     overlaps = (box[0, :2] < other[1, :2]).all() and (other[0, :2] < box[1, :2]).all()
     return bool(overlaps and box[0, 2] < other[1, 2])

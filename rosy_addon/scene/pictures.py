@@ -69,7 +69,7 @@ NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """How pictures are stored and shown in a scene.
+    """Settings for storing and showing pictures in a scene.
 
     Attributes
     ----------

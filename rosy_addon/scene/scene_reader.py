@@ -304,7 +304,7 @@ class SceneReader:
 
     @property
     def has_unresolved(self) -> bool:
-        """Whether there are objects that need `resolve_topologies`."""
+        """Return whether there are objects that need `resolve_topologies`."""
         return bool(self._unresolved)
 
     def resolve_topologies(

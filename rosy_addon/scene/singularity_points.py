@@ -215,7 +215,7 @@ def read_singularity_points(
 
 
 def has_points(obj: bpy.types.Object) -> bool:
-    """Whether an object has points with attributes: a mesh or a point cloud."""
+    """Return whether an object has points with attributes: a mesh or a point cloud."""
     return obj.type in ("MESH", "POINTCLOUD")
 
 

@@ -98,7 +98,7 @@ class SceneStateCache:
 
     @staticmethod
     def _is_watching() -> bool:
-        """Whether the handlers exist. Blender drops them when it loads a file."""
+        """Return whether the handlers exist. Blender drops them when it loads a file."""
         return _note_changes in bpy.app.handlers.depsgraph_update_post
 
 

@@ -88,7 +88,7 @@ MAX_LEGACY_WIDTH = 1000
 
 
 def has_grease_pencil_drawings() -> bool:
-    """Whether Grease Pencil frames hold drawings with attributes (Blender 4.3 and later)."""
+    """Return whether Grease Pencil frames hold drawings with attributes (Blender 4.3 and later)."""
     return hasattr(bpy.types, "GreasePencilDrawing")
 
 

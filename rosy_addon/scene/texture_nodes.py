@@ -17,7 +17,7 @@ ANISOTROPY, BRUSHED_ROUGHNESS = 0.8, 0.3
 
 
 class Hatching(NamedTuple):
-    """How hatching is drawn from thresholds.
+    """The look and the number of lines with which a material draws hatching from thresholds.
 
     Attributes
     ----------

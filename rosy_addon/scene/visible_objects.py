@@ -72,7 +72,7 @@ def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) 
 def _is_rendered(
     instance: bpy.types.DepsgraphObjectInstance, visible_objects: set[bpy.types.Object]
 ) -> bool:
-    """Whether an instance is a mesh that is visible in renders."""
+    """Return whether an instance is a mesh that is visible in renders."""
     obj = instance.object
     # The depsgraph lists the meshes of curves, texts, surfaces and metaballs as separate instances.
     if obj.type != "MESH" or not instance.show_self or not obj.visible_camera:
@@ -88,7 +88,7 @@ def _is_rendered(
 
 
 def _draws_field(obj: bpy.types.Object) -> bool:
-    """Whether an object has a field, and drawing it is switched on."""
+    """Return whether an object has a field, and drawing it is switched on."""
     return has_field(obj) and (not has_rosy_properties() or obj.rosy.include)
 
 

@@ -188,7 +188,7 @@ class LayerStates:
 
 
 def _evaluate_windows() -> None:
-    """Evaluate the scenes of all windows, so that handlers are told of all changes so far."""
+    """Evaluate the scenes of all windows, so that Blender calls the handlers for all changes so far."""
     for window in bpy.context.window_manager.windows:
         with bpy.context.temp_override(window=window):
             bpy.context.evaluated_depsgraph_get()

@@ -123,7 +123,7 @@ class SingularityDots:
 
 @dataclass(eq=False)
 class ViewOverlay:
-    """What is drawn over the picture of a region of a live view.
+    """The marks and messages over the picture of a region of a live view.
 
     Attributes
     ----------

@@ -38,7 +38,7 @@ _MIN_MEGAPIXELS = 0.02
 
 
 class Request(NamedTuple):
-    """A picture that is wanted.
+    """A request for a picture.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Request(NamedTuple):
 
 @dataclass(eq=False)
 class Work:
-    """Work for a view that goes on from redraw to redraw: a picture, or its preparation.
+    """A picture of a view, or its preparation, on which the renderer works from redraw to redraw.
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class ViewState:
 
     @property
     def is_rendering(self) -> bool:
-        """Whether a picture is being rendered. Views that left the screen have stopped."""
+        """Return whether a picture is being rendered. Views that left the screen have stopped."""
         picture = self.picture
         return picture is not None and (
             not picture.runner.poll() or time.monotonic() < picture.time + ABANDON_SECONDS
@@ -209,7 +209,7 @@ class ProgressiveRenderer:
 
     @property
     def is_rendering(self) -> bool:
-        """Whether the picture of a view is being rendered."""
+        """Return whether the picture of a view is being rendered."""
         return any(view.is_rendering for view in self.views.values())
 
     def poll(self) -> bool:
@@ -389,7 +389,7 @@ class ProgressiveRenderer:
         self._render(view)
 
     def _must_wait(self, view: ViewState) -> bool:
-        """Whether another view has waited for the last picture of this view. Then it goes first."""
+        """Return whether another view has waited for the last picture of this view. Then it goes first."""
         return (
             self._waiting_view in self.views.values()
             and self._waiting_view is not view

@@ -119,11 +119,7 @@ def bake_animation(
     RosyError
         See `bake`; the message has the frame number. Also if there is no folder, or a picture cannot be written.
     """
-    settings = read_output_settings(scene) if settings is None else settings
-    if settings.folder is None:
-        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
-    check_folder(settings.folder)
-    remove_leftovers(settings.folder)
+    settings = _folder_settings(scene, settings)
     frames = list(frames)
     depsgraph = scene_depsgraph(scene)
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
@@ -171,6 +167,19 @@ def bake_animation(
             update_backdrops(scene)
             update_keys(scene)
         return results
+
+
+def _folder_settings(scene: bpy.types.Scene, settings: OutputSettings | None) -> OutputSettings:
+    """Return the output settings, by default the scene's, with a folder that can be written to.
+
+    What an interrupted job has left in the folder is removed.
+    """
+    settings = read_output_settings(scene) if settings is None else settings
+    if settings.folder is None:
+        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
+    check_folder(settings.folder)
+    remove_leftovers(settings.folder)
+    return settings
 
 
 @contextmanager

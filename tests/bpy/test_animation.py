@@ -14,13 +14,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.core.errors import RosyError
-from rosy.rosy_addon.gpu.select import select_device
-from rosy.rosy_addon.jobs import animation
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.projection import project as projection
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
 from rosy.rosy_addon.scene.files import picture_stem
@@ -346,47 +342,6 @@ def test_invalid_options_are_refused(file, tmp_path, monkeypatch):
         process = start(file, tmp_path / "out", *options)
         _, err = process.communicate(timeout=120)
         assert process.returncode == 2 and expected in err, err
-
-
-def test_the_device_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
-    """The graphics card does not draw the method "members": the choice is made for each frame."""
-    look = moving.rosy.look
-    for frame, method in ((1, "sheets"), (2, "members"), (3, "sheets")):
-        look.method = method
-        look.keyframe_insert("method", frame=frame)
-    chosen = []
-
-    def select(device, look):
-        chosen.append((moving.frame_current, device, look.method))
-        return select_device(device, look)
-
-    monkeypatch.setattr(animation, "select_device", select)
-    settings = OutputSettings(folder=tmp_path, device="auto")
-    bake_animation(moving, [1, 2], settings=settings)
-    assert chosen == [(1, "auto", "sheets"), (2, "auto", "members")]
-
-
-def test_frames_in_which_only_streaks_move_share_their_work(
-    scene, camera, monkey, tmp_path, monkeypatch
-):
-    """Their noise is carried along the field once, and the meshes are projected once."""
-    scene.render.resolution_x, scene.render.resolution_y = 96, 72
-    look, calls = scene.rosy.look, []
-    look.method, look.flow = "ibfv", 1.0
-    for frame, phase in ((1, 0.0), (11, 1.0)):
-        look.flow_phase = phase
-        look.keyframe_insert("flow_phase", frame=frame)
-    for module, name in ((projection, "project"), (stages, "streak_waves")):
-        real = getattr(module, name)
-        monkeypatch.setattr(
-            module, name, lambda *args, real=real, name=name: calls.append(name) or real(*args)
-        )
-    bake_animation(scene, [2, 3, 4], settings=OutputSettings(folder=tmp_path))
-    assert sorted(calls) == ["project", "streak_waves"]
-    assert len(set(frames_of(tmp_path).values())) == 3
-    scene.frame_set(4)
-    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
-    np.testing.assert_allclose(pixels(bake(scene)[0].image), frame, atol=1 / 255)
 
 
 # --- turntables ------------------------------------------------------------------------------

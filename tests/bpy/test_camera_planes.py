@@ -284,13 +284,6 @@ def test_the_switch_shows_and_hides_the_backdrop(hatched):
     assert contents() == before
 
 
-def test_animations_have_the_backdrop_of_the_active_camera(hatched, tmp_path):
-    hatched.rosy.backdrop = True
-    bake_animation(hatched, range(1, 2), settings=OutputSettings(folder=tmp_path))
-    (obj,) = backdrops()
-    assert obj.parent == hatched.camera
-
-
 @pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
 def test_renders_show_paper_all_over_the_background(hatched, tmp_path, kind):
     data = hatched.camera.data

@@ -10,7 +10,7 @@ from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes
-from rosy.rosy_addon.scene.look_inputs import ReadRequest, color_attribute_of
+from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from scenes import depsgraph, pixels
@@ -53,13 +53,6 @@ def test_mistakes_are_one_line_that_lists_the_attributes(wall):
         read_scene(depsgraph(), None, ReadRequest(color_attribute=""))
     with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected a number"):
         read_scene(depsgraph(), None, ReadRequest(color_attribute="rosy"))
-
-
-def test_looks_that_color_an_attribute(scene):
-    scene.rosy.color_attribute = "Angle"
-    assert color_attribute_of(scene, Look()) is None
-    assert color_attribute_of(scene, Look(hue="values")) == "Angle"
-    assert color_attribute_of(scene, Look(hue="values", magnitude="both")) is None
 
 
 @pytest.fixture

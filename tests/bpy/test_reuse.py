@@ -8,7 +8,7 @@ from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.core.cache import BAKE_CACHE
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection import project as projection
-from scenes import add_camera, add_field, add_plane, set_vectors
+from scenes import add_camera, add_field
 
 
 @pytest.fixture(autouse=True)
@@ -123,18 +123,3 @@ def test_results_of_two_cameras_are_kept(scene, camera, monkey, run_stages):
     run_stages.clear()
     bake(scene, cameras=cameras)
     assert not run_stages
-
-
-def test_a_change_adds_only_results_of_its_object(scene, camera, monkey, run_stages):
-    """The results of other instances stay in the cache."""
-    plane = add_field(add_plane("Other"), kind="axis")
-    bake(scene)
-    entries = len(BAKE_CACHE)
-    plane.location.z -= 0.5
-    bake(scene)
-    # A G-buffer, a pixel field, noise, and LIC images.
-    assert len(BAKE_CACHE) == entries + 4
-    set_vectors(plane.data, np.zeros((len(plane.data.polygons), 3)) + (1, 0, 0.5))
-    bake(scene)
-    # Its field, its corner field, and those four.
-    assert len(BAKE_CACHE) == entries + 10

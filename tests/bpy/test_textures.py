@@ -124,13 +124,6 @@ def test_remove_leaves_nothing(scene, camera, monkey):
     assert contents() == before
 
 
-def test_folder_gets_a_file(scene, camera, monkey, tmp_path):
-    scene.rosy.texture_size = 64
-    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path)
-    bake_texture(scene, [monkey])
-    assert [file.name for file in tmp_path.iterdir()] == [f"RoSy_{monkey.name}_texture.png"]
-
-
 def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):
     """Packed, in a folder, and read again from a saved file."""
     layer = textured.data.uv_layers.active

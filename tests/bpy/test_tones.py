@@ -18,7 +18,6 @@ from rosy.rosy_addon.scene.look_inputs import (
     ToneRequest,
     image_luminance,
     load_reference,
-    read_request,
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
@@ -91,20 +90,6 @@ def test_the_default_is_the_active_color_attribute(wall):
     wall.data.color_attributes.active_color_name = "Paint"
     tone = tone_of(ToneRequest("attribute")).values
     np.testing.assert_allclose(tone, 0.7, atol=1e-6)
-
-
-def test_modifiers_copy_attributes(wall):
-    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.linspace(0, 1, 9))
-    wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
-    tone = tone_of(ToneRequest("attribute", "Ink")).values
-    assert len(tone) == 4 * 16
-    mesh = depsgraph().id_eval_get(wall).data
-    positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
-    x, _, z = positions.reshape(-1, 3)[corner].T
-    np.testing.assert_allclose(tone[:, 0], 0.5 + x / 8 + 3 * z / 8, atol=1e-5)
 
 
 def test_objects_without_the_attribute_have_no_tone(wall, monkey):
@@ -269,14 +254,6 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
 
 
 # --- requests, shadows and occlusion --------------------------------------------------------------
-
-
-def test_tone_requests_of_looks(scene):
-    scene.rosy.tone_attribute = "Ink"
-    assert read_request(scene, Look()).tone is None
-    assert read_request(scene, Look(tone="attribute")).tone == ToneRequest("attribute", "Ink")
-    assert read_request(scene, Look(tone="image")).tone == ToneRequest("image")
-    assert read_request(scene, Look(tone="picture")).tone is None
 
 
 @pytest.mark.parametrize(

@@ -79,20 +79,18 @@ class FieldLayout:
         return all(name in mesh.attributes for name in self.attribute_names)
 
 
-def add_temp_field(mesh: bpy.types.Mesh, field: RosyField, name: str) -> FieldLayout:
-    """Store a field in temporary attributes on the faces of a mesh, and return their layout."""
-    layout = FieldLayout(name, field.degree, field.direction_ratios is not None, field.family_count)
-    add_temp_vectors(mesh, name, field.vectors)
+def _add_temp_field(mesh: bpy.types.Mesh, field: RosyField, layout: FieldLayout) -> None:
+    """Store a field in temporary attributes on the faces of a mesh."""
+    _add_temp_vectors(mesh, layout.name, field.vectors)
     for index, deviation_name in enumerate(layout.attribute_names[1:]):
         deviation = field.direction_ratios[:, index]
         attribute = mesh.attributes.new(deviation_name, "FLOAT2", "FACE")
         pairs = np.stack([deviation.real, deviation.imag], axis=1).astype(np.float32)
         attribute.data.foreach_set("vector", pairs.ravel())
     mesh.update_tag()
-    return layout
 
 
-def add_temp_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
+def _add_temp_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
     """Store vectors, (F, 3), in a temporary attribute on the faces of a mesh."""
     attribute = mesh.attributes.new(name, VECTOR_TYPE, "FACE")
     attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
@@ -226,7 +224,7 @@ def temp_attributes(
             if deforms and FACE_NORMAL_ATTRIBUTE not in mesh.attributes and _can_modify(mesh):
                 temp_meshes.append(mesh)
                 surface = mesh_surface(mesh, f"object '{obj.name}'", cache=cache)
-                add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
+                _add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
         if rest_enabled or temp_meshes:
             depsgraph.update()
         yield layouts
@@ -262,12 +260,12 @@ def _prepare_field(
             f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}, and only fields "
             "stored as vectors on faces can be read there: use Store Field first"
         )
+    has_deviations = field.direction_ratios is not None
+    layout = FieldLayout(TEMP_FIELD_ATTRIBUTE, field.degree, has_deviations, field.family_count)
     if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
         temp_meshes.append(mesh)
-        return add_temp_field(mesh, field, TEMP_FIELD_ATTRIBUTE)
-    return FieldLayout(
-        TEMP_FIELD_ATTRIBUTE, field.degree, field.direction_ratios is not None, field.family_count
-    )
+        _add_temp_field(mesh, field, layout)
+    return layout
 
 
 def _can_modify(mesh: bpy.types.Mesh) -> bool:

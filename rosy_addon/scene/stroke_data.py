@@ -136,7 +136,6 @@ def new_grease_pencil(
             np.diff(strokes.start)[stroke_mask],
             geometry.points[point_mask].astype(np.float32),
             geometry.radius[point_mask].astype(np.float32),
-            np.ones(int(point_mask.sum()), dtype=np.float32),
             material_index,
         )
     return data
@@ -147,7 +146,6 @@ def _add_to_drawing(
     point_counts: np.ndarray,
     points: np.ndarray,
     radius: np.ndarray,
-    opacity: np.ndarray,
     material_index: int,
 ) -> None:
     """Add strokes to a frame in Blender 4.3 and later."""
@@ -155,7 +153,7 @@ def _add_to_drawing(
     drawing.add_strokes(point_counts.tolist())
     set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
     set_attribute(drawing, "radius", "FLOAT", "POINT", radius)
-    set_attribute(drawing, "opacity", "FLOAT", "POINT", opacity)
+    set_attribute(drawing, "opacity", "FLOAT", "POINT", np.ones(len(points)))
     materials = np.full(len(point_counts), material_index)
     set_attribute(drawing, "material_index", "INT", "CURVE", materials)
     drawing.tag_positions_changed()
@@ -166,7 +164,6 @@ def _add_to_frame(
     point_counts: np.ndarray,
     points: np.ndarray,
     radius: np.ndarray,
-    opacity: np.ndarray,
     material_index: int,
 ) -> None:
     """Add strokes to a frame before Blender 4.3.
@@ -182,7 +179,7 @@ def _add_to_frame(
         stroke.points.foreach_set(
             "pressure", radius[start:end] * (LEGACY_WIDTH_PER_UNIT / line_width)
         )
-        stroke.points.foreach_set("strength", opacity[start:end])
+        stroke.points.foreach_set("strength", np.ones(end - start, dtype=np.float32))
         stroke.line_width, stroke.material_index = line_width, material_index
 
 

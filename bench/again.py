@@ -69,7 +69,7 @@ def measure(runs: int) -> Iterator[Case]:
 
 def ball_scene(bpy, triangles: int) -> object:
     """Return a scene that contains only the ball, with a field of degree 4."""
-    from rosy_addon.scene.write_field import write_mesh_field
+    from rosy_addon.scene.mesh_fields import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered
 
     bpy.ops.wm.read_factory_settings(use_empty=True)

@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.jobs.bake import bake
+from rosy_addon.scene.mesh_fields import write_mesh_field
 from rosy_addon.scene.meshes import mesh_surface
-from rosy_addon.scene.write_field import write_mesh_field
 from rosy_addon.ui.properties import ensure_registered
 
 SIZE = 800, 640

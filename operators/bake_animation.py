@@ -9,7 +9,8 @@ import bpy
 from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.jobs.animation import SequenceResult, bake_animation
 from ..rosy_addon.scene.cameras import scene_cameras
-from ..rosy_addon.scene.pictures import output_folder, read_output_settings
+from ..rosy_addon.scene.files import output_folder
+from ..rosy_addon.scene.pictures import read_output_settings
 from ..rosy_addon.ui.preferences import worker_count
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, VISIBLE_FIELD

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..rosy_addon.projection.ambient_occlusion import DIRECTION_COUNT
-from ..rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
+from ..rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
 from ..rosy_addon.scene.visible_objects import field_objects
 from ..rosy_addon.worker.job import Steps
 from .base import IDLE, VISIBLE_FIELD

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..rosy_addon.core.errors import RosyError
 from ..rosy_addon.jobs.bake_texture import TextureResult, bake_texture
-from ..rosy_addon.scene.compat import is_editable
+from ..rosy_addon.scene.datablocks import is_editable
 from ..rosy_addon.scene.field_attributes import has_field
 from ..rosy_addon.worker.job import Step, Steps
 from .base import ACTIVE_FIELD, IDLE, selected_mesh_objects

@@ -11,8 +11,8 @@ import bpy
 from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError, as_sentence, error_text
 from ..rosy_addon.field.rosy_field import RosyField
 from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.scene.mesh_fields import assign_fields
 from ..rosy_addon.scene.visible_objects import field_objects
-from ..rosy_addon.scene.write_field import assign_fields
 from ..rosy_addon.ui import job_status, live_views, overlay
 from ..rosy_addon.ui.preferences import apply_preferences
 

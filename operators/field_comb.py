@@ -13,6 +13,7 @@ from ..rosy_addon.jobs.comb_field import CombStroke
 from ..rosy_addon.ui import comb_brush, overlay
 from ..rosy_addon.ui.properties import BRUSH_STRENGTH
 from ..rosy_addon.ui.sidebar import use_property_columns
+from ..rosy_addon.viewport.brush_mouse import hold_mouse, release_mouse
 from ..rosy_addon.worker.job import Steps, part
 from .base import ACTIVE_FIELD, FRACTION, IDLE, Condition, selected_mesh_objects
 from .modal_job import ActiveMeshMixin, Job, ModalJobMixin
@@ -115,10 +116,10 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
             return super().invoke(context, event)
         self._is_away = False
         try:
-            self._mouse = comb_brush.CURSOR.hold(context, selected_mesh_objects(context)[0])
+            self._mouse = hold_mouse(context, selected_mesh_objects(context)[0])
             self._add(context, event)
         except REPORTED_ERRORS as error:
-            comb_brush.CURSOR.release()
+            release_mouse()
             return self.report_error(error)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
@@ -127,7 +128,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         if self._job is None:
             result = self._drag(context, event)
             if result != {"RUNNING_MODAL"} or self._job is not None:
-                comb_brush.CURSOR.release()
+                release_mouse()
             return result
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             # The next stroke begins: settle at once.
@@ -222,7 +223,7 @@ class ROSY_OT_field_comb(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Stop. Blender calls this if the window is closed or a file is opened."""
-        comb_brush.CURSOR.release()
+        release_mouse()
         super().cancel(context)
         self._take_back()
 

@@ -8,10 +8,9 @@ import bpy
 import numpy as np
 
 from ..rosy_addon.core.errors import counted
-from ..rosy_addon.field.analysis import format_degrees
-from ..rosy_addon.scene.field_difference import (
+from ..rosy_addon.field.analysis import FieldComparison, format_degrees
+from ..rosy_addon.scene.computed_attributes import (
     DIFFERENCE_ATTRIBUTE,
-    FieldDifference,
     other_field_names,
     store_difference,
 )
@@ -46,17 +45,18 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         default=True,
     )
 
-    def begin(self, context: bpy.types.Context) -> Steps[FieldDifference]:
+    def begin(self, context: bpy.types.Context) -> Steps[tuple[str, int, FieldComparison]]:
         return store_difference.begin(selected_mesh_objects(context)[0].data, self.other)
 
-    def finish(self, context: bpy.types.Context, result: FieldDifference) -> None:
+    def finish(self, context: bpy.types.Context, result: tuple[str, int, FieldComparison]) -> None:
+        other, degree, comparison = result
         if self.use_as_color:
             settings = context.scene.rosy
             settings.color_attribute = DIFFERENCE_ATTRIBUTE
             # Light where the fields are the same, and lines can be seen.
             settings.look.hue, settings.look.color_map = "values", "magma"
-            settings.look.color_range = 180.0 / result.degree, 0.0
-        statistics = result.statistics
+            settings.look.color_range = 180.0 / degree, 0.0
+        statistics = comparison.statistics
         mean, p95, largest = (
             format_degrees(np.degrees(angle))
             for angle in (statistics.mean, statistics.p95, statistics.max)
@@ -64,9 +64,9 @@ class ROSY_OT_field_compare(ActiveMeshMixin, ModalJobMixin, bpy.types.Operator):
         self.report(
             {"INFO"},
             f"Off by {mean} degrees on average, {p95} on 95 % of the area, at most {largest} on "
-            f"face {statistics.worst_face}; {result.matched_count} of "
-            f"{counted(result.singularity_count, 'singularity', 'singularities')} match the "
-            f"{result.other_count} of '{result.other}'",
+            f"face {statistics.worst_face}; {comparison.matched_count} of "
+            f"{counted(comparison.singularity_count, 'singularity', 'singularities')} match the "
+            f"{comparison.other_count} of '{other}'",
         )
 
     def draw(self, context: bpy.types.Context) -> None:

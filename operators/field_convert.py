@@ -13,12 +13,11 @@ from ..rosy_addon.core.errors import RosyError, counted
 from ..rosy_addon.field.convert import Conversion, convert
 from ..rosy_addon.field.curvature import MAGNITUDES
 from ..rosy_addon.field.rosy_field import MAX_DEGREE, RosyField
+from ..rosy_addon.scene.computed_attributes import assign_tangents, mesh_tangents
 from ..rosy_addon.scene.face_values import read_face_scalars
 from ..rosy_addon.scene.field_attributes import has_field
+from ..rosy_addon.scene.mesh_fields import STORAGE_FORMS, assign_fields, read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from ..rosy_addon.scene.read_field import read_mesh_field
-from ..rosy_addon.scene.tangents import assign_tangents, mesh_tangents
-from ..rosy_addon.scene.write_field import STORAGE_FORMS, assign_fields
 from ..rosy_addon.ui.operator_settings import draw_convert_settings, draw_settings
 from ..rosy_addon.worker.job import Call, Step, Steps, part
 from .base import EDITABLE_FIELD, FRACTION, selected_mesh_objects

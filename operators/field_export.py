@@ -11,10 +11,10 @@ from ..rosy_addon.core.errors import RosyError
 from ..rosy_addon.core.file_io import check_writable, write_bytes
 from ..rosy_addon.field.field_io import field_file
 from ..rosy_addon.field.rosy_field import RosyField
-from ..rosy_addon.scene.combed_guides import read_combed_guides
 from ..rosy_addon.scene.field_attributes import field_degree
+from ..rosy_addon.scene.guides import read_combed_guides
+from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_label, mesh_surface
-from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.worker.job import Call, Steps
 from .base import selected_mesh_objects, sync_suffix
 from .modal_job import ActiveMeshMixin, FileJobMixin

@@ -16,15 +16,15 @@ from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
 from ..rosy_addon.field.surface import Surface, orientation_warning
-from ..rosy_addon.scene.combed_guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
 from ..rosy_addon.scene.guides import (
+    GUIDE_ATTRIBUTE,
+    STROKE_FIRMNESS,
     annotation_strokes,
-    corner_uvs,
     guide_objects,
     guide_strokes_and_empties,
     guide_vectors,
 )
-from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
+from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface, read_uvs
 from ..rosy_addon.scene.singularity_points import (
     INDEX_ATTRIBUTE,
     has_points,
@@ -244,7 +244,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             annotations = annotation_strokes(context.scene, owner)
             values["strokes"] = [*values.get("strokes", ()), *annotations]
         if "UV" in guides:
-            values["uv"] = corner_uvs(mesh, self.uv_map)
+            values["uv"] = read_uvs(mesh, self.uv_map)
         if "ATTRIBUTE" in guides:
             name = self.vectors or GUIDE_ATTRIBUTE
             values["vectors"] = guide_vectors(mesh, name, surface)

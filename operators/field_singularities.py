@@ -8,8 +8,8 @@ import bpy
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS
 from ..rosy_addon.field.singularity_changes import OUTSIDE, move_index
+from ..rosy_addon.scene.mesh_fields import read_mesh_field
 from ..rosy_addon.scene.meshes import mesh_surface
-from ..rosy_addon.scene.read_field import read_mesh_field
 from ..rosy_addon.ui import singularity_handles
 from ..rosy_addon.ui.operator_settings import draw_settings
 from ..rosy_addon.worker.job import Call, Steps

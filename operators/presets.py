@@ -21,8 +21,8 @@ from ..rosy_addon.preset_files.store import (
     save_preset,
     write_preset,
 )
+from ..rosy_addon.scene.files import user_presets_folder
 from ..rosy_addon.scene.look_properties import read_look
-from ..rosy_addon.scene.paths import user_presets_folder
 from ..rosy_addon.ui import preset_library
 from ..rosy_addon.viewport.view3d import redraw
 from .base import Condition, RosyOperator

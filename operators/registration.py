@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..rosy_addon.ui import comb_brush
 from ..rosy_addon.ui.comb_brush import VIEW3D_TOOL_rosy_comb, VIEW3D_TOOL_rosy_comb_sculpt
 from ..rosy_addon.ui.singularity_handles import VIEW3D_TOOL_rosy_singularities
-from ..rosy_addon.viewport import session
+from ..rosy_addon.viewport import brush_mouse, session
 from . import (
     bake,
     bake_animation,
@@ -68,7 +67,7 @@ def unregister() -> None:
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb_sculpt)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_singularities)
     bpy.utils.unregister_tool(VIEW3D_TOOL_rosy_comb)
-    comb_brush.unregister()
+    brush_mouse.unregister()
     for module in reversed(MODULES):
         for cls in reversed(module.CLASSES):
             bpy.utils.unregister_class(cls)

@@ -82,8 +82,8 @@ def run_bake(options: Options) -> None:
     scene = open_scene(options, "bake", options.scene)
     import bpy
 
-    from ..scene.blend_files import save_blend
-    from ..scene.pictures import is_beside_blend, read_output_settings
+    from ..scene.files import is_beside_blend, save_blend
+    from ..scene.pictures import read_output_settings
 
     out = None if options.out is None else Path(os.path.realpath(options.out))
     settings = read_output_settings(scene, out)

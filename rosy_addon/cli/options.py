@@ -301,6 +301,6 @@ def user_presets_folder() -> Path:
     """Return the folder of the user's presets: in Blender, the one of the extension."""
     if sys.modules.get("bpy") is None:
         return default_user_folder()
-    from ..scene.paths import user_presets_folder
+    from ..scene.files import user_presets_folder
 
     return user_presets_folder()

@@ -30,7 +30,7 @@ def open_scene(options: Options, command: str, path: Path | None) -> Any:
             f"{command} needs Blender: run `blender -b SCENE.blend --command rosy {command}`, "
             "or install the Python module bpy"
         ) from None
-    from ..scene.blend_files import open_blend
+    from ..scene.files import open_blend
     from ..ui.properties import ensure_registered
 
     ensure_registered()

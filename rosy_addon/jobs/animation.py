@@ -1,4 +1,4 @@
-"""The main job over a range of frames: read, draw and write each frame that is not up to date.
+"""The job of animations: read, draw and write each frame that is not up to date.
 
 The picture of a frame is a file in a folder. A sidecar file next to it holds two hashes: of
 everything that the picture was drawn from (the look, the camera, the meshes and fields, and the
@@ -14,13 +14,13 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
 
-from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
@@ -29,13 +29,13 @@ from ..gpu.select import image_steps, select_device
 from ..projection.camera import Camera
 from ..rendering.marks import sequence_key
 from ..rendering.view_input import ViewInput
-from ..scene.backdrop import update_backdrops
-from ..scene.bake_records import DrawnFrom
 from ..scene.blender_images import frame_path, write_frame
+from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, frame_camera
 from ..scene.evaluated_field import temp_attributes
-from ..scene.file_names import picture_stem
+from ..scene.files import picture_stem
 from ..scene.keys import update_keys
+from ..scene.look_inputs import nonfinite_policy
 from ..scene.look_properties import look_at_frame, read_look
 from ..scene.picture_state import PictureState, read_picture_states
 from ..scene.pictures import (
@@ -45,7 +45,6 @@ from ..scene.pictures import (
     check_targets,
     read_output_settings,
 )
-from ..scene.read_request import nonfinite_policy
 from ..scene.read_view import read_views, scene_depsgraph
 from ..scene.scene_reader import SceneData
 from ..scene.visible_objects import field_objects
@@ -104,7 +103,7 @@ def bake_animation(
         One image sequence for each. By default there is one sequence, from the camera that renders
         each frame; markers may change it.
     objects, look, size, workers : optional
-        As for `bake`. Settings of the scene's own look may be animated.
+        See `bake`. Settings of the scene's own look may be animated.
     settings : OutputSettings, optional
         By default the scene's. Must have a folder.
     show : bool
@@ -118,23 +117,22 @@ def bake_animation(
     Raises
     ------
     RosyError
-        As `bake`, with the frame number; if there is no folder; if a picture cannot be written.
+        See `bake`; the message has the frame number. Also if there is no folder, or a picture cannot be written.
     """
-    settings = read_output_settings(scene) if settings is None else settings
-    if settings.folder is None:
-        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
-    check_folder(settings.folder)
-    remove_leftovers(settings.folder)
+    settings = _folder_settings(scene, settings)
     frames = list(frames)
-    frame_results: dict[str, list[_FrameResult]] = {}
-    start_time, rendered_count = time.monotonic(), 0
-    scene_data = None
-    warnings: dict[str, None] = {}
     depsgraph = scene_depsgraph(scene)
     targets = field_objects(depsgraph.view_layer) if objects is None else list(objects)
     if show:
         check_targets(targets, settings)
     cache = Cache()  # of what was read; `_frame_steps` evicts what a frame has not used
+    draw_frame = partial(
+        _frame_steps, scene, cameras, objects, look, size, settings, cache, workers
+    )
+    start_time, rendered_count = time.monotonic(), 0
+    sequences: dict[str, list[_Frame]] = {}
+    scene_data, warnings = None, {}
+    # Added for each frame, they would cost two more evaluations of the scene: up to half of the time of reading.
     attributes = temp_attributes(depsgraph, targets, nonfinite_policy(scene), cache, {})
     with _restored_frame(scene), attributes:
         for index, frame in enumerate(frames):
@@ -143,47 +141,45 @@ def bake_animation(
             yield Step(start, label)
             scene.frame_set(frame)
             try:
-                steps = _frame_steps(
-                    scene, frame, cameras, objects, look, size, settings, cache, workers
-                )
-                scene_data, results = yield from part(steps, start, stop, label)
+                steps = draw_frame(frame)
+                scene_data, drawn = yield from part(steps, start, stop, label)
             except RosyError as error:
                 raise RosyError(f"frame {frame}: {error}") from None
             warnings |= dict.fromkeys(scene_data.warnings)
-            for result in results:
-                frame_results.setdefault(result.name, []).append(result)
+            for one in drawn:
+                sequences.setdefault(one.name, []).append(one)
             # Frames that are up to date take almost no time and do not count.
-            rendered_count += not all(result.up_to_date for result in results)
+            rendered_count += not all(one.up_to_date for one in drawn)
             if not rendered_count:
                 start_time = time.monotonic()
-        key = PictureKey()
+        results = [
+            _sequence_result(drawn, settings, cameras, tuple(warnings))
+            for drawn in sequences.values()
+        ]
         if show and scene_data is not None:
             last_look = read_look(scene.rosy) if look is None else look
             key = yield Call(sequence_key, (scene_data.instances, last_look), 1.0)
-        sequence_results = []
-        for index, (name, results) in enumerate(frame_results.items()):
-            path = _path_of_frame(settings, name, cameras, frames[0])
-            camera = results[-1].camera
-            sequence = ImageSequence(name, path, frames[0], frames[-1], camera.width, camera.height)
-            if show:
-                drawn_from = DrawnFrom(
-                    None if cameras is None else cameras[index],
-                    {result.frame: result.state for result in results},
-                    results[-1].device,
-                    key,
-                )
-                apply_sequence(scene, scene_data, sequence, camera, settings, drawn_from)
-            rendered, skipped = (
-                tuple(result.frame for result in results if result.up_to_date == up_to_date)
-                for up_to_date in (False, True)
-            )
-            sequence_results.append(
-                SequenceResult(name, rendered, skipped, sequence, tuple(warnings))
-            )
-        if show:
+            sources = [None] * len(results) if cameras is None else cameras
+            for result, drawn, source in zip(results, sequences.values(), sources, strict=True):
+                states = {one.frame: one.state for one in drawn}
+                camera, sequence = drawn[-1].camera, result.sequence
+                apply_sequence(scene, scene_data, sequence, camera, settings, source, states, key)
             update_backdrops(scene)
             update_keys(scene)
-        return sequence_results
+        return results
+
+
+def _folder_settings(scene: bpy.types.Scene, settings: OutputSettings | None) -> OutputSettings:
+    """Return the output settings, by default the scene's, with a folder that can be written to.
+
+    What an interrupted job has left in the folder is removed.
+    """
+    settings = read_output_settings(scene) if settings is None else settings
+    if settings.folder is None:
+        raise RosyError("frames need a folder: choose Output > Store > In a Folder")
+    check_folder(settings.folder)
+    remove_leftovers(settings.folder)
+    return settings
 
 
 @contextmanager
@@ -200,19 +196,18 @@ def _restored_frame(scene: bpy.types.Scene) -> Iterator[None]:
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameResult:
+class _Frame:
     """One frame of a sequence.
 
     Attributes
     ----------
     name : str
-        Of the sequence.
+        Name of the sequence.
     frame : int
     camera : Camera
     up_to_date : bool
         Whether the picture existed already.
     state : PictureState
-    device : {"cpu", "gpu"}
     """
 
     name: str
@@ -220,12 +215,28 @@ class _FrameResult:
     camera: Camera
     up_to_date: bool
     state: PictureState
-    device: str
+
+
+def _sequence_result(
+    drawn: Sequence[_Frame],
+    settings: OutputSettings,
+    cameras: Sequence[CameraSource] | None,
+    warnings: tuple[str, ...],
+) -> SequenceResult:
+    """Return the result of the frames of a sequence."""
+    first, last = drawn[0], drawn[-1]
+    path = _path_of_frame(settings, first.name, cameras, first.frame)
+    size = last.camera.width, last.camera.height
+    sequence = ImageSequence(first.name, path, first.frame, last.frame, *size)
+    rendered, skipped = (
+        tuple(one.frame for one in drawn if one.up_to_date == up_to_date)
+        for up_to_date in (False, True)
+    )
+    return SequenceResult(first.name, rendered, skipped, sequence, warnings)
 
 
 def _frame_steps(
     scene: bpy.types.Scene,
-    frame: int,
     cameras: Sequence[CameraSource] | None,
     objects: Sequence[bpy.types.Object] | None,
     look: Look | None,
@@ -233,14 +244,15 @@ def _frame_steps(
     settings: OutputSettings,
     cache: Cache,
     workers: int,
-) -> Steps[tuple[SceneData, list[_FrameResult]]]:
+    frame: int,
+) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras."""
     look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)
     # The look may be animated, and its method decides which device can draw it.
     device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene)
-    scene_views = read_views(
+    views, scene_data = read_views(
         scene,
         depsgraph,
         sources,
@@ -251,10 +263,9 @@ def _frame_steps(
         cache=cache,
     )
     cache.evict_unused()
-    mesh_states = scene_views.scene_data.mesh_states
-    states = read_picture_states(scene, depsgraph, sources, mesh_states, is_frame=True)
-    results = []
-    for index, view in enumerate(scene_views.views):
+    states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states, is_frame=True)
+    drawn = []
+    for index, view in enumerate(views):
         start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
         path = _path_of_frame(settings, name, cameras, frame)
@@ -276,8 +287,9 @@ def _frame_steps(
             sidecar.unlink(missing_ok=True)
             write_frame(path, image_data)
             write_bytes(sidecar, _sidecar_text(input_hash, path))
-        results.append(_FrameResult(name, frame, view.camera, up_to_date, states[index], device))
-    return scene_views.scene_data, results
+        state = replace(states[index], device=device)
+        drawn.append(_Frame(name, frame, view.camera, up_to_date, state))
+    return scene_data, drawn
 
 
 def _path_of_frame(

@@ -9,11 +9,9 @@ import bpy
 
 from ..compositor.ink_thresholds import unlit_look
 from ..compositor.look import Look, is_hatched
-from ..compositor.picture_key import picture_key
 from ..core.cache import BAKE_CACHE
 from ..gpu.select import image_steps, select_device
-from ..scene.backdrop import update_backdrops
-from ..scene.bake_records import DrawnFrom
+from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, render_camera
 from ..scene.keys import update_keys
 from ..scene.look_properties import look_at_frame, read_look
@@ -26,7 +24,6 @@ from ..scene.pictures import (
     read_output_settings,
 )
 from ..scene.read_view import read_views, scene_depsgraph
-from ..scene.texture_nodes import Hatching
 from ..worker.job import Step, Steps, job, part
 
 __all__ = ["BakeResult", "bake"]
@@ -55,7 +52,7 @@ def bake(
     depsgraph : bpy.types.Depsgraph, optional
         By default `scene_depsgraph`.
     objects : sequence of bpy.types.Object, optional
-        Objects whose fields are drawn; by default all that have one. All other objects only occlude.
+        Objects with fields to draw; by default all that have one. All other objects only occlude.
     cameras : sequence of bpy.types.Object or Camera, optional
         By default the scene's active camera. A `Camera` keeps its own size, as for a 3D view
         (`camera_of_view`).
@@ -88,26 +85,23 @@ def bake(
         look, settings = unlit_look(look), replace(settings, device="cpu")
     sources = [render_camera(scene)] if cameras is None else list(cameras)
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
-    scene_views = read_views(
+    views, scene_data = read_views(
         scene, depsgraph, sources, look, objects=objects, size=size, cache=BAKE_CACHE
     )
     BAKE_CACHE.evict_over_limit()
-    check_targets(scene_views.scene_data.objects, settings)
-    states = read_picture_states(scene, depsgraph, sources, scene_views.scene_data.mesh_states)
+    check_targets(scene_data.objects, settings)
+    states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states)
     device = select_device(settings.device, look)
     drawings = []
-    for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
+    for index, view in enumerate(views):
         view = replace(view, draws_thresholds=draws_thresholds)
         steps = image_steps(view, device, settings.as_float, workers=workers)
         start, stop = (0.97 * done / len(sources) for done in (index, index + 1))
         picture, image_data = yield from part(steps, start, stop)
-        drawn_from = DrawnFrom(source, {None: states[index]}, device, picture_key(look, picture))
-        hatching = Hatching(look, picture.line_count) if draws_thresholds else None
-        drawings.append((view.camera, picture, image_data, drawn_from, hatching))
+        state = replace(states[index], device=device)
+        drawings.append((view, picture, image_data, sources[index], state))
     yield Step(0.97, "applying the pictures")
-    results = [
-        apply_picture(scene, scene_views.scene_data, settings, *drawing) for drawing in drawings
-    ]
+    results = [apply_picture(scene, scene_data, settings, *drawing) for drawing in drawings]
     update_backdrops(scene)
     update_keys(scene)
     return results

@@ -12,13 +12,13 @@ from ..compositor.look import Look
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
-from ..scene.color_inputs import color_attribute_of
-from ..scene.lights import read_lights
+from ..scene.look_inputs import color_attribute_of
 from ..scene.look_properties import read_look
+from ..scene.meshes import uv_map_name
 from ..scene.picture_state import bakes_light, read_texture_state
-from ..scene.pictures import OutputSettings, check_targets, read_output_settings
-from ..scene.read_view import scene_depsgraph
-from ..scene.textures import Hatching, apply_texture, read_texture_input, uv_map_name
+from ..scene.pictures import OutputSettings, apply_texture, check_targets, read_output_settings
+from ..scene.read_view import read_lights, read_texture_input, scene_depsgraph
+from ..scene.texture_nodes import Hatching
 from ..surface_texture.draw import (
     TextureSettings,
     draw_texture_images,
@@ -82,7 +82,10 @@ def bake_texture(
     look = read_look(scene.rosy) if look is None else look
     content = scene.rosy.texture_content.lower()
     settings = read_output_settings(scene) if settings is None else settings
-    uv_maps = {obj: uv_map_name(obj) for obj in objects}
+    uv_maps = {
+        obj: uv_map_name(obj.data, obj.rosy.texture_uv_map, f"object '{obj.name}'")
+        for obj in objects
+    }
     check_targets(objects, settings)
     depsgraph = scene_depsgraph(scene) if depsgraph is None else depsgraph
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None

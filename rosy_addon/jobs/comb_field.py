@@ -1,4 +1,4 @@
-"""The job of combing: read a mesh's field and guides, change them along a stroke, and store them."""
+"""The job of combing: read the field and guides of a mesh, change them along a stroke, and store them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,10 @@ from ..field.guide_brush import BrushStroke, GuideBrush
 from ..field.guided_system import guided_system
 from ..field.rosy_field import RosyField
 from ..scene.brush_surface import closest_faces
-from ..scene.combed_guides import check_guides_storable, read_combed_guides, store_combed_guides
 from ..scene.field_attributes import is_face_vector_field
+from ..scene.guides import check_guides_storable, read_combed_guides, store_combed_guides
+from ..scene.mesh_fields import assign_fields, check_writable, overwrite_vectors, read_mesh_field
 from ..scene.meshes import mesh_surface
-from ..scene.read_field import read_mesh_field
-from ..scene.write_field import assign_fields, check_writable, overwrite_vectors
 from ..worker.job import Call, Steps
 
 
@@ -53,11 +52,11 @@ class CombStroke:
         BAKE_CACHE.evict_over_limit()
 
     def extend(self, points: np.ndarray, pressure: np.ndarray) -> bool:
-        """Go on to (n, 3) places on the surface at rest, with (n,) pressures. Return whether the field has changed."""
+        """Extend the stroke by (n, 3) points of the original mesh with (n,) pressures. Return whether the field changed."""
         return self._follow(self._stroke.extend(points, pressure))
 
     def lift(self) -> bool:
-        """End the line, so that the next point begins another one. Return whether the field has changed."""
+        """End the line, so that the next point begins another one. Return whether the field changed."""
         return self._follow(self._stroke.finish())
 
     def _follow(self, face: np.ndarray) -> bool:
@@ -87,6 +86,6 @@ class CombStroke:
         return field
 
     def restore(self) -> None:
-        """Take back what `show` has changed."""
+        """Restore the field as it was before `show`."""
         if self._vectors_before is not None:
             overwrite_vectors(self.mesh, self._vectors_before)

@@ -19,9 +19,8 @@ from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
 from ..projection.gbuffer import MeshInstance
 from ..scene.cameras import CameraSource, render_camera, render_size, resolve_camera
-from ..scene.lights import read_lights
-from ..scene.read_request import ReadRequest, nonfinite_policy
-from ..scene.read_view import scene_depsgraph
+from ..scene.look_inputs import ReadRequest, nonfinite_policy
+from ..scene.read_view import read_lights, scene_depsgraph
 from ..scene.scene_reader import SceneData, read_scene
 from ..scene.stroke_objects import read_pen, read_stroke_style, store_strokes
 from ..worker.job import Call, Step, Steps, job
@@ -81,7 +80,7 @@ def draw_strokes(
         `polyline_file`. In an .obj file, y points up, as Blender exports it. ``//`` is the folder of
         the .blend file. By default ``scene.rosy.strokes.filepath``.
     objects : sequence of bpy.types.Object, optional
-        Objects whose fields are drawn. By default all that have one. Other objects only occlude.
+        Objects with fields to draw; by default all that have one. Other objects only occlude.
     camera : bpy.types.Object or Camera, optional
         By default the camera of renders.
     collection : bpy.types.Collection, optional

@@ -52,7 +52,7 @@ def render_turntable(
         Its look and its lights are used.
     obj : bpy.types.Object
     path : Path
-        Of a .mp4 or .gif file.
+        The .mp4 or .gif file.
     count : int
         Pictures in a full turn.
     rate : float

@@ -1,7 +1,7 @@
 """Records of baked pictures in ``scene.rosy.bakes``: store, list and remove them.
 
-A record holds the image, the material, the camera, and the state that the picture was drawn from. A
-picture may also have no record in a scene, as on objects that were appended from another file.
+A record holds the image, the material, the camera, and the state of the scene when the picture was drawn.
+Objects that were appended from another file may show a picture without a record.
 """
 
 from __future__ import annotations
@@ -19,17 +19,16 @@ from ..annotation.key_contents import PictureKey
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..projection.camera import Camera
-from .backdrop import update_backdrops
+from .camera_planes import update_backdrops
 from .cameras import FRAME_CAMERAS, CameraSource, frame_camera
+from .datablocks import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .keys import update_keys
 from .look_properties import read_look
-from .owned_data import delete_owned, delete_unused, is_rosy_modifier, removable_modifiers
 from .picture_nodes import (
     has_applied_picture,
-    image_of_material,
+    image_node,
     projections_of_group,
     remove_applied_picture,
-    remove_picture_modifiers,
     shown_materials,
 )
 from .picture_state import PictureState, SceneState
@@ -43,7 +42,7 @@ NAME_PREFIX = "RoSy "
 TEXTURE_VIEW = "texture"
 
 
-#: The key of a picture that needs none.
+#: The key of a picture that has nothing to explain.
 NO_KEY = PictureKey()
 
 
@@ -54,7 +53,7 @@ class BakeInfo:
     Attributes
     ----------
     camera : str
-        Name of the camera, or ``3D View``; of a texture, the name of the object.
+        Name of the camera, or ``3D View``; for a texture, the name of the object.
     width, height : int
         Pixels.
     image : bpy.types.Image
@@ -82,34 +81,10 @@ class BakeInfo:
 
 
 class RemovalCounts(NamedTuple):
-    """Numbers of objects whose modifier was removed, and of images that were deleted."""
+    """The number of objects that lost their modifier, and of images that were deleted."""
 
     objects: int
     images: int
-
-
-@dataclass(frozen=True)
-class DrawnFrom:
-    """What a picture or a sequence was drawn from, for its record.
-
-    Attributes
-    ----------
-    source : bpy.types.Object, Camera or None
-        None for a sequence from the cameras that render the frames. Of a texture, the object.
-    states : dict of int or None to PictureState
-        By frame; for a single picture the only key is None.
-    device : {"cpu", "gpu"}
-    key : PictureKey
-        What the key of the picture says.
-    is_texture : bool
-        Whether it is a texture of an object.
-    """
-
-    source: CameraSource | None
-    states: Mapping[int | None, PictureState]
-    device: str
-    key: PictureKey = NO_KEY
-    is_texture: bool = False
 
 
 def store_record(
@@ -117,10 +92,13 @@ def store_record(
     name: str,
     image: bpy.types.Image,
     material: bpy.types.Material,
-    drawn_from: DrawnFrom,
+    source: CameraSource | None,
+    states: Mapping[int | None, PictureState],
     *,
     size: tuple[int, int],
+    key: PictureKey = NO_KEY,
     frame_range: str = "",
+    is_texture: bool = False,
 ) -> None:
     """Store the record of a picture or sequence. An older picture of the same camera is deleted.
 
@@ -128,24 +106,31 @@ def store_record(
     ----------
     scene : bpy.types.Scene
     name : str
-        Name of the camera, or of the scene for a sequence from several cameras.
+        Name of the camera, of the scene for a sequence from several cameras, or of the object of a texture.
     image : bpy.types.Image
     material : bpy.types.Material
-    drawn_from : DrawnFrom
+    source : bpy.types.Object, Camera or None
+        The camera; None for a sequence from the cameras that render the frames. For a texture, the object.
+    states : mapping of int or None to PictureState
+        What was drawn, by frame; the only key of a single picture is None. The device is the one that
+        has drawn it.
     size : (int, int)
         Width and height in pixels.
+    key : PictureKey
+        What the key of the picture says.
     frame_range : str
         First and last frame of a sequence.
+    is_texture : bool
+        Whether it is a texture of an object.
     """
-    record = _find_or_add_record(scene, name, drawn_from)
+    record = _find_or_add_record(scene, name, source, is_texture)
     _replace_datablocks(record, image, material)
     record.frames = frame_range
     record.width, record.height = size
-    record.device = drawn_from.device
-    record.key = drawn_from.key.to_json()
+    record.key = key.to_json()
     record.state = ""
     record.frame_states.clear()
-    for frame, state in drawn_from.states.items():
+    for frame, state in states.items():
         if frame is None:
             record.state = state.to_json()
         else:
@@ -154,12 +139,12 @@ def store_record(
 
 
 def _find_or_add_record(
-    scene: bpy.types.Scene, name: str, drawn_from: DrawnFrom
+    scene: bpy.types.Scene, name: str, source: CameraSource | None, is_texture: bool
 ) -> bpy.types.PropertyGroup:
-    """Return the record of a camera, or of the scene if there is no camera, with its present name."""
-    records, source = scene.rosy.bakes, drawn_from.source
+    """Return the record of a camera, of the scene or of an object with a texture, with its present name."""
+    records = scene.rosy.bakes
     camera, view, record = None, "", None
-    if drawn_from.is_texture:
+    if is_texture:
         view, record = TEXTURE_VIEW, _find_texture_record(scene, source) or records.add()
     elif source is None:
         view = FRAME_CAMERAS
@@ -225,9 +210,9 @@ def find_record(scene: bpy.types.Scene, name: str) -> bpy.types.PropertyGroup | 
 
 
 def camera_name(record: bpy.types.PropertyGroup) -> str:
-    """Return the present name of the camera of a record, or of the scene if it has several.
+    """Return the present name of the camera of a record.
 
-    Of a texture, that of the object.
+    It is the name of the scene if there are several cameras, and the name of the object for a texture.
     """
     if record.view == FRAME_CAMERAS:
         return record.id_data.name
@@ -248,7 +233,7 @@ def _view_from_json(text: str) -> Camera:
 
 
 def _is_recorded(datablock: bpy.types.ID | None) -> bool:
-    """Whether a record of any scene has an image or material. Copies of a scene share them."""
+    """Return whether a record of any scene uses an image or material. Copies of a scene share them."""
     return any(
         datablock in (record.image, record.material)
         for scene in bpy.data.scenes
@@ -257,7 +242,7 @@ def _is_recorded(datablock: bpy.types.ID | None) -> bool:
 
 
 def recorded_materials(*, textures: bool = True) -> set[bpy.types.Material]:
-    """Return the materials of all records of all scenes, also those of textures."""
+    """Return the materials of all records of all scenes, by default including textures."""
     return {
         record.material
         for scene in bpy.data.scenes
@@ -288,7 +273,10 @@ def list_bakes(
     shown = {material for obj in baked_objects(scene) for material in shown_materials(obj)}
     if for_panel and not recorded:
         SCENE_STATES.clear()
-    reasons = _PresentReasons(scene, for_panel, automatic_device) if recorded else None
+    state = None
+    if recorded:
+        depsgraph = scene_depsgraph(scene)
+        state = SCENE_STATES.get(scene, depsgraph) if for_panel else SceneState(scene, depsgraph)
     infos = [
         BakeInfo(
             camera_name(record),
@@ -298,95 +286,64 @@ def list_bakes(
             record.material in shown,
             record.frames,
             is_texture=record.view == TEXTURE_VIEW,
-            **reasons.find(record),
+            **_present_reason(scene, record, state, automatic_device),
         )
         for record in recorded
     ]
     for material in shown - {record.material for record in scene.rosy.bakes}:
-        image = image_of_material(material)
-        if image is not None:
+        node = image_node(material)
+        if node is not None and node.image is not None:
+            image = node.image
             name = material.name.removeprefix(NAME_PREFIX)
             note = "baked in another file or scene"
             infos.append(BakeInfo(name, *image.size, image, True, unknown_reason=note))
     return sorted(infos, key=lambda info: info.camera)
 
 
-class _PresentReasons:
-    """Compares records with the present state of a scene, which is read once for all of them."""
+def _present_reason(
+    scene: bpy.types.Scene,
+    record: bpy.types.PropertyGroup,
+    state: SceneState,
+    automatic_device: Callable[[Look], str] | None,
+) -> dict[str, str]:
+    """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one.
 
-    def __init__(
-        self,
-        scene: bpy.types.Scene,
-        for_panel: bool,
-        automatic_device: Callable[[Look], str] | None,
-    ) -> None:
-        self.scene = scene
-        self.automatic_device = automatic_device
-        self.depsgraph = scene_depsgraph(scene)
-        self.scene_state = (
-            SCENE_STATES.get(scene, self.depsgraph)
-            if for_panel
-            else SceneState(scene, self.depsgraph)
-        )
-
-    def find(self, record: bpy.types.PropertyGroup) -> dict[str, str]:
-        """Return the ``stale_reason`` or the ``unknown_reason`` of a picture, if it has one."""
-        text = record.state
-        if record.frames and record.frame_states:
-            frame = self.scene.frame_current
-            entry = record.frame_states.get(str(frame))
-            if entry is None or self.scene.frame_subframe:
-                return {"unknown_reason": f"frame {frame} was not drawn"}
-            text = entry.state
-        recorded = PictureState.from_json(text)
-        if recorded is None:
-            return {"unknown_reason": "baked with another version of RoSy"}
-        name = camera_name(record)
-        if record.view == TEXTURE_VIEW:
-            return self._find_of_texture(record, recorded)
-        try:
-            source = self._source(record)
-        except RosyError as error:  # there is no camera at all
-            return {"stale_reason": str(error)}
-        if source is None:
-            return {"stale_reason": f"camera '{name}' was deleted"}
-        is_frame = bool(record.frames)
-        present = self.scene_state.picture_state(self.scene, self.depsgraph, source, is_frame)
-        recorded = replace(recorded, device=record.device)
-        present = replace(present, device=self._device(present, record))
-        return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
-
-    def _find_of_texture(
-        self, record: bpy.types.PropertyGroup, recorded: PictureState
-    ) -> dict[str, str]:
-        """Do the same as `find` for a texture."""
+    `state` is the present state of the scene. See `list_bakes` for the other parameters.
+    """
+    text, frame = record.state, scene.frame_current
+    if record.frames and record.frame_states:
+        entry = record.frame_states.get(str(frame))
+        if entry is None or scene.frame_subframe:
+            return {"unknown_reason": f"frame {frame} was not drawn"}
+        text = entry.state
+    recorded = PictureState.from_json(text)
+    if recorded is None:
+        return {"unknown_reason": "baked with another version of RoSy"}
+    depsgraph = scene_depsgraph(scene)
+    if record.view == TEXTURE_VIEW:
         objects = _texture_objects(record)
         if not objects:
             return {"unknown_reason": f"object '{record.name}' does not show it any more"}
-        obj = objects[0]
-        present = self.scene_state.texture_state(self.scene, self.depsgraph, obj)
-        return {"stale_reason": difference(recorded, present, f"the UV map of '{obj.name}'")}
-
-    def _device(self, present: PictureState, record: bpy.types.PropertyGroup) -> str:
-        """Return what would draw a picture now: "cpu" or "gpu"."""
-        if present.device != "auto":
-            return present.device
-        if self.automatic_device is None:
-            return record.device
-        return self.automatic_device(read_look(self.scene.rosy))
-
-    def _source(self, record: bpy.types.PropertyGroup) -> CameraSource | None:
-        """Return the camera that a picture would be drawn from; None if it was deleted."""
-        if record.view == FRAME_CAMERAS:
-            return frame_camera(self.scene, self.scene.frame_current)
+        present = state.texture_state(scene, depsgraph, objects[0])
+        return {"stale_reason": difference(recorded, present, f"the UV map of '{objects[0].name}'")}
+    try:
+        source = record.camera
         if record.view:
-            return _view_from_json(record.view)
-        camera = record.camera
-        return camera if camera is not None and camera.users_collection else None
+            is_frame_camera = record.view == FRAME_CAMERAS
+            source = frame_camera(scene, frame) if is_frame_camera else _view_from_json(record.view)
+    except RosyError as error:  # there is no camera at all
+        return {"stale_reason": str(error)}
+    if not record.view and (source is None or not source.users_collection):
+        return {"stale_reason": f"camera '{camera_name(record)}' was deleted"}
+    present = state.picture_state(scene, depsgraph, source, bool(record.frames))
+    if present.device == "auto":
+        device = automatic_device(read_look(scene.rosy)) if automatic_device else recorded.device
+        present = replace(present, device=device)
+    return {"stale_reason": difference(recorded, present, f"camera '{source.name}'")}
 
 
 def has_pictures(scene: bpy.types.Scene) -> bool:
-    """Whether there is anything for `remove_bakes` to remove.
+    """Return whether there is anything for `remove_bakes` to remove.
 
     A picture may have no record, as on appended objects, and a record no image, if the user deleted
     it.
@@ -395,14 +352,14 @@ def has_pictures(scene: bpy.types.Scene) -> bool:
 
 
 def baked_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects of a scene with pictures, and those that are in no scene.
+    """Return the objects with pictures that are in a scene, or in no scene at all.
 
-    Objects of collections that the scene instances are included.
+    Objects of instanced collections are included.
     """
     baked = [
         obj for obj in bpy.data.objects if removable_modifiers(obj) or has_applied_picture(obj.data)
     ]
-    if not baked:  # as at most redraws of a panel before the first bake
+    if not baked:  # the common case when a panel is redrawn before the first bake
         return []
     own = _reached_objects(scene)
     others = {obj for other in bpy.data.scenes if other != scene for obj in _reached_objects(other)}
@@ -429,7 +386,8 @@ def remove_bakes(scene: bpy.types.Scene) -> RemovalCounts:
     objects = baked_objects(scene)
     with _object_mode(objects):
         for obj in objects:
-            remove_picture_modifiers(obj)
+            for modifier in removable_modifiers(obj):
+                obj.modifiers.remove(modifier)
             remove_applied_picture(obj.data)
     _clean_unused_meshes()
     image_count = _remove_records(scene)
@@ -463,7 +421,7 @@ def _remove_records(scene: bpy.types.Scene) -> int:
 
 @contextmanager
 def _object_mode(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Leave edit mode for a moment if the data of objects have to be changed."""
+    """Leave edit mode during a block if the meshes of objects have to be changed."""
     is_editing = bpy.context.mode == "EDIT_MESH" and any(
         obj.mode == "EDIT" and has_applied_picture(obj.data) for obj in objects
     )

@@ -1,4 +1,4 @@
-"""Pictures as Blender images: packed, saved to a file, or one file for each frame."""
+"""Create Blender images from pictures: packed, saved to a file, or as a file for each frame."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def new_tiled_image(
     Parameters
     ----------
     name, as_float, is_color
-        As for `new_image`.
+        See `new_image`.
     tiles : mapping of int to ImageData
         The tiles by their UDIM numbers.
     stem : Path, optional
@@ -98,7 +98,7 @@ def new_tiled_image(
         except RuntimeError as reason:
             bpy.data.images.remove(image)
             raise RosyError(f"image '{name}': cannot be packed: {reason}") from reason
-    # Where the tiles go if they are unpacked.
+    # Paths to which Blender writes the tiles if the user unpacks them.
     image.filepath_raw = f"//{name}.<UDIM>{'.exr' if as_float else '.png'}"
     for file in image.packed_files:
         file.filepath = image.filepath_raw.replace("<UDIM>", str(file.tile_number))
@@ -190,7 +190,7 @@ def load_sequence(path: Path, as_float: bool) -> bpy.types.Image:
 def _save_image(image: bpy.types.Image, png: bytes | None, stem: Path) -> None:
     """Save an image to a file, and make the image use this file. An older file is replaced.
 
-    The contents of a .png are given. An .exr is written by Blender.
+    A .png has the given contents. An .exr file is written by Blender.
     """
     path = stem.with_name(stem.name + (".exr" if image.is_float else ".png"))
     make_folder(path.parent)

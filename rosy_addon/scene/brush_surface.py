@@ -1,4 +1,4 @@
-"""The surface under a brush: places on an object as it is seen, on its own mesh at rest."""
+"""The surface under a brush: from points of the evaluated mesh to points of the original mesh."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ FaceLocator = Callable[[np.ndarray], np.ndarray]
 
 
 class BrushSurface:
-    """Places on an object's own mesh, at rest and as it is seen.
+    """Maps between an object's original mesh (at rest) and its evaluated mesh (as it is seen).
 
     Parameters
     ----------
     obj : bpy.types.Object
     depsgraph : bpy.types.Depsgraph
     surface : Surface
-        Of the object's own mesh.
+        Surface of the object's original mesh.
     """
 
     def __init__(
@@ -50,10 +50,10 @@ class BrushSurface:
         self._shown_tree: BVHTree | None = None
 
     def cast_ray(self, origin: Vector, direction: Vector) -> np.ndarray | None:
-        """Return the place at rest, (3,) float32 in object space, where a ray in world space meets the object.
+        """Return the point of the original mesh that a ray hits, (3,) float32 in object space; None for a miss.
 
-        None if it does not meet it. The ray meets the surface with all modifiers; the closest place of the own
-        mesh is taken.
+        The ray is in world space and hits the evaluated mesh. If modifiers change the faces, the closest point
+        of the original mesh, deformed, is taken.
         """
         to_object = self._obj.matrix_world.inverted_safe()
         is_hit, location, _, face = self._evaluated.ray_cast(
@@ -71,7 +71,7 @@ class BrushSurface:
                 )
             location, _, index, _ = self._shown_tree.find_nearest(location)
             triangle = np.array([index])
-        # Of several triangles, the one whose barycentric coordinates are least negative has the place.
+        # The point lies in the triangle with the least negative barycentric coordinate.
         weights = [
             _barycentric(self._shown[vertex[index]], np.array(location)) for index in triangle
         ]
@@ -81,15 +81,15 @@ class BrushSurface:
     def dashes(
         self, vectors: np.ndarray, degree: int, place: np.ndarray, radius: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return short lines along a field around a place, as they are seen.
+        """Return short lines along a field around a point, on the evaluated mesh.
 
         Parameters
         ----------
         vectors : (F, 3) ndarray
-            One member of each face, at rest.
+            One member of each face of the original mesh.
         degree : int
         place : (3,) ndarray
-            At rest, object space.
+            Point of the original mesh, object space.
         radius : float
 
         Returns
@@ -111,7 +111,7 @@ class BrushSurface:
         directions = [
             np.cos(angle) * member + np.sin(angle) * np.cross(normal, member) for angle in angles
         ]
-        # The first triangle of a face tells how the face is deformed.
+        # A face is deformed like its first triangle.
         vertex = surface.triangle_vertex[np.searchsorted(surface.triangle_face, near)]
         half_length = DASH_LENGTH / 2 * np.sqrt(np.abs(_edge_cross(surface.vertices, vertex)))
         center = self._shown_center[near]
@@ -126,12 +126,12 @@ class BrushSurface:
 
     @cached_property
     def _shown_center(self) -> np.ndarray:
-        """(F, 3) float64: centers of the faces as they are seen."""
+        """Centers of the faces on the evaluated mesh, (F, 3) float64."""
         return mean_per_face(self._shown[self._surface.corner_vertex], self._surface.face_start)
 
 
 def _edge_cross(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
-    """(n,) twice the areas of (n, 3) triangles."""
+    """Return twice the areas of (n, 3) triangles, (n,)."""
     a, b, c = (points[column] for column in vertex.T)
     cross = np.cross(b - a, c - a)
     return np.sqrt(dot(cross, cross))
@@ -140,7 +140,7 @@ def _edge_cross(points: np.ndarray, vertex: np.ndarray) -> np.ndarray:
 def _deformed(
     direction: np.ndarray, vertex: np.ndarray, rest: np.ndarray, shown: np.ndarray
 ) -> np.ndarray:
-    """(n, 3) directions in the planes of (n, 3) triangles at rest, after the triangles were deformed."""
+    """Return directions in the planes of (n, 3) triangles after the triangles were deformed, (n, 3)."""
     (a, b), (shown_a, shown_b) = (
         (points[vertex[:, 1]] - points[vertex[:, 0]], points[vertex[:, 2]] - points[vertex[:, 0]])
         for points in (rest, shown)
@@ -153,7 +153,7 @@ def _deformed(
 
 
 def closest_faces(mesh: bpy.types.Mesh, surface: Surface, cache: Cache) -> FaceLocator:
-    """Return a function that finds the (n,) faces of a mesh that are closest to (n, 3) points at rest."""
+    """Return a function that finds the (n,) faces of a mesh that are closest to (n, 3) points."""
 
     def create() -> BVHTree:
         copy = bmesh.new()
@@ -173,7 +173,7 @@ def closest_faces(mesh: bpy.types.Mesh, surface: Surface, cache: Cache) -> FaceL
 
 
 def _barycentric(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """(3,) barycentric coordinates of a point of the triangle with (3, 3) corners."""
+    """Return the (3,) barycentric coordinates of a point in a triangle with (3, 3) corners."""
     a, b = corners[1] - corners[0], corners[2] - corners[0]
     matrix = np.array([[a @ a, a @ b], [a @ b, b @ b]])
     right = np.array([a @ (point - corners[0]), b @ (point - corners[0])])

@@ -1,4 +1,4 @@
-"""Planes in front of cameras that only these see: backdrops and keys."""
+"""Planes in front of cameras, which only camera rays see, and backdrops, which are such planes."""
 
 from __future__ import annotations
 
@@ -6,12 +6,17 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..compositor.look import is_hatched
+from ..core.color import from_hex, to_linear
 from ..projection.camera import Camera
-from .cameras import FRAME_CAMERAS
-from .owned_data import delete_owned
+from .cameras import FRAME_CAMERAS, camera_of_object
+from .datablocks import delete_owned, rollback_on_error
+from .look_properties import read_look
+from .node_builder import new_emissive_material
 from .picture_nodes import shown_materials
+from .read_view import scene_depsgraph
 
-#: Visibility to rays; only camera rays meet a plane.
+#: Kinds of rays that do not see a plane. Only camera rays do.
 HIDDEN_FROM = (
     "visible_diffuse",
     "visible_glossy",
@@ -22,9 +27,9 @@ HIDDEN_FROM = (
 
 
 def pictured_cameras(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.PropertyGroup]:
-    """Return the cameras that have pictures, with a record of each: of a picture that is shown, if any.
+    """Return the cameras that have pictures, with the record of one picture each.
 
-    For animations, it is the active camera of the scene.
+    A picture that is shown goes first. An animation counts for the active camera of the scene.
     """
     shown = set[bpy.types.Material]().union(*(shown_materials(obj) for obj in scene.objects))
     cameras: dict[bpy.types.Object, bpy.types.PropertyGroup] = {}
@@ -43,7 +48,7 @@ def remove_camera_planes(scene: bpy.types.Scene, tag: str) -> list[bpy.types.Ima
     Returns
     -------
     list of bpy.types.Image
-        The images of these materials that nothing else uses.
+        The images of these materials, if nothing else uses them.
     """
     images = []
     for obj in [obj for obj in scene.objects if obj.get(tag)]:
@@ -123,3 +128,41 @@ def frame_corners(camera: Camera, distance: float, size: float = 1.0) -> np.ndar
     ]
     corners = np.array(clip) @ np.linalg.inv(camera.projection).T
     return corners[:, :3] / corners[:, 3:]
+
+
+#: Custom property on the objects of backdrops.
+BACKDROP_TAG = "rosy_backdrop"
+
+#: Distance of a backdrop from the camera, as a fraction of the end of the clip range.
+DISTANCE = 0.99
+
+#: Size of a backdrop relative to the frame, so that it also fills the frame if the lens or the size of
+#: renders changes a little.
+OVERSIZE = 1.5
+
+
+def update_backdrops(scene: bpy.types.Scene) -> None:
+    """Replace the backdrops of a scene by the ones that its settings ask for.
+
+    If backdrops are switched on and the look draws lines on paper, every camera with a picture gets a
+    backdrop in the color of the paper. For an animation, the active camera of the scene gets one.
+    """
+    remove_camera_planes(scene, BACKDROP_TAG)
+    look = read_look(scene.rosy)
+    if scene.rosy.backdrop and is_hatched(look):
+        for camera in pictured_cameras(scene):
+            _add_backdrop(scene, camera, look.paper_color)
+
+
+def _add_backdrop(scene: bpy.types.Scene, camera: bpy.types.Object, paper: str) -> None:
+    """Add a plane with the color of the paper, parented to a camera."""
+    name = f"RoSy Backdrop {camera.name}"
+    view = camera_of_object(scene, scene_depsgraph(scene), camera)
+    corners = frame_corners(view, DISTANCE * camera.data.clip_end, OVERSIZE)
+    with rollback_on_error() as created:
+        color = (*to_linear(from_hex(paper)).tolist(), 1.0)
+        material = new_emissive_material(name, color, scene.rosy.emission)
+        created.append(material)
+        material.diffuse_color = color  # in views with Solid shading
+        material.use_backface_culling = True
+        add_camera_plane(scene, camera, name, BACKDROP_TAG, corners, material, created)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..projection.camera import Camera, check_size
-from .libraries import check_object_type
+from .datablocks import check_object_type
 
 #: Camera name of pictures that are drawn from a 3D view.
 VIEW_NAME = "3D View"

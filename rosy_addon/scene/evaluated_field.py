@@ -1,4 +1,4 @@
-"""Fields on evaluated meshes: temporary attributes that modifiers copy, and reading them again."""
+"""Fields on evaluated meshes, read from attributes that modifiers have copied."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from ..field.validate import (
     project_to_tangent,
     tangent_normals,
 )
-from .compat import is_editable
+from .datablocks import is_editable, user_modifiers
 from .field_attributes import (
     VECTOR_TYPE,
     attribute_name,
     cached_field,
     field_degree,
     field_values,
+    follow_mesh,
     is_face_vector_field,
+    read_rest_shape,
 )
+from .mesh_fields import read_mesh_field
 from .meshes import mesh_surface, read_attribute
-from .owned_data import user_modifiers
-from .read_field import read_mesh_field
-from .rest_shape import follow_mesh, read_rest_shape
 
-#: Temporary attribute while a scene is read: the normals of the original faces, to whose planes the
-#: field's vectors are tangent. Modifiers copy it to the evaluated mesh.
+#: Temporary attribute while a scene is read: the normals of the original faces, to which the field's vectors
+#: are perpendicular. Modifiers copy it to the evaluated mesh.
 FACE_NORMAL_ATTRIBUTE = "rosy_face_normal"
 
 #: Temporary attribute while a scene is read: vectors on faces, for a field that is stored in
@@ -79,20 +79,18 @@ class FieldLayout:
         return all(name in mesh.attributes for name in self.attribute_names)
 
 
-def add_temp_field(mesh: bpy.types.Mesh, field: RosyField, name: str) -> FieldLayout:
-    """Store a field in temporary attributes on the faces of a mesh, and return their layout."""
-    layout = FieldLayout(name, field.degree, field.direction_ratios is not None, field.family_count)
-    add_temp_vectors(mesh, name, field.vectors)
+def _add_temp_field(mesh: bpy.types.Mesh, field: RosyField, layout: FieldLayout) -> None:
+    """Store a field in temporary attributes on the faces of a mesh."""
+    _add_temp_vectors(mesh, layout.name, field.vectors)
     for index, deviation_name in enumerate(layout.attribute_names[1:]):
         deviation = field.direction_ratios[:, index]
         attribute = mesh.attributes.new(deviation_name, "FLOAT2", "FACE")
         pairs = np.stack([deviation.real, deviation.imag], axis=1).astype(np.float32)
         attribute.data.foreach_set("vector", pairs.ravel())
     mesh.update_tag()
-    return layout
 
 
-def add_temp_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
+def _add_temp_vectors(mesh: bpy.types.Mesh, name: str, vectors: np.ndarray) -> None:
     """Store vectors, (F, 3), in a temporary attribute on the faces of a mesh."""
     attribute = mesh.attributes.new(name, VECTOR_TYPE, "FACE")
     attribute.data.foreach_set("vector", vectors.astype(np.float32).ravel())
@@ -107,11 +105,11 @@ def read_evaluated_field(
     label: str,
     cache: Cache | None = None,
 ) -> RosyField:
-    """Read the field of an evaluated mesh, whose faces a modifier may have created.
+    """Read the field of an evaluated mesh, which may have new faces.
 
-    Modifiers copy the vector of an original face without changing it. `Surface.rest_vertices` gives
-    the new face before any deformation, but its plane can still differ from that of the original
-    face, for example if the polygon was not planar. If the mesh has the original normals
+    Modifiers copy the vector of an original face unchanged to its new faces. A new face may lie in another
+    plane than the original face even before any deformation (`Surface.rest_vertices`), for example if the
+    polygon was not planar. If the mesh has the original normals
     (`FACE_NORMAL_ATTRIBUTE`), each vector is transported by the minimal rotation between the two
     normals. Otherwise it is projected to the tangent plane.
 
@@ -121,7 +119,7 @@ def read_evaluated_field(
         Evaluated.
     layout : FieldLayout
     surface : Surface
-        Of the mesh.
+        Surface of the mesh.
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     label : str
@@ -226,7 +224,7 @@ def temp_attributes(
             if deforms and FACE_NORMAL_ATTRIBUTE not in mesh.attributes and _can_modify(mesh):
                 temp_meshes.append(mesh)
                 surface = mesh_surface(mesh, f"object '{obj.name}'", cache=cache)
-                add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
+                _add_temp_vectors(mesh, FACE_NORMAL_ATTRIBUTE, surface.face_normal)
         if rest_enabled or temp_meshes:
             depsgraph.update()
         yield layouts
@@ -262,14 +260,14 @@ def _prepare_field(
             f"{label}: its mesh is {'in edit mode' if mesh.is_editmode else 'linked'}, and only fields "
             "stored as vectors on faces can be read there: use Store Field first"
         )
+    has_deviations = field.direction_ratios is not None
+    layout = FieldLayout(TEMP_FIELD_ATTRIBUTE, field.degree, has_deviations, field.family_count)
     if TEMP_FIELD_ATTRIBUTE not in mesh.attributes:
         temp_meshes.append(mesh)
-        return add_temp_field(mesh, field, TEMP_FIELD_ATTRIBUTE)
-    return FieldLayout(
-        TEMP_FIELD_ATTRIBUTE, field.degree, field.direction_ratios is not None, field.family_count
-    )
+        _add_temp_field(mesh, field, layout)
+    return layout
 
 
 def _can_modify(mesh: bpy.types.Mesh) -> bool:
-    """Whether attributes can be added to a mesh."""
+    """Return whether attributes can be added to a mesh."""
     return is_editable(mesh) and not mesh.is_editmode

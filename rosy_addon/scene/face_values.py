@@ -1,4 +1,4 @@
-"""Reading vectors and numbers from mesh attributes, as one value for each face."""
+"""Read vectors and numbers from mesh attributes, for each face or corner."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
 from .meshes import mesh_label, mesh_surface, polygon_arrays
 
-#: Types of attributes that are numbers, with dtypes for them, and those that are colors.
+#: Types of attributes with numbers, with their dtypes, and types of attributes with colors.
 NUMBER_TYPES = {"FLOAT": np.float32, "INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
 COLOR_TYPES = ("FLOAT_COLOR", "BYTE_COLOR")
 
@@ -112,7 +112,7 @@ def corner_scalars(attribute: bpy.types.Attribute, mesh: bpy.types.Mesh, source:
     Raises
     ------
     RosyError
-        As of `scalar_values`.
+        See `scalar_values`.
     """
     values = scalar_values(attribute, source)
     corner_vertex, face_start = polygon_arrays(mesh)

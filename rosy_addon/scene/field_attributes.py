@@ -1,4 +1,4 @@
-"""The mesh attributes that hold fields: their names, forms and values.
+"""The mesh attributes that hold fields: their names, forms and values, and the rest shape beside them.
 
 The standard form is a vector attribute (FLOAT_VECTOR) on faces. It holds one member vector of each
 face in object space. Its length is the magnitude; it is zero where the field is undefined. The name
@@ -10,6 +10,12 @@ of the attribute and the degree are in ``mesh.rosy``. These forms can be read to
 - a float on faces: the angle in radians between the face's first edge and a member,
   counterclockwise about the normal. The magnitude is 1. NaN means undefined if the policy for
   values that are not finite allows it.
+
+Blender moves the vertices of a mesh when a transform or a modifier is applied, when objects are
+joined, and in edit mode, but it does not rotate the vectors of attributes. Two hidden attributes record
+the rest shape, in which a field was stored: the positions of the vertices, and a check of each vector,
+which shows whether the vector is still the stored one. With them a field follows later changes of its
+mesh.
 """
 
 from __future__ import annotations
@@ -21,9 +27,11 @@ import numpy as np
 
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
+from ..field.carry import carried_vectors
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
-from .compat import has_rosy_properties
+from .datablocks import has_rosy_properties
+from .meshes import read_attribute
 
 DEFAULT_FIELD_NAME = "rosy"
 DEFAULT_DEGREE = 4
@@ -47,7 +55,7 @@ def field_degree(mesh: bpy.types.Mesh) -> int:
 
 
 def has_field(obj: bpy.types.Object) -> bool:
-    """Whether an object is a mesh with a field attribute, which may be invalid."""
+    """Return whether an object is a mesh with a field attribute, which may be invalid."""
     if obj.type != "MESH" or obj.data is None:
         return False
     attributes = obj.data.attributes
@@ -55,7 +63,7 @@ def has_field(obj: bpy.types.Object) -> bool:
 
 
 def is_face_vector_field(mesh: bpy.types.Mesh, name: str | None = None) -> bool:
-    """Whether the field is stored in the standard form: vectors on faces."""
+    """Return whether the field is stored in the standard form: vectors on faces."""
     attribute = mesh.attributes.get(name or attribute_name(mesh))
     return attribute is not None and (attribute.domain, attribute.data_type) == (
         "FACE",
@@ -111,7 +119,7 @@ def check_attribute_type(
     if attribute is not None and (attribute.domain, attribute.data_type) != (domain, data_type):
         raise RosyError(
             f"mesh '{mesh.name}' already has an attribute '{name}' of another type "
-            f"({describe_type(attribute)}): remove it, or choose another name for the field"
+            f"({describe_type(attribute)}): remove it, or choose another name"
         )
 
 
@@ -156,3 +164,106 @@ def surface_key(surface: Surface, *key_parts: object) -> Hashable:
     The result must contain the surface: while it is alive, no other object can have its id.
     """
     return "field", id(surface), content_hash(*key_parts)
+
+
+#: Coefficients of a vector's components in its check. The check is linear, so it stays right when Blender
+#: interpolates attributes.
+CHECK_COEFFICIENTS = np.array([1.0, 1.618034, 2.718282])
+
+#: Largest difference of a check, relative to the length of the vector.
+CHECK_TOLERANCE = 1e-4
+
+#: Positions of the vertices and checks of the faces.
+RestShape = tuple[np.ndarray, np.ndarray]
+
+
+def _attribute_names(name: str) -> tuple[str, str]:
+    """Return the names of the positions and the checks of a field's attribute."""
+    return f".{name}_rest", f".{name}_check"
+
+
+def store_rest_shape(mesh: bpy.types.Mesh, name: str) -> None:
+    """Store the present shape beside an attribute of vectors on faces.
+
+    Nothing is stored if Blender does not allow the names of the attributes. The field is then read
+    as it is stored.
+    """
+    rest_name, check_name = _attribute_names(name)
+    vectors = read_attribute(mesh, name, np.float32, 3)
+    positions = read_attribute(mesh, "position", np.float32, 3)
+    try:
+        get_or_create_attribute(mesh, rest_name, VECTOR_TYPE, "POINT")
+        get_or_create_attribute(mesh, check_name, ANGLE_TYPE)
+    except RosyError:
+        return
+    # Written after both exist: a new attribute may move the others in memory.
+    mesh.attributes[rest_name].data.foreach_set("vector", positions.ravel())
+    mesh.attributes[check_name].data.foreach_set("value", vector_checks(vectors).astype(np.float32))
+
+
+def read_rest_shape(mesh: bpy.types.Mesh, name: str) -> RestShape | None:
+    """Return the positions (V, 3) and checks (F,) beside an attribute; None if there are none.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Original or evaluated.
+    name : str
+        Name of the attribute that was stored with `store_rest_shape`.
+    """
+    if not _has_rest_shape(mesh, name):
+        return None
+    rest_name, check_name = _attribute_names(name)
+    positions = read_attribute(mesh, rest_name, np.float32, 3)
+    checks = read_attribute(mesh, check_name, np.float32, 1)
+    return None if positions is None or checks is None else (positions, checks)
+
+
+def follow_mesh(rest_shape: RestShape | None, vectors: np.ndarray, surface: Surface) -> np.ndarray:
+    """Rotate stored vectors as the faces have been rotated since they were stored.
+
+    Parameters
+    ----------
+    rest_shape : (ndarray, ndarray) or None
+        Result of `read_rest_shape`.
+    vectors : (F, 3) or (F, N, 3) ndarray
+        The values of the attribute; or of ``dir0`` ... ``dir{N-1}``, if the attribute is ``dir0``.
+    surface : Surface
+        The surface of the mesh. If it is deformed, the vectors are rotated to its rest shape.
+
+    Returns
+    -------
+    ndarray
+        `vectors` itself if nothing has moved. Vectors that were changed since, for example by a script, stay
+        as they are. See `carried_vectors` for other vectors that stay.
+    """
+    if rest_shape is None:
+        return vectors
+    stored_positions, checks = rest_shape
+    positions = surface.vertices if surface.rest_vertices is None else surface.rest_vertices
+    if len(stored_positions) != len(positions):
+        return vectors
+    if np.array_equal(stored_positions, positions):
+        return vectors
+    first = vectors.reshape(len(vectors), -1, 3)[:, 0]
+    with np.errstate(invalid="ignore", over="ignore"):
+        length = np.abs(first).max(axis=1)
+        is_stored = np.abs(vector_checks(first) - checks) <= CHECK_TOLERANCE * length
+    carried = carried_vectors(surface.in_rest_shape(), stored_positions, vectors)
+    is_stored = is_stored.reshape(-1, *(1 for _ in vectors.shape[1:]))
+    return np.where(is_stored, carried, vectors)
+
+
+def _has_rest_shape(mesh: bpy.types.Mesh, name: str) -> bool:
+    """Return whether both attributes exist as they were stored. Users can convert them to other types."""
+    types = ("POINT", VECTOR_TYPE), ("FACE", ANGLE_TYPE)
+    attributes = (mesh.attributes.get(hidden) for hidden in _attribute_names(name))
+    return all(
+        attribute is not None and (attribute.domain, attribute.data_type) == expected
+        for attribute, expected in zip(attributes, types, strict=True)
+    )
+
+
+def vector_checks(vectors: np.ndarray) -> np.ndarray:
+    """Return the checks of (F, 3) vectors, (F,) float64."""
+    return vectors.astype(np.float64) @ CHECK_COEFFICIENTS

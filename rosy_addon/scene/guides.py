@@ -1,4 +1,9 @@
-"""Reading guides that a field follows: strokes, annotations, empties, UV maps, vectors."""
+"""Guides that a field follows: strokes, annotations, empties, UV maps, vectors, and combed guides.
+
+Combed guides are stored on the mesh. The attribute `GUIDE_ATTRIBUTE` (FLOAT_VECTOR on faces) holds one
+member vector of each face in object space, whose length from 0 to 1 is the firmness of the guide. Beside it
+are its rest shape, as for fields, and a check of the field that was made from the guides.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +16,22 @@ from mathutils.geometry import interpolate_bezier
 
 from ..core.errors import RosyError
 from ..field.surface import Surface
-from .compat import is_annotation_in_space, scene_annotation
+from .datablocks import check_not_missing
 from .face_values import read_face_vectors
-from .libraries import check_not_missing
+from .field_attributes import (
+    ANGLE_TYPE,
+    CHECK_TOLERANCE,
+    VECTOR_TYPE,
+    attribute_name,
+    check_attribute_type,
+    follow_mesh,
+    get_or_create_attribute,
+    is_face_vector_field,
+    read_rest_shape,
+    store_rest_shape,
+    vector_checks,
+)
 from .meshes import mesh_label, read_attribute, read_collection
-from .rest_shape import follow_mesh, read_rest_shape
 
 #: Object types that can guide a field: those with strokes, and all.
 STROKE_TYPES = ("GREASEPENCIL", "GPENCIL", "CURVE", "CURVES")
@@ -104,7 +120,8 @@ def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[
         If there is no such stroke, or if the owner is scaled to zero.
     """
     matrix = _world_to_object(owner)
-    annotation = scene_annotation(scene)
+    # The property was renamed in Blender 5.0.
+    annotation = scene.annotation if hasattr(scene, "annotation") else scene.grease_pencil
     frames = [
         _annotation_frame(layer, scene.frame_current)
         for layer in (annotation.layers if annotation else ())
@@ -115,7 +132,8 @@ def annotation_strokes(scene: bpy.types.Scene, owner: bpy.types.Object) -> list[
         for frame in frames
         if frame is not None
         for stroke in frame.strokes
-        if len(stroke.points) > 1 and is_annotation_in_space(stroke)
+        # Blender 4.3 does not tell where a stroke has its coordinates.
+        if len(stroke.points) > 1 and getattr(stroke, "display_mode", "3DSPACE") == "3DSPACE"
     ]
     strokes = [stroke for stroke in strokes if np.isfinite(stroke).all()]
     if not strokes:
@@ -143,37 +161,10 @@ def _world_to_object(obj: bpy.types.Object) -> np.ndarray:
         raise RosyError(f"object '{obj.name}' has a scale of zero: scale it up") from None
 
 
-def corner_uvs(mesh: bpy.types.Mesh, name: str = "") -> np.ndarray:
-    """Read a UV map of a mesh. By default it is the active one.
-
-    Returns
-    -------
-    (C, 2) float32 ndarray
-
-    Raises
-    ------
-    RosyError
-        If the UV map does not exist, or the mesh is in edit mode.
-    """
-    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
-    if layer is None:
-        if not mesh.uv_layers:
-            raise RosyError(f"{mesh_label(mesh)} has no UV map: add one")
-        available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers)
-        raise RosyError(f"{mesh_label(mesh)} has no UV map '{name}', only {available}")
-    values = read_attribute(mesh, layer.name, np.float32, 2)
-    if values is None:
-        raise RosyError(
-            f"{mesh_label(mesh)}: UV map '{layer.name}' cannot be read in edit mode: leave edit mode "
-            "(Tab) first"
-        )
-    return values
-
-
 def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarray:
     """Read a vector attribute as one vector for each face; see `read_face_vectors`.
 
-    Vectors that RoSy has stored are turned as the faces were turned since.
+    Vectors that RoSy has stored are rotated with the faces; see `follow_mesh`.
 
     Parameters
     ----------
@@ -181,7 +172,7 @@ def guide_vectors(mesh: bpy.types.Mesh, name: str, surface: Surface) -> np.ndarr
     name : str
         Name of the attribute.
     surface : Surface
-        Of the mesh.
+        Surface of the mesh.
 
     Returns
     -------
@@ -259,3 +250,64 @@ def _spline_points(spline: bpy.types.Spline) -> np.ndarray:
 def _read_coordinates(collection, key: str, columns: int) -> np.ndarray:
     """Read coordinates from a collection: (n, columns) float64."""
     return read_collection(collection, key, np.float32, columns).astype(np.float64)
+
+
+#: Name of the attribute with the guides, and of the attribute with the checks of the field.
+GUIDE_ATTRIBUTE, FIELD_CHECK_ATTRIBUTE = "rosy_guides", ".rosy_guides_field"
+
+#: Least firmness of the guides of strokes. Guides that only keep the rest of the field have less.
+STROKE_FIRMNESS = 0.25
+
+
+def read_combed_guides(mesh: bpy.types.Mesh, surface: Surface) -> np.ndarray:
+    """Read the guides of a mesh.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    surface : Surface
+        Surface of the mesh.
+
+    Returns
+    -------
+    (F, 3) float64 ndarray
+        Zero on faces without a guide, and where something else has changed the field since.
+    """
+    guides = np.zeros((surface.face_count, 3))
+    values = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
+    checks = read_attribute(mesh, FIELD_CHECK_ATTRIBUTE, np.float32, 1)
+    field = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
+    are_stored = is_face_vector_field(mesh, GUIDE_ATTRIBUTE) and is_face_vector_field(mesh)
+    if not are_stored or checks is None:
+        return guides
+    values = follow_mesh(read_rest_shape(mesh, GUIDE_ATTRIBUTE), values.astype(np.float64), surface)
+    length = np.abs(field).max(axis=1)
+    with np.errstate(invalid="ignore"):
+        is_current = np.abs(vector_checks(field) - checks) <= CHECK_TOLERANCE * length
+        is_current &= np.isfinite(values).all(axis=1)
+    guides[is_current] = values[is_current]
+    return guides
+
+
+def check_guides_storable(mesh: bpy.types.Mesh) -> None:
+    """Raise an error if `store_combed_guides` cannot store guides on a mesh."""
+    check_attribute_type(mesh, GUIDE_ATTRIBUTE, VECTOR_TYPE)
+    check_attribute_type(mesh, FIELD_CHECK_ATTRIBUTE, ANGLE_TYPE)
+
+
+def store_combed_guides(mesh: bpy.types.Mesh, guides: np.ndarray) -> None:
+    """Store (F, 3) guides, after the field that was made from them.
+
+    Raises
+    ------
+    RosyError
+        If the mesh has an attribute of the same name and another type.
+    """
+    check_guides_storable(mesh)
+    attribute = get_or_create_attribute(mesh, GUIDE_ATTRIBUTE, VECTOR_TYPE)
+    attribute.data.foreach_set("vector", guides.astype(np.float32).ravel())
+    store_rest_shape(mesh, GUIDE_ATTRIBUTE)
+    field = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
+    attribute = get_or_create_attribute(mesh, FIELD_CHECK_ATTRIBUTE, ANGLE_TYPE)
+    attribute.data.foreach_set("value", vector_checks(field).astype(np.float32))
+    mesh.update()

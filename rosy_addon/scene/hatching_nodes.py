@@ -26,8 +26,8 @@ from ..compositor.look import Look, has_tone_inks
 from ..compositor.streak_statistics import MAX_SOFTNESS, MIN_SOFTNESS
 from ..compositor.target_tone import MIN_TONE_RANGE
 from ..core.color import from_hex, to_linear
+from .datablocks import OWNED_TAG
 from .node_builder import NodeBuilder, Number
-from .owned_data import OWNED_TAG
 
 #: Name of the node group.
 GROUP_NAME = "RoSy Hatching"

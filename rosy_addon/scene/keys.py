@@ -1,4 +1,4 @@
-"""Keys: what explains a picture, on a plane in front of the camera that it was drawn from."""
+"""Keys, which explain a picture, on a plane in front of its camera: color scale, dots, scale bar, text."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .camera_planes import (
     remove_camera_planes,
 )
 from .cameras import camera_of_object
-from .font_shapes import FontShapes
+from .datablocks import KEY_TAG, delete_owned, rollback_on_error
 from .look_properties import read_look
+from .meshes import read_collection, vertex_positions
 from .node_builder import new_empty_material
-from .owned_data import KEY_TAG, delete_owned, rollback_on_error
 from .read_view import scene_depsgraph
 
 #: Distance of a key from the camera, in the starts of the clip range.
@@ -48,10 +48,10 @@ DARK_BACKGROUND = 0.18
 
 
 def update_keys(scene: bpy.types.Scene) -> None:
-    """Create the keys of a scene anew, and remove those that it should not have.
+    """Replace the keys of a scene by the ones that its settings ask for.
 
-    If the switch is on, every camera with a picture has a key. For animations, it is the active camera
-    of the scene. A key says what the picture was drawn from when it was baked.
+    If keys are switched on, every camera with a picture gets one. For an animation, the active camera of
+    the scene gets one. A key explains the picture as it was baked.
     """
     for image in remove_camera_planes(scene, KEY_TAG):
         delete_owned(image)
@@ -197,7 +197,7 @@ def _world_color(world: bpy.types.World | None) -> np.ndarray | None:
 
 
 def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.types.Material:
-    """Create a material that emits an image, and is transparent where that is, and from behind."""
+    """Create a material that emits an image, with its transparency. It is transparent from behind."""
     material, build = new_empty_material(name)
     material[KEY_TAG] = True
     material.diffuse_color = (1.0, 1.0, 1.0, 0.0)
@@ -215,3 +215,47 @@ def _new_material(name: str, image: bpy.types.Image, strength: float) -> bpy.typ
     shader = build.mix_shaders(opacity, transparent.outputs["BSDF"], emission.outputs["Emission"])
     build("ShaderNodeOutputMaterial", {"Surface": shader})
     return material
+
+
+#: Points of each curve of a letter, for large letters too.
+CURVE_RESOLUTION = 6
+
+
+class FontShapes:
+    """Lines of text as triangles, in Blender's own font. Each text is read once."""
+
+    def __init__(self) -> None:
+        self._shapes: dict[str, np.ndarray] = {}
+
+    def triangles(self, text: str) -> np.ndarray:
+        """Return the (n, 3, 2) triangles of a text of size 1, from its left end and baseline."""
+        if text not in self._shapes:
+            self._shapes[text] = _text_triangles(text)
+        return self._shapes[text]
+
+    def width(self, text: str) -> float:
+        """Return the width of a text of size 1."""
+        triangles = self.triangles(text)
+        return float(triangles[..., 0].max()) if len(triangles) else 0.0
+
+
+def _text_triangles(text: str) -> np.ndarray:
+    """Return the (n, 3, 2) triangles of a text, moved so that the least x is 0."""
+    fonts = set(bpy.data.fonts)
+    curve = bpy.data.curves.new("RoSy text", type="FONT")
+    created: list[bpy.types.ID] = [curve]
+    try:
+        curve.body = text
+        curve.resolution_u = CURVE_RESOLUTION
+        obj = bpy.data.objects.new(curve.name, curve)  # in no scene
+        created.insert(0, obj)
+        mesh = obj.to_mesh()
+        mesh.calc_loop_triangles()
+        points = vertex_positions(mesh)[:, :2].astype(np.float64)
+        triangles = points[read_collection(mesh.loop_triangles, "vertices", np.int32, 3)]
+    finally:
+        # The mesh goes with the object. The font may have come with the curve.
+        bpy.data.batch_remove([*created, *(set(bpy.data.fonts) - fonts)])
+    if len(triangles):
+        triangles[..., 0] -= triangles[..., 0].min()
+    return triangles

@@ -42,7 +42,7 @@ def color_components(code: str, setting: Color) -> list[float]:
 
 
 def look_at_frame(scene: bpy.types.Scene, look: Look, frame: float) -> Look:
-    """Return the look of a frame, whose streaks may drift. The frame range of the scene is a loop."""
+    """Return the look of a frame. Its streaks may drift, in a loop over the frame range of the scene."""
     count = scene.frame_end - scene.frame_start + 1
     return flow_at(look, frame - scene.frame_start, count)
 

@@ -1,6 +1,6 @@
-"""Digests of evaluated meshes and their fields, by which pictures know that they are out of date.
+"""Digests of evaluated meshes and their fields, which tell whether a picture is out of date.
 
-A digest is much faster than reading a surface, and needs no temporary attributes.
+Computing a digest is much faster than reading a surface, and needs no temporary attributes.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ import numpy as np
 
 from ..core.cache import content_hash
 from ..field.rosy_field import MAX_DEGREE
-from .color_inputs import color_values_digest
+from .datablocks import user_modifiers
 from .field_attributes import ANGLE_TYPE, VECTOR_TYPE, attribute_name, field_degree
+from .look_inputs import ReadRequest, color_values_digest, tone_digest
 from .meshes import read_attribute, shape_digest, vertex_positions
-from .owned_data import user_modifiers
-from .read_request import ReadRequest
-from .tone_inputs import tone_digest
 
 
 @dataclass(frozen=True, eq=False)
 class MeshState:
-    """A digest of an evaluated mesh, with its field if that is drawn, and its bounding box.
+    """The digest and the bounding box of an evaluated mesh, with its field if it is drawn.
 
     Attributes
     ----------
@@ -45,7 +43,7 @@ MeshStates = dict[tuple, MeshState | None]
 def mesh_state_key(
     obj: bpy.types.Object, owner: bpy.types.Object, request: ReadRequest | None
 ) -> tuple:
-    """Return the key in `MeshStates` of an evaluated object; the first part is that of its owner.
+    """Return the key in `MeshStates` of an evaluated object. Its first part identifies the owner.
 
     Parameters
     ----------
@@ -67,7 +65,7 @@ def read_mesh_state(
     Parameters
     ----------
     mesh : bpy.types.Mesh or None
-        Of `evaluated_mesh`.
+        From `evaluated_mesh`.
     owner, request
         See `mesh_state_key`.
     """

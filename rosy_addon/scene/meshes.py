@@ -134,7 +134,9 @@ def _read_shape(mesh: bpy.types.Mesh, *, occluder_only: bool) -> dict[str, np.nd
     }
     if not occluder_only:
         flat_faces = read_attribute(mesh, "sharp_face", bool, 1)
-        shape["sharp_edges"] = _sharp_edges(mesh)
+        sharp_edges = read_attribute(mesh, "sharp_edge", bool, 1)
+        if sharp_edges is not None and sharp_edges.any():
+            shape["sharp_edges"] = _edge_vertices(mesh)[sharp_edges]
         shape["flat_faces"] = flat_faces if flat_faces is not None and flat_faces.any() else None
         shape["corner_normal"] = _corner_normals(mesh) if mesh.has_custom_normals else None
     return shape
@@ -145,29 +147,47 @@ def _corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     return read_collection(mesh.corner_normals, "vector", np.float32, 3)
 
 
-def read_uvs(mesh: bpy.types.Mesh, name: str, label: str, purpose: str) -> np.ndarray:
-    """Return u and v of the corners, (C, 2) float32, from a UV map.
+def uv_map_name(mesh: bpy.types.Mesh, name: str, label: str) -> str:
+    """Return the name of a UV map of a mesh: `name`, or the active one if it is empty.
+
+    Raises
+    ------
+    RosyError
+        If there is no such UV map. `label` is the mesh in the message.
+    """
+    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
+    if layer is not None:
+        return layer.name
+    if not mesh.uv_layers:
+        raise RosyError(f"{label} has no UV map: unwrap its mesh first")
+    available = ", ".join(f"'{other.name}'" for other in mesh.uv_layers)
+    raise RosyError(f"{label} has no UV map '{name}', only {available}")
+
+
+def read_uvs(mesh: bpy.types.Mesh, name: str = "", label: str | None = None) -> np.ndarray:
+    """Return u and v of the corners, (C, 2) float32, from a UV map of a mesh.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
     name : str
-        Of the UV map. Empty: the active one.
-    label, purpose : str
-        The mesh, and what needs the UV map, for the message.
+        Name of the UV map. Empty: the active one.
+    label : str, optional
+        The mesh in messages; by default `mesh_label`.
 
     Raises
     ------
     RosyError
-        If there is no such UV map.
+        If there is no such UV map, or the mesh is in edit mode.
     """
-    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
-    if layer is None:
-        missing = f"no UV map '{name}'" if name else "no UV map"
-        raise RosyError(f"{label}: its mesh has {missing}, which {purpose} needs")
-    values = np.empty(2 * len(mesh.loops), dtype=np.float32)
-    layer.uv.foreach_get("vector", values)
-    return values.reshape(-1, 2)
+    label = mesh_label(mesh) if label is None else label
+    name = uv_map_name(mesh, name, label)
+    values = read_attribute(mesh, name, np.float32, 2)
+    if values is None:
+        raise RosyError(
+            f"{label}: UV map '{name}' cannot be read in edit mode: leave edit mode (Tab) first"
+        )
+    return values
 
 
 def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -175,7 +195,13 @@ def polygon_arrays(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
     corner_vertex = _attribute_or_collection(
         mesh, ".corner_vert", mesh.loops, "vertex_index", np.int32
     )
-    return corner_vertex, _face_starts(mesh)
+    face_count, corner_count = len(mesh.polygons), len(mesh.loops)
+    if corner_count == 3 * face_count:
+        return corner_vertex, np.arange(0, corner_count + 1, 3, dtype=np.int32)
+    face_start = np.empty(face_count + 1, dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", face_start[:-1])
+    face_start[-1] = corner_count
+    return corner_vertex, face_start
 
 
 def vertex_positions(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -217,9 +243,7 @@ def marked_edges(mesh: bpy.types.Mesh, mark: str) -> np.ndarray:
         raise NoFeaturesError(
             f"{mesh_label(mesh)} has no edges of this kind ({label}): mark some, or choose another kind"
         )
-    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[
-        is_marked
-    ]
+    return _edge_vertices(mesh)[is_marked]
 
 
 def flush_edit_mode(mesh: bpy.types.Mesh) -> None:
@@ -241,17 +265,6 @@ def read_attribute(mesh: bpy.types.Mesh, name: str, dtype: type, columns: int) -
     return read_collection(attribute.data, key, dtype, columns)
 
 
-def _face_starts(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Return the first corner of each face and the number of corners: (F + 1,) int32."""
-    face_count, corner_count = len(mesh.polygons), len(mesh.loops)
-    if corner_count == 3 * face_count:
-        return np.arange(0, corner_count + 1, 3, dtype=np.int32)
-    starts = np.empty(face_count + 1, dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", starts[:-1])
-    starts[-1] = corner_count
-    return starts
-
-
 def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     """Return Blender's own triangulation, for the same pictures; empty if there is none yet."""
     face_count = len(mesh.polygons)
@@ -266,12 +279,9 @@ def _triangles(mesh: bpy.types.Mesh) -> dict[str, np.ndarray]:
     }
 
 
-def _sharp_edges(mesh: bpy.types.Mesh) -> np.ndarray | None:
-    """Return the vertices of the edges marked sharp, (K, 2) int32; None if there are none."""
-    sharp = read_attribute(mesh, "sharp_edge", bool, 1)
-    if sharp is None or not sharp.any():
-        return None
-    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)[sharp]
+def _edge_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Return the vertices of all edges, (E, 2) int32."""
+    return _attribute_or_collection(mesh, ".edge_verts", mesh.edges, "vertices", np.int32, 2)
 
 
 def _edge_flags(mesh: bpy.types.Mesh, property_name: str) -> np.ndarray:

@@ -8,14 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .compat import has_nodes_by_default
-
 
 class NodeBuilder:
     """Adds nodes to a tree, laid out in rows from left to right.
 
     Calling it adds a node of a type, sets its properties, and connects its inputs to sockets or
-    constants. Inputs are given by their numbers, or by the names of those that the properties enable.
+    constants. Inputs are given by number, or by name among the inputs that the properties enable.
     """
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
@@ -163,8 +161,10 @@ class Number:
 def new_empty_material(name: str) -> tuple[bpy.types.Material, NodeBuilder]:
     """Create a material without nodes, and return what adds them."""
     material = bpy.data.materials.new(name)
-    if not has_nodes_by_default(material):
-        material.use_nodes = True
+    if material.node_tree is None:
+        material.use_nodes = (
+            True  # deprecated since Blender 5.0, where a material has nodes already
+        )
     material.node_tree.nodes.clear()
     return material, NodeBuilder(material.node_tree)
 

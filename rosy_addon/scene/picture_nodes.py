@@ -1,6 +1,6 @@
 """Nodes that show a picture: a material per camera, a node group and a modifier per object.
 
-The user may have applied the modifier. Then the data of the object have the material and attribute.
+If the user has applied the modifier, the mesh of the object itself has the material and the attributes.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ import numpy as np
 
 from ..projection.camera import Camera
 from ..rendering.picture_images import NEUTRAL_GRAY
-from .compat import is_editable
+from .datablocks import KEY_TAG, OWNED_TAG, is_editable, is_rosy_modifier
 from .meshes import read_attribute
 from .node_builder import NodeBuilder, new_empty_material, new_modifier_group
-from .owned_data import KEY_TAG, OWNED_TAG, is_rosy_modifier, removable_modifiers
 from .texture_nodes import Hatching, hatching_shader
 
 #: Name of the modifier that shows a picture.
@@ -24,8 +23,8 @@ MODIFIER_NAME = "RoSy"
 #: Point attribute: the clip-space (x, y, w) of each vertex for the camera of the bake.
 CLIP_ATTRIBUTE = "rosy_projection"
 
-#: Face attribute: the material index that each face had. It matters only if the user applies the
-#: modifier.
+#: Face attribute: the material index that each face had. Restored if the user applies the modifier and then
+#: removes the picture.
 MATERIAL_ATTRIBUTE = "rosy_material"
 
 _OUTSIDE_COLOR = (NEUTRAL_GRAY, NEUTRAL_GRAY, NEUTRAL_GRAY, 1.0)
@@ -110,7 +109,7 @@ def set_sequence_frames(material: bpy.types.Material, first: int, last: int) -> 
 
 
 def _clip_position(build: NodeBuilder, view_projection: np.ndarray) -> bpy.types.Node:
-    """Return a node whose outputs X, Y and Z are the clip-space x, y and w."""
+    """Add a node with the clip-space x, y and w as its outputs X, Y and Z, and return it."""
     baked_clip = build("ShaderNodeAttribute", attribute_name=CLIP_ATTRIBUTE).outputs["Vector"]
     world_position = build("ShaderNodeNewGeometry").outputs["Position"]
     live_clip = build.transformed(world_position, _clip_rows(view_projection))
@@ -186,14 +185,8 @@ def material_of_group(group: bpy.types.NodeTree) -> bpy.types.Material | None:
     return None
 
 
-def image_of_material(material: bpy.types.Material) -> bpy.types.Image | None:
-    """Return the image that a material of `new_material` shows; None if it shows none."""
-    node = _image_node(material)
-    return None if node is None else node.image
-
-
-def _image_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """Return the node of the image of a material; None if there is none."""
+def image_node(material: bpy.types.Material) -> bpy.types.Node | None:
+    """Return the node of the image of a material of `new_material`; None if there is none."""
     nodes = material.node_tree.nodes if material.node_tree is not None else ()
     return next((node for node in nodes if node.bl_idname == "ShaderNodeTexImage"), None)
 
@@ -230,12 +223,6 @@ def set_picture_modifier(
     node_group.name = f"RoSy {obj.name}"
 
 
-def remove_picture_modifiers(obj: bpy.types.Object) -> None:
-    """Remove RoSy's modifiers from an object. Their node groups may have no use then."""
-    for modifier in removable_modifiers(obj):
-        obj.modifiers.remove(modifier)
-
-
 def applied_materials(data: bpy.types.ID | None) -> list[bpy.types.Material]:
     """Return the pictures in the material slots of a mesh, or of other data of an object.
 
@@ -254,17 +241,17 @@ def shown_materials(obj: bpy.types.Object) -> set[bpy.types.Material]:
 
 
 def _is_picture(material: bpy.types.Material | None) -> bool:
-    """Whether RoSy created a material for a picture, and not for strokes or a key."""
+    """Return whether RoSy created a material for a picture, and not for strokes or a key."""
     return (
         material is not None
         and bool(material.get(OWNED_TAG))
         and not material.get(KEY_TAG)
-        and _image_node(material) is not None
+        and image_node(material) is not None
     )
 
 
 def has_applied_picture(data: bpy.types.ID | None) -> bool:
-    """Whether a mesh, or other data, have the results of `new_group`: the modifier was applied."""
+    """Return whether a mesh, or other data, have the results of `new_group`: the modifier was applied."""
     return bool(applied_materials(data) or _applied_attributes(data))
 
 

@@ -1,4 +1,4 @@
-"""What a picture of a scene is drawn from: a `PictureState`, which can be compared and stored.
+"""The state of a scene that a picture depends on: a `PictureState`, which can be compared and stored.
 
 Nothing is changed in the file, so a state can be read while Blender draws a panel. Meshes are read as
 they are evaluated, without the temporary attributes of `scene_reader`.
@@ -22,36 +22,27 @@ from ..core.settings import settings_of
 from ..projection.camera import Camera
 from ..surface_texture.draw import DIRECTION_SETTINGS, TEXTURE_SETTINGS, texture_colors_values
 from .cameras import CameraSource, camera_of_object, render_camera, render_size, resolve_camera
-from .color_inputs import color_values_digest
 from .field_attributes import attribute_name, field_degree
-from .lights import rendered_lights
+from .look_inputs import ReadRequest, color_values_digest, read_request, reference_path
 from .look_properties import read_look
 from .mesh_states import MeshStates, digest, field_parts, mesh_state_key, read_mesh_state
 from .meshes import evaluated_mesh, polygon_arrays, read_uvs, shape_digest
-from .read_request import ReadRequest, read_request
-from .tone_inputs import reference_path
+from .read_view import rendered_lights
 from .visible_objects import field_objects, rendered_instances
 
-#: Properties of ``scene.rosy`` that decide how a picture is stored and shown, and not how it is
-#: drawn.
+#: Properties of ``scene.rosy`` that change how a picture is stored and shown, but not how it is drawn.
 OUTPUT_PROPERTIES = ("placement", "emission", "diffuse", "store", "directory", "image_format")
 
-#: Those that decide what a texture shows, and how it is stored.
+#: Properties that decide what a texture shows, and how it is stored.
 TEXTURE_OUTPUT = (
-    *(
-        "texture_content",
-        "texture_bake_light",
-        "texture_udim",
-        "store",
-        "directory",
-        "image_format",
-    ),
+    *("texture_content", "texture_bake_light", "texture_udim"),
+    *("store", "directory", "image_format"),
 )
 
 
 @dataclass(frozen=True)
 class PictureState:
-    """Everything that a picture of a scene is drawn from, as values and digests.
+    """Everything that a picture of a scene depends on, as values and digests.
 
     Attributes
     ----------
@@ -60,16 +51,16 @@ class PictureState:
     size : list of int
         Width and height in pixels.
     camera : str
-        Of the view and the projection. Empty if no picture can be drawn from the camera.
+        Digest of the view and the projection. Empty if no picture can be drawn from the camera.
     output : dict
         Values of `OUTPUT_PROPERTIES`, and whether the picture is relit.
     device : str
         What draws the picture: "cpu", "gpu" or "auto".
     objects, occluders, lights : dict of str to list of str
-        By the name of an object, the digests of the transforms of its instances and of what they
-        are instances of. Only the occluders and lights that may change the picture are in it.
+        Two digests by the name of an object: of the transforms of its instances, and of their meshes. Only
+        occluders and lights that may change the picture are included.
     reference : str
-        Of the reference render. Empty if the look uses none.
+        Digest of the reference render. Empty if the look uses none.
     """
 
     look: dict
@@ -105,7 +96,7 @@ class _Instances:
     Attributes
     ----------
     digests : list of (str, str)
-        Of the transform and of the mesh of each instance.
+        Digests of the transform and of the mesh of each instance.
     corners : list of (8, 3) ndarray
         The corners of the bounding box of each instance, in world space.
     """
@@ -222,8 +213,8 @@ class SceneState:
     ) -> dict[str, _Instances]:
         """Return the objects without a field that may change the picture.
 
-        They may cast shadows. Otherwise the bounding box of an instance must be at least partly in
-        front of that of a field.
+        If shadows are drawn, all may. Otherwise the bounding box of an instance must be at least partly in
+        front of the bounding box of an object with a field.
         """
         if casts_shadows or camera is None:
             return self._occluders
@@ -258,7 +249,7 @@ def read_picture_states(
 ) -> list[PictureState]:
     """Return the state of the picture from each camera, or of a frame of an animation.
 
-    `mesh_states` are those of the meshes that were read for the pictures (`SceneData`).
+    `mesh_states` are the states that were noted when the scene was read (`SceneData.mesh_states`).
     """
     scene_state = SceneState(scene, depsgraph, mesh_states)
     return [scene_state.picture_state(scene, depsgraph, source, is_frame) for source in sources]
@@ -286,9 +277,7 @@ def read_texture_state(
             if texture_colors_values(look, settings.texture_content.lower()):
                 shape.append(color_values_digest(evaluated, settings.color_attribute))
             try:
-                uv_parts.append(
-                    read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name, "the texture")
-                )
+                uv_parts.append(read_uvs(evaluated, obj.rosy.texture_uv_map, obj.name))
             except RosyError as error:
                 uv_parts.append(str(error))
     output = {name: getattr(settings, name) for name in TEXTURE_OUTPUT}
@@ -315,7 +304,7 @@ def read_texture_state(
 
 
 def _uses_lights(look: Look) -> bool:
-    """Whether a look is lit by the lights of the scene."""
+    """Return whether a look is lit by the lights of the scene."""
     return look.light == "scene" and look.shading > 0
 
 
@@ -402,6 +391,6 @@ def _picture_box(camera: Camera, corners: np.ndarray) -> np.ndarray | None:
 
 
 def _may_hide(box: np.ndarray, other: np.ndarray) -> bool:
-    """Whether something in a box of `_picture_box` may hide something in another."""
+    """Return whether something in a box of `_picture_box` may hide something in another."""
     overlaps = (box[0, :2] < other[1, :2]).all() and (other[0, :2] < box[1, :2]).all()
     return bool(overlaps and box[0, 2] < other[1, 2])

@@ -1,42 +1,51 @@
-"""Baked pictures on objects: make the image, the material and the modifiers that show it.
+"""Apply baked pictures and textures to objects: the image, the material and the modifiers that show it.
 
-There is one image and one material for each camera. An object shows a picture through a modifier
-at the end of its stack, with a node group of its own. The user's mesh, material slots and modifiers
+There is one image and one material for each camera, and for each texture. An object shows a picture by a
+modifier at the end of its stack, with a node group of its own. The user's mesh, material slots and modifiers
 are not changed. Datablocks that RoSy creates have the custom property ``rosy_made``. The records in
 ``scene.rosy.bakes`` store what each picture was drawn from.
 
 A picture is projected onto the shape at the time of the bake. It moves with an object that is
-transformed, and slides over one that deforms.
+transformed, and slides over one that deforms. A texture is mapped by a UV map, and stays in place.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ..annotation.key_contents import PictureKey
 from ..compositor.picture import Picture
+from ..compositor.picture_key import picture_key
 from ..core.errors import RosyError
 from ..core.file_io import check_folder
 from ..image_io.image_data import ImageData
 from ..projection.camera import Camera
+from ..rendering.view_input import ViewInput
 from .bake_records import (
-    DrawnFrom,
+    NAME_PREFIX,
     baked_objects,
     camera_name,
     find_record,
     recorded_materials,
     store_record,
 )
-from .blender_images import load_sequence, new_image
-from .compat import is_editable
-from .file_names import picture_stem
+from .blender_images import load_sequence, new_image, new_tiled_image
+from .cameras import CameraSource
+from .datablocks import (
+    OWNED_TAG,
+    delete_unused,
+    is_editable,
+    removable_modifiers,
+    rollback_on_error,
+)
+from .files import output_folder, picture_stem
 from .keys import update_keys
-from .owned_data import OWNED_TAG, delete_unused, removable_modifiers, rollback_on_error
 from .picture_nodes import (
     new_group,
     new_material,
@@ -44,8 +53,15 @@ from .picture_nodes import (
     set_picture_modifier,
     set_sequence_frames,
 )
+from .picture_state import PictureState
 from .scene_reader import SceneData
-from .texture_nodes import Hatching
+from .texture_nodes import (
+    Hatching,
+    brushed_metal_shader,
+    color_shader,
+    hatching_shader,
+    new_texture_material,
+)
 
 #: View transforms that do not change the colors of a picture.
 NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
@@ -53,7 +69,7 @@ NEUTRAL_VIEW_TRANSFORMS = ("Standard", "Raw")
 
 @dataclass(frozen=True)
 class OutputSettings:
-    """How pictures are stored and shown in a scene.
+    """Settings for storing and showing pictures in a scene.
 
     Attributes
     ----------
@@ -83,7 +99,7 @@ class OutputSettings:
 
 @dataclass(frozen=True, eq=False)
 class BakeResult:
-    """The result of a bake from one camera.
+    """A picture that was baked from one camera.
 
     Attributes
     ----------
@@ -158,31 +174,6 @@ def read_output_settings(scene: bpy.types.Scene, folder: Path | None = None) -> 
     )
 
 
-def output_folder(scene: bpy.types.Scene) -> Path:
-    """Return the folder in which the pictures of a scene are saved.
-
-    Raises
-    ------
-    RosyError
-        If there is none, or it is relative to the .blend file, and this was never saved.
-    """
-    directory = scene.rosy.directory
-    if not directory.strip():
-        raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
-    if directory.startswith("//") and not bpy.data.filepath:
-        raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
-    # Blender would take a path that is relative to the working directory for another one later.
-    return Path(bpy.path.abspath(directory)).absolute()
-
-
-def is_beside_blend(folder: Path) -> bool:
-    """Whether a folder is that of the .blend file, or below it. Links are followed."""
-    blend = bpy.data.filepath
-    return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
-        os.path.realpath(Path(blend).parent)
-    )
-
-
 def check_targets(objects: Iterable[bpy.types.Object], settings: OutputSettings) -> None:
     """Check that pictures can be applied to objects. Call this before a long job.
 
@@ -207,11 +198,11 @@ def apply_picture(
     scene: bpy.types.Scene,
     scene_data: SceneData,
     settings: OutputSettings,
-    camera: Camera,
+    view: ViewInput,
     picture: Picture,
     image_data: ImageData,
-    drawn_from: DrawnFrom,
-    hatching: Hatching | None,
+    source: CameraSource,
+    state: PictureState,
 ) -> BakeResult:
     """Apply a picture to the objects that it shows. An older one from the same camera is replaced.
 
@@ -224,22 +215,26 @@ def apply_picture(
         The mesh instances that the picture was drawn from, and their objects, of which each passes
         `check_targets`.
     settings : OutputSettings
-    camera : Camera
+    view : ViewInput
+        What was drawn.
     picture : Picture
     image_data : ImageData
         The picture, converted for the output settings.
-    drawn_from : DrawnFrom
-    hatching : Hatching or None
-        How the picture is drawn, if it has thresholds of ink.
+    source : bpy.types.Object or Camera
+        The camera that the view was read from.
+    state : PictureState
+        What the picture was drawn from.
 
     Raises
     ------
     RosyError
         If the image cannot be saved.
     """
+    camera = view.camera
+    hatching = Hatching(view.look, picture.line_count) if view.draws_thresholds else None
     with rollback_on_error() as created:
         image = new_image(
-            f"RoSy {camera.name}",
+            f"{NAME_PREFIX}{camera.name}",
             image_data,
             as_float=settings.as_float,
             is_color=hatching is None,
@@ -257,7 +252,16 @@ def apply_picture(
         )
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, created)
-    store_record(scene, camera.name, image, material, drawn_from, size=image_data[:2])
+    store_record(
+        scene,
+        camera.name,
+        image,
+        material,
+        source,
+        {None: state},
+        size=image_data[:2],
+        key=picture_key(view.look, picture),
+    )
     _show_on_objects(node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)
@@ -269,17 +273,33 @@ def apply_sequence(
     sequence: ImageSequence,
     camera: Camera,
     settings: OutputSettings,
-    drawn_from: DrawnFrom,
+    source: CameraSource | None,
+    states: Mapping[int, PictureState],
+    key: PictureKey,
 ) -> None:
     """Apply an image sequence to the objects of a scene. An older one of the same name is replaced.
 
     The pictures are mapped by window coordinates, so they fill the frame of the rendering camera.
     Each is shown at its own frame. Any machine that has the files can show them without RoSy.
+
+    Parameters
+    ----------
+    scene, scene_data, settings
+        See `apply_picture`.
+    sequence : ImageSequence
+    camera : Camera
+        The camera of the last frame.
+    source : bpy.types.Object, Camera or None
+        The camera of all frames; None if each is from the camera that renders it.
+    states : mapping of int to PictureState
+        What each frame was drawn from.
+    key : PictureKey
+        What the key of the pictures says.
     """
     with rollback_on_error() as created:
         image = load_sequence(sequence.path, settings.as_float)
         created.append(image)
-        image.name = f"RoSy {sequence.name}"
+        image.name = f"{NAME_PREFIX}{sequence.name}"
         material = new_material(
             image,
             camera,
@@ -295,11 +315,82 @@ def apply_sequence(
         sequence.name,
         image,
         material,
-        drawn_from,
+        source,
+        states,
         size=(sequence.width, sequence.height),
+        key=key,
         frame_range=f"{sequence.first} to {sequence.last}",
     )
     _show_on_objects(node_groups)
+
+
+def apply_texture(
+    scene: bpy.types.Scene,
+    obj: bpy.types.Object,
+    uv_map: str,
+    tiles: Mapping[int, ImageData],
+    settings: OutputSettings,
+    state: PictureState,
+    content: str,
+    hatching: Hatching | None,
+    *,
+    is_udim: bool,
+) -> bpy.types.Image:
+    """Show a texture on its object, and return its image. An older one is replaced.
+
+    If an error is raised, the scene is not changed.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    obj : bpy.types.Object
+    uv_map : str
+        Name of the UV map.
+    tiles : mapping of int to ImageData
+        One picture, or UDIM tiles by their numbers.
+    settings : OutputSettings
+    state : PictureState
+        What the texture was drawn from.
+    content : str
+        What the image shows; see `surface_texture.draw.CONTENTS`.
+    hatching : Hatching or None
+        How hatching is drawn, if the image has thresholds of ink and not colors.
+    is_udim : bool
+        Whether the image has UDIM tiles.
+
+    Raises
+    ------
+    RosyError
+        If the file cannot be written.
+    """
+    name = f"{NAME_PREFIX}{obj.name}"
+    stem = None
+    if settings.folder is not None:
+        kind = "texture" if content == "look" else content
+        stem = settings.folder / picture_stem(obj.name, kind)
+    first = next(iter(tiles.values()))
+    is_color = content == "look" and hatching is None
+    options = {"as_float": settings.as_float, "is_color": is_color, "stem": stem}
+    with rollback_on_error() as created:
+        image = (
+            new_tiled_image(name, tiles, **options)
+            if is_udim
+            else new_image(name, first, **options)
+        )
+        created.append(image)
+        add_shader = color_shader
+        if content == "anisotropy":
+            add_shader = partial(brushed_metal_shader, uv_map=uv_map)
+        elif hatching is not None:
+            add_shader = partial(hatching_shader, hatching=hatching, created=created)
+        material = new_texture_material(name, image, uv_map, add_shader)
+        created.append(material)
+        node_groups = _new_groups(material, {obj: None}, created)
+    size = first.width, first.height
+    store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
+    # The object keeps its pictures, but no other texture.
+    _show_on_objects(node_groups, keep_textures=False)
+    return image
 
 
 def _new_groups(
@@ -315,12 +406,14 @@ def _new_groups(
     return node_groups
 
 
-def _show_on_objects(node_groups: Mapping[bpy.types.Object, bpy.types.NodeTree]) -> None:
-    """Show a picture that is recorded, by a node group for each object, and delete older groups.
+def _show_on_objects(
+    node_groups: Mapping[bpy.types.Object, bpy.types.NodeTree], *, keep_textures: bool = True
+) -> None:
+    """Show a recorded picture by a node group for each object, and delete older groups.
 
     The older groups refer to the new picture by now, so they are replaced as a whole.
     """
-    materials = recorded_materials()
+    materials = recorded_materials(textures=keep_textures)
     for obj, node_group in node_groups.items():
         set_picture_modifier(obj, node_group, materials)
     delete_unused()

@@ -1,9 +1,8 @@
-"""Reading a scene as the input of a renderer: one `ViewInput` for each camera."""
+"""Read a scene as the input of a renderer: one `ViewInput` for each camera, with its lights."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -15,26 +14,9 @@ from ..core.errors import RosyError
 from ..projection.gbuffer import MeshInstance
 from ..rendering.view_input import ViewInput
 from .cameras import CameraSource, render_camera, resolve_camera
-from .lights import read_lights
-from .read_request import read_request
+from .look_inputs import ReadRequest, load_reference, nonfinite_policy, read_request
+from .meshes import evaluated_mesh, read_uvs
 from .scene_reader import SceneData, read_scene
-from .tone_inputs import load_reference
-
-
-@dataclass(frozen=True, eq=False)
-class SceneViews:
-    """The views of a scene from one or more cameras, as the input of a renderer.
-
-    Attributes
-    ----------
-    views : tuple of ViewInput
-        One per camera. They share their mesh instances.
-    scene_data : SceneData
-        The mesh instances, and the objects that they came from.
-    """
-
-    views: tuple[ViewInput, ...]
-    scene_data: SceneData
 
 
 def read_views(
@@ -47,20 +29,20 @@ def read_views(
     size: tuple[int, int] | None = None,
     reference_camera: bpy.types.Object | None = None,
     cache: Cache | None = None,
-) -> SceneViews:
+) -> tuple[tuple[ViewInput, ...], SceneData]:
     """Read a scene as the input of a renderer, for one or more cameras. Meshes are read once.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     depsgraph : bpy.types.Depsgraph
-        Of a view layer of the scene.
+        Depsgraph of a view layer of the scene.
     cameras : sequence of bpy.types.Object or Camera
         See `resolve_camera`.
     look : Look
         Lights, tones, numbers and the reference render are read only if it uses them.
     objects : sequence of bpy.types.Object, optional
-        Objects whose fields are drawn; by default all that have one. Other objects only occlude.
+        Objects with fields to draw; by default all that have one. Other objects only occlude.
     size : (int, int), optional
         Pixels; by default the size of renders times the scene's percentage for pictures.
     reference_camera : bpy.types.Object, optional
@@ -70,7 +52,10 @@ def read_views(
 
     Returns
     -------
-    SceneViews
+    views : tuple of ViewInput
+        One per camera. They share their mesh instances.
+    scene_data : SceneData
+        The mesh instances, and the objects that they come from.
 
     Raises
     ------
@@ -96,7 +81,7 @@ def read_views(
     for camera in resolved_cameras:
         lights = read_lights(depsgraph, camera.view) if look.light == "scene" else ()
         views.append(ViewInput(instances, camera, look, tuple(lights), reference))
-    return SceneViews(tuple(views), scene_data)
+    return tuple(views), scene_data
 
 
 def read_turntable(
@@ -131,3 +116,85 @@ def scene_depsgraph(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
         return context.evaluated_depsgraph_get()
     with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
         return context.evaluated_depsgraph_get()
+
+
+def read_lights(depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray) -> list[Light]:
+    """Return all lights that are visible in renders, including instances, in camera space.
+
+    A sun with a strength of pi W/m2 gives a white diffuse surface that faces it a radiance of 1. A
+    point light with the power P gives P / (4 pi^2 r^2) at the distance r. Spots and area lights are
+    treated as point lights. An area light gets the factor 4 of its radiance along its axis.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+    view_matrix : (4, 4) ndarray
+        World to camera space.
+
+    Returns
+    -------
+    list of Light
+    """
+    return [light for light, _ in rendered_lights(depsgraph, view_matrix)]
+
+
+def rendered_lights(
+    depsgraph: bpy.types.Depsgraph, view_matrix: np.ndarray
+) -> list[tuple[Light, bpy.types.Object]]:
+    """Return the lights of `read_lights`, each with its original object."""
+    lights = []
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if obj.type == "LIGHT" and not obj.original.hide_render and instance.show_self:
+            matrix = view_matrix @ np.array(instance.matrix_world)
+            lights.append((_convert_light(obj.data, matrix), obj.original))
+    return lights
+
+
+def _convert_light(data: bpy.types.Light, matrix: np.ndarray) -> Light:
+    """Convert a Blender light with a local-to-camera matrix."""
+    color = np.array(data.color) * _temperature_color(data)
+    energy = data.energy * 2.0 ** getattr(data, "exposure", 0.0)
+    if data.type == "SUN":
+        direction = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+        return Light("sun", direction, color, energy / np.pi)
+    axial_gain = 4.0 if data.type == "AREA" else 1.0
+    return Light("point", matrix[:3, 3].copy(), color, axial_gain * energy / (4 * np.pi**2))
+
+
+def _temperature_color(data: bpy.types.Light) -> np.ndarray:
+    """Return the RGB factor of a light's color temperature; ones if it is not used."""
+    if not getattr(data, "use_temperature", False):
+        return np.ones(3)
+    return np.array(data.temperature_color)
+
+
+def read_texture_input(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    obj: bpy.types.Object,
+    uv_map: str,
+    cache: Cache,
+    color_attribute: str | None,
+) -> tuple[MeshInstance, np.ndarray]:
+    """Read an object with a field, and the UV map of its texture, as it is evaluated.
+
+    If `color_attribute` is given, the numbers of this attribute are read for the color map.
+
+    Returns
+    -------
+    instance : MeshInstance
+        With a field, in world space. If the object has several instances, one of them.
+    uv : (C, 2) float32 ndarray
+        u and v at its corners.
+
+    Raises
+    ------
+    RosyError
+        If there is no field or no such attribute, or a modifier loses one of them or the UV map.
+    """
+    request = ReadRequest(nonfinite_policy(scene), color_attribute=color_attribute)
+    instance = read_scene(depsgraph, [obj], request, cache).instances[0]
+    with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+        uv = read_uvs(mesh, uv_map, f"object '{obj.name}'")
+    return instance, uv

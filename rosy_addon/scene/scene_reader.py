@@ -1,9 +1,9 @@
-"""Reading a scene as mesh instances: evaluated meshes with their fields, and occluders.
+"""Read a scene as mesh instances: evaluated meshes with their fields, and occluders.
 
-Bakes and live views read by the same `SceneReader`. Nothing is changed in the file as long as modifiers
-only deform an object: its original mesh has the rest positions and the field. If they change the
-topology, or may change the attribute of the field, both are read from meshes with temporary attributes,
-by `SceneReader.resolve_topologies`.
+Bakes and live views use the same `SceneReader`. If modifiers only deform an object, its rest positions and its
+field are read from the original mesh, and nothing is changed in the file. If modifiers change the topology, or
+may change the attribute of the field, `SceneReader.resolve_topologies` adds temporary attributes to the mesh
+and reads them from the evaluated mesh.
 """
 
 from __future__ import annotations
@@ -23,10 +23,18 @@ from ..field.rosy_field import RosyField
 from ..field.surface import Surface, have_same_polygons
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from .color_inputs import check_colored, read_color_values
+from .datablocks import remedy_for_absence, user_modifiers
 from .evaluated_field import Errors, FieldLayout, read_evaluated_field, temp_attributes
 from .field_attributes import attribute_name, field_degree, is_face_vector_field, surface_key
-from .libraries import remedy_for_absence
+from .look_inputs import (
+    FIELDS_ONLY,
+    ReadRequest,
+    check_sources,
+    read_color_values,
+    read_tone,
+    tone_image_key,
+)
+from .mesh_fields import read_mesh_field
 from .mesh_states import MeshStates, mesh_state_key, read_mesh_state
 from .meshes import (
     REST_ATTRIBUTE,
@@ -36,10 +44,6 @@ from .meshes import (
     polygon_arrays,
     read_attribute,
 )
-from .owned_data import user_modifiers
-from .read_field import read_mesh_field
-from .read_request import FIELDS_ONLY, ReadRequest
-from .tone_inputs import check_tones, read_tone, tone_image_key
 from .visible_objects import Instances, field_objects, rendered_instances
 
 #: The mesh instances of the last reading, in the cache.
@@ -88,8 +92,8 @@ def read_scene(
     depsgraph : bpy.types.Depsgraph
         The evaluated depsgraph of a view layer.
     objects : sequence of bpy.types.Object, optional
-        Original objects whose fields are drawn. All other objects only occlude. By default all of
-        `field_objects` whose fields can be drawn.
+        Original objects with fields to draw. All other objects only occlude. By default `field_objects`,
+        without objects that have an error.
     request : ReadRequest
     cache : Cache, optional
         Keeps mesh instances that have not changed since an earlier call.
@@ -118,7 +122,7 @@ def read_scene(
     if errors and (objects is not None or len(errors) == len(targets)):
         raise errors[0]
     with_field = [entry for entry in entries if entry.instance.field is not None]
-    check_sources(with_field, request)
+    check_sources([(entry.instance, entry.owner) for entry in with_field], request)
     occluders = [entry.instance for entry in entries if entry.instance.field is None]
     return SceneData(
         [entry.instance for entry in with_field] + occluders,
@@ -133,7 +137,7 @@ def _field_errors(
     entries: Sequence[SceneInstance],
     targets: Sequence[bpy.types.Object],
 ) -> list[RosyError]:
-    """Return why the fields of objects cannot be drawn; raise what is not about a field."""
+    """Return the errors of objects with fields; raise any other error."""
     names = [obj.name_full for obj in targets]
     for name, error in errors.items():
         if name not in names or not isinstance(error, RosyError):
@@ -148,21 +152,6 @@ def _field_errors(
         for name, obj in zip(names, targets, strict=True)
         if name in errors or name not in seen
     ]
-
-
-def check_sources(with_field: Sequence[SceneInstance], request: ReadRequest) -> None:
-    """Check that at least one of the instances with a field has the requested tone and numbers.
-
-    Raises
-    ------
-    RosyError
-        If none has.
-    """
-    check_tones(request.tone, [(entry.instance.tone, entry.owner) for entry in with_field])
-    check_colored(
-        request.color_attribute,
-        [(entry.instance.color_values, entry.owner) for entry in with_field],
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,12 +179,12 @@ _MeshData = tuple[Surface, RosyField | None, SurfaceTone | None, np.ndarray | No
 #: The full name of an object, and the `_topology_hash` of one of its evaluated meshes.
 _TopologyKey = tuple[str, bytes]
 
-#: Rest positions and field of an evaluated mesh whose topology differs from the original's.
+#: Rest positions and field of an evaluated mesh that has other faces than the original mesh.
 _Topology = tuple[np.ndarray | None, RosyField]
 
 
 class SceneReader:
-    """Reads the meshes of one view layer, and again those that have changed.
+    """Reads the meshes of one view layer. Later readings read only what has changed.
 
     Parameters
     ----------
@@ -209,7 +198,7 @@ class SceneReader:
     cache : Cache
     mesh_states : dict or None
     errors : dict of str to Exception
-        By the full name of an object: why its field is not drawn, or why it does not occlude.
+        By the full name of an object: the error for which its field is not drawn, or it does not occlude.
     is_complete : bool
         Whether the last call of `read` ended before its deadline.
     """
@@ -286,7 +275,7 @@ class SceneReader:
             obj, owner = instance.object, instance.object.original
             mesh_data = self._mesh_data(obj, owner, draws_field)
             if mesh_data is None and draws_field and owner.name_full in self.errors:
-                mesh_data = self._mesh_data(obj, owner, False)  # it hides what is behind it
+                mesh_data = self._mesh_data(obj, owner, False)  # as an occluder
             if mesh_data is None:
                 if draws_field:
                     faceless.add(owner)
@@ -315,7 +304,7 @@ class SceneReader:
 
     @property
     def has_unresolved(self) -> bool:
-        """Whether there are objects that need `resolve_topologies`."""
+        """Return whether there are objects that need `resolve_topologies`."""
         return bool(self._unresolved)
 
     def resolve_topologies(
@@ -389,7 +378,7 @@ class SceneReader:
     def _mesh_data(
         self, obj: bpy.types.Object, owner: bpy.types.Object, draws_field: bool
     ) -> _MeshData | None:
-        """Return what is read of the mesh of an evaluated object; None if it cannot be read now."""
+        """Return the data of the mesh of an evaluated object; None if it cannot be read now."""
         pointer, request = obj.data.as_pointer(), self._request
         key = owner.name_full, pointer, tone_image_key(owner, request.tone), draws_field
         if key in self._meshes:
@@ -487,7 +476,7 @@ class SceneReader:
 
 
 def lost_field_error(obj: bpy.types.Object, attribute: str | None) -> RosyError:
-    """Return the error for an object whose modifiers lose an attribute, or, if None, all faces."""
+    """Return the error for an object that loses an attribute, or (if None) all faces, in its modifiers."""
     if attribute is None and not len(obj.data.polygons):
         return no_faces_error(obj.data, f"object '{obj.name}'")
     names = ", ".join(modifier.name for modifier in user_modifiers(obj)) or "none"

@@ -12,6 +12,9 @@ from ..field.rosy_field import RosyField
 from ..field.singularities import find_singularities
 from ..field.surface import Surface
 from ..field.validate import vertex_normals
+from .datablocks import OWNED_TAG, user_modifiers
+from .look_inputs import ReadRequest
+from .mesh_fields import read_mesh_field
 from .meshes import (
     evaluated_mesh,
     mesh_surface,
@@ -19,9 +22,6 @@ from .meshes import (
     read_collection,
     vertex_positions,
 )
-from .owned_data import OWNED_TAG, user_modifiers
-from .read_field import read_mesh_field
-from .read_request import ReadRequest
 from .scene_reader import read_scene
 
 #: Attributes of the points: the singularity index in units of 1 / N, and the degree N.
@@ -43,7 +43,7 @@ class Singularities:
     degree : int
         Degree N of the field.
     vertex : (K,) int32 ndarray or None
-        Vertices of the object's own mesh; None if the singularities are those of the evaluated mesh.
+        Vertices of the original mesh; None for singularities of the evaluated mesh.
     """
 
     points: np.ndarray
@@ -81,7 +81,7 @@ def read_singularities(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
 
 
 def _own_field(obj: bpy.types.Object) -> tuple[Surface, RosyField]:
-    """Return the surface and the field of an object's own mesh."""
+    """Return the surface and the field of an object's original mesh."""
     label = f"object '{obj.name}'"
     surface = mesh_surface(obj.data, label)
     return surface, read_mesh_field(obj.data, surface=surface, nonfinite="zero", label=label)
@@ -90,9 +90,9 @@ def _own_field(obj: bpy.types.Object) -> tuple[Surface, RosyField]:
 def read_editable_singularities(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Singularities:
-    """Find the singularities of the field of an object's own mesh, at their places on the evaluated mesh.
+    """Find the singularities of the field of an object's original mesh, at their places on the evaluated mesh.
 
-    They are what an edit of the field changes. Modifiers may give the evaluated mesh other ones.
+    These can be edited. The evaluated mesh may have other singularities.
 
     Raises
     ------
@@ -109,10 +109,10 @@ def read_editable_singularities(
 
 
 def mesh_of_own_vertices(obj: bpy.types.Object, evaluated: bpy.types.Mesh | None) -> bpy.types.Mesh:
-    """Return the mesh whose first vertices are those of an object's own mesh, as they are seen.
+    """Return the evaluated mesh if its first vertices are the vertices of the original mesh.
 
-    It is the evaluated mesh if modifiers keep the vertices, or add new ones after them, such as
-    *Armature*, *Subdivision Surface* or *Mirror*. If vertices are lost, it is the own mesh.
+    They are if modifiers keep the vertices, or add new ones after them, such as *Armature*, *Subdivision
+    Surface* or *Mirror*. If vertices are lost, the original mesh is returned.
     """
     is_lost = evaluated is None or len(evaluated.vertices) < len(obj.data.vertices)
     return obj.data if is_lost else evaluated
@@ -215,7 +215,7 @@ def read_singularity_points(
 
 
 def has_points(obj: bpy.types.Object) -> bool:
-    """Whether an object has points with attributes: a mesh or a point cloud."""
+    """Return whether an object has points with attributes: a mesh or a point cloud."""
     return obj.type in ("MESH", "POINTCLOUD")
 
 

@@ -1,4 +1,4 @@
-"""Whether a baked picture is out of date: the state that it was drawn from and the present one."""
+"""Compare the recorded state of a picture with the present one: is the picture out of date?"""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import bpy
 
 from .picture_state import MeshStates, PictureState, SceneState, settings_key
 
-#: For how long a panel uses the state of a scene although something has changed since, so that
-#: playback and sculpting stay fluent: a multiple of the time that reading the state has taken.
+#: Least time between two readings of a scene, as a multiple of the time that a reading takes. Panels spend at
+#: most a tenth of the time on readings, so playback and sculpting stay fluent.
 TTL_READINGS = 10.0
 
 #: Lists of `bpy.app.handlers` that are called when objects may have changed.
@@ -45,7 +45,7 @@ class SceneStateCache:
         self._next_reading = 0.0
 
     def get(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> SceneState:
-        """Return the present state of the depsgraph's view layer, or that of a moment ago."""
+        """Return the present state of the depsgraph's view layer, or a recent one; see `TTL_READINGS`."""
         view_layer = depsgraph.view_layer
         key = scene.session_uid, view_layer.name, settings_key(scene, view_layer)
         if key != self._key or not self._is_watching():
@@ -63,7 +63,7 @@ class SceneStateCache:
         return self._scene_state
 
     def seconds_to_wait(self) -> float:
-        """Return after how many seconds to ask again, because something has changed; 0: not."""
+        """Return the seconds after which to ask again; 0 if nothing has changed since the last reading."""
         is_behind = self._is_watching() and self._is_outdated
         return max(self._next_reading - time.monotonic(), 0.01) if is_behind else 0.0
 
@@ -98,7 +98,7 @@ class SceneStateCache:
 
     @staticmethod
     def _is_watching() -> bool:
-        """Whether the handlers exist. Blender drops them when it loads a file."""
+        """Return whether the handlers exist. Blender drops them when it loads a file."""
         return _note_changes in bpy.app.handlers.depsgraph_update_post
 
 
@@ -132,54 +132,58 @@ def difference(recorded: PictureState, present: PictureState, source: str) -> st
         return f"the size was changed to {present.size[0]} x {present.size[1]}"
     if recorded.camera != present.camera:
         return f"{source} was changed"
-    return (
-        _object_difference(recorded.objects, present.objects, "the mesh or field of ")
+    reason = (
+        _object_difference(recorded.objects, present.objects, of_mesh="the mesh or field of ")
         or _object_difference(recorded.occluders, present.occluders)
-        or _light_difference(recorded.lights, present.lights)
-        or ("the picture of the tone was changed" * (recorded.reference != present.reference))
-        or _output_difference(recorded.output, present.output)
-        or ("the device was changed" * (recorded.device != present.device))
+        or _object_difference(recorded.lights, present.lights, kind="light ")
     )
-
-
-def _output_difference(recorded: Mapping[str, Any], present: Mapping[str, Any]) -> str:
-    """Return which property of the output has changed; empty if none has."""
-    for name, value in present.items():
-        if recorded.get(name) != value:
+    if reason:
+        return reason
+    if recorded.reference != present.reference:
+        return "the picture of the tone was changed"
+    for name, value in present.output.items():
+        if recorded.output.get(name) != value:
             return f"the {_OUTPUT_LABELS.get(name, name)} was changed"
-    return ""
+    return "" if recorded.device == present.device else "the device was changed"
 
 
 def _object_difference(
-    recorded: Mapping[str, list[str]], present: Mapping[str, list[str]], of_mesh: str = ""
+    recorded: Mapping[str, list[str]],
+    present: Mapping[str, list[str]],
+    *,
+    kind: str = "",
+    of_mesh: str = "",
 ) -> str:
-    """Return how objects have changed; empty if they have not. Their names do not matter."""
-    if sorted(recorded.values()) == sorted(present.values()):
-        return ""
-    before, after = _without_renamed(recorded, present)
-    for name in sorted(before.keys() & after.keys()):
-        if before[name][1] != after[name][1]:
-            return f"{of_mesh}'{name}' was changed"
-        if before[name][0] != after[name][0]:
-            return f"'{name}' was moved"
-    return _presence_difference(before, after)
+    """Return how objects or lights have changed; empty if they have not. Their names do not matter.
 
-
-def _light_difference(recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]) -> str:
-    """Return how lights have changed; empty if they have not. Their names do not matter."""
+    Parameters
+    ----------
+    recorded, present : mapping of str to list of str
+        Attributes of `PictureState`.
+    kind : str
+        What precedes the names. Without it, objects may also have been moved.
+    of_mesh : str
+        What precedes the name of an object with a changed mesh.
+    """
     if sorted(recorded.values()) == sorted(present.values()):
         return ""
     before, after = _without_renamed(recorded, present)
     for name in sorted(before.keys() & after.keys()):
         if before[name] != after[name]:
-            return f"light '{name}' was changed"
-    return _presence_difference(before, after, "light ")
+            is_moved = not kind and before[name][1] == after[name][1]
+            return f"'{name}' was moved" if is_moved else f"{kind}{of_mesh}'{name}' was changed"
+    for name in sorted(before.keys() - after.keys()):
+        is_there = any(obj.name_full == name and obj.users_collection for obj in bpy.data.objects)
+        return f"{kind}'{name}' {'is not visible any more' if is_there else 'was deleted'}"
+    for name in sorted(after.keys() - before.keys()):
+        return f"{kind}'{name}' was added"
+    return ""
 
 
 def _without_renamed(
     recorded: Mapping[str, list[str]], present: Mapping[str, list[str]]
 ) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Return both with the present name of each object that was only renamed, or hardly changed."""
+    """Return both, in which objects that were only renamed, moved or changed have their present names."""
     before, after = dict(recorded), dict(present)
     for name in recorded.keys() - present.keys():
         for new_name in after.keys() - before.keys():
@@ -187,15 +191,3 @@ def _without_renamed(
                 before[new_name] = before.pop(name)
                 break
     return before, after
-
-
-def _presence_difference(
-    before: Mapping[str, list[str]], after: Mapping[str, list[str]], kind: str = ""
-) -> str:
-    """Return which object is missing or new; empty if none is."""
-    for name in sorted(before.keys() - after.keys()):
-        is_there = any(obj.name_full == name and obj.users_collection for obj in bpy.data.objects)
-        return f"{kind}'{name}' {'is not visible any more' if is_there else 'was deleted'}"
-    for name in sorted(after.keys() - before.keys()):
-        return f"{kind}'{name}' was added"
-    return ""

@@ -21,13 +21,17 @@ from ..core.errors import RosyError
 from ..line_drawing.drawing_outputs import StrokeGeometry
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
-from .compat import has_grease_pencil_drawings, is_editable
-from .curves import INK_ATTRIBUTE, new_curves
-from .grease_pencil import new_grease_pencil
+from .datablocks import OWNED_TAG, is_editable, rollback_on_error
 from .look_properties import read_settings
 from .meshes import read_collection
-from .owned_data import OWNED_TAG, rollback_on_error
-from .surface_strokes import follow_surface, stop_following
+from .stroke_data import (
+    INK_ATTRIBUTE,
+    follow_surface,
+    has_grease_pencil_drawings,
+    new_curves,
+    new_grease_pencil,
+    stop_following,
+)
 from .visible_objects import field_objects
 
 #: The function that creates the data of each kind of object.
@@ -108,9 +112,9 @@ def store_strokes(
     owner : bpy.types.Object, optional
         Parent of the object. The strokes move with it.
     collection : bpy.types.Collection, optional
-        The collection of a new object, by default that of the scene. Also if it cannot be changed.
+        The collection of a new object. By default, or if it is linked, the collection of the scene.
     vertex_count : int
-        Of the evaluated mesh of `owner`, if the geometry has the places of its points on it.
+        Number of vertices of the evaluated mesh of `owner`, if the geometry has places on it.
 
     Returns
     -------
@@ -207,7 +211,7 @@ def _store_record(scene: bpy.types.Scene, kind: str, camera: str, obj: bpy.types
 
 
 def _delete_object(obj: bpy.types.Object) -> None:
-    """Delete an object, and its data if RoSy created them and nothing else uses them."""
+    """Delete an object. Its data are deleted too if RoSy created them and they have no other user."""
     data = obj.data
     stop_following(obj)
     bpy.data.objects.remove(obj)
@@ -215,7 +219,7 @@ def _delete_object(obj: bpy.types.Object) -> None:
 
 
 def _remove_data(data: bpy.types.ID) -> None:
-    """Delete data that RoSy created, and their materials, if nothing else uses them."""
+    """Delete data that RoSy created, and their materials, if they have no users."""
     if data.users or not data.get(OWNED_TAG):
         return
     materials = [material for material in data.materials if material and material.get(OWNED_TAG)]

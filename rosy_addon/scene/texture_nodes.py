@@ -18,7 +18,7 @@ ANISOTROPY, BRUSHED_ROUGHNESS = 0.8, 0.3
 
 
 class Hatching(NamedTuple):
-    """How hatching is drawn from thresholds.
+    """The look and the number of lines with which a material draws hatching from thresholds.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ def hatching_shader(
     ----------
     build : NodeBuilder
     image_node : bpy.types.Node
-        Of an image of thresholds; see `compositor.ink_thresholds`.
+        Node of an image of thresholds; see `compositor.ink_thresholds`.
     hatching : Hatching
     created : list of bpy.types.ID
         Gets the node group of hatching if it is new; see `owned_data.rollback_on_error`.
@@ -88,8 +88,8 @@ def hatching_shader(
         The shader.
     """
     look, image_color = hatching.look, image_node.outputs["Color"]
-    # Has no effect, but Blender's exporter of glTF takes the color of the first emission, and follows all
-    # links before it, which takes long in the group.
+    # Has no visible effect. Blender's glTF exporter takes the color of the first emission and follows all links
+    # before it; in the node group that would take long.
     exported = build("ShaderNodeEmission", {"Color": image_color}, label="For Exporters")
     white = build("ShaderNodeBsdfDiffuse", {"Color": (1.0, 1.0, 1.0, 1.0)})
     light = build("ShaderNodeShaderToRGB", {"Shader": white.outputs["BSDF"]})
@@ -117,14 +117,14 @@ def brushed_metal_shader(
 ) -> bpy.types.NodeSocket:
     """Add a metal that is brushed along the directions of an anisotropy map.
 
-    Nodes and links are those that Blender's importer of glTF makes, in front of which the direction is mirrored
-    where the UV map is. So its exporter recognizes the map.
+    The nodes are linked like the ones of Blender's glTF importer, so its exporter recognizes the map. Nodes
+    before them mirror the direction where the UV map is mirrored.
 
     Parameters
     ----------
     build : NodeBuilder
     image_node : bpy.types.Node
-        Of an image from `surface_texture.direction_maps`.
+        Node of an image from `surface_texture.direction_maps`.
     uv_map : str
         Name of the UV map.
     """
@@ -151,7 +151,7 @@ def brushed_metal_shader(
 def _along_bitangent(
     build: NodeBuilder, decoded: bpy.types.NodeSocket, tangent: bpy.types.NodeSocket, uv_map: str
 ) -> bpy.types.NodeSocket:
-    """Add nodes for the component along the bitangent. Blender turns to the left where the map is mirrored, too."""
+    """Add nodes for the component along the bitangent, mirrored where the UV map is: Blender does not mirror it."""
     # In the tangent space of the map, this color is the bitangent.
     bitangent = build("ShaderNodeNormalMap", {"Color": (0.5, 1.0, 0.5, 1.0)}, uv_map=uv_map)
     normal = build("ShaderNodeNewGeometry").outputs["Normal"]

@@ -1,4 +1,4 @@
-"""Which objects of a view layer are visible in renders, and which of them have a field."""
+"""Find the objects of a view layer that are visible in renders, and the ones with a field."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from collections.abc import Collection, Iterable, Iterator
 import bpy
 
 from ..core.errors import RosyError
-from .compat import has_rosy_properties
+from .datablocks import OWNED_TAG, check_object_type, has_rosy_properties, remedy_for_absence
 from .field_attributes import attribute_name, has_field
-from .libraries import check_object_type, remedy_for_absence
-from .owned_data import OWNED_TAG
 
 
 def field_objects(
@@ -46,7 +44,7 @@ def rendered_instances(
 ) -> Instances:
     """Return the instances of meshes that are visible in renders.
 
-    `targets` are the original objects whose fields are drawn. The others only occlude.
+    `targets` are the original objects with fields to draw. The others only occlude.
     """
     visible_objects = set(_visible_objects(depsgraph.view_layer))
     with_field = set(targets)
@@ -74,7 +72,7 @@ def shown_instances(depsgraph: bpy.types.Depsgraph, *, include_occluders: bool) 
 def _is_rendered(
     instance: bpy.types.DepsgraphObjectInstance, visible_objects: set[bpy.types.Object]
 ) -> bool:
-    """Whether an instance is a mesh that is visible in renders."""
+    """Return whether an instance is a mesh that is visible in renders."""
     obj = instance.object
     # The depsgraph lists the meshes of curves, texts, surfaces and metaballs as separate instances.
     if obj.type != "MESH" or not instance.show_self or not obj.visible_camera:
@@ -90,7 +88,7 @@ def _is_rendered(
 
 
 def _draws_field(obj: bpy.types.Object) -> bool:
-    """Whether an object has a field whose drawing is switched on."""
+    """Return whether an object has a field, and drawing it is switched on."""
     return has_field(obj) and (not has_rosy_properties() or obj.rosy.include)
 
 

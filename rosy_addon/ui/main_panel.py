@@ -8,8 +8,8 @@ from ..compositor.look import has_flow, is_hatched
 from ..core.errors import counted
 from ..gpu.select import automatic_device
 from ..scene.bake_records import BakeInfo, has_pictures, list_bakes
+from ..scene.computed_attributes import other_field_names
 from ..scene.field_attributes import has_field
-from ..scene.field_difference import other_field_names
 from ..scene.pictures import NEUTRAL_VIEW_TRANSFORMS
 from ..scene.staleness import SCENE_STATES
 from ..scene.visible_objects import field_objects

@@ -18,7 +18,7 @@ from ..scene.singularity_points import (
     read_editable_singularities,
     read_singularities,
 )
-from ..viewport.marks import SingularityDots, draw_dots, draw_labels
+from ..viewport.overlays import SingularityDots, draw_dots, draw_labels
 from ..viewport.view3d import redraw
 
 #: Diameter of the dot of an index of 1 / N, without its outline, in pixels of a screen of normal resolution.

@@ -6,7 +6,7 @@ import bpy
 
 from ..compositor.look import Look
 from ..core.settings import settings_of
-from ..scene.paths import EXTENSION_ID
+from ..scene.files import EXTENSION_ID
 from . import preset_library
 
 

@@ -19,8 +19,8 @@ from ..preset_files.store import (
     read_preset,
     user_preset_files,
 )
+from ..scene.files import user_presets_folder
 from ..scene.look_properties import apply_look, matches_look
-from ..scene.paths import user_presets_folder
 
 #: Icons of a preset without a picture and of a preset that is not found.
 DEFAULT_ICON, MISSING_ICON = "PRESET", "QUESTION"

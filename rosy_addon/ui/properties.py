@@ -13,8 +13,8 @@ from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
 from ..preset_files.store import DEFAULT_KEY
-from ..scene.backdrop import update_backdrops
-from ..scene.compat import has_rosy_properties, path_property_options
+from ..scene.camera_planes import update_backdrops
+from ..scene.datablocks import has_rosy_properties
 from ..scene.field_attributes import DEFAULT_DEGREE, DEFAULT_FIELD_NAME
 from ..scene.keys import update_keys
 from ..scene.look_properties import color_components
@@ -27,6 +27,14 @@ from ..surface_texture.draw import (
     MIN_SIZE,
 )
 from . import preset_library
+
+#: Options of a path that may start with ``//``, the folder of the .blend file. Blender 5.0 and later need the
+#: second one for this.
+_PATH_OPTIONS = {"ANIMATABLE"} | (
+    {"PATH_SUPPORTS_BLEND_RELATIVE"}
+    if "is_path_supports_blend_relative" in bpy.types.Property.bl_rna.properties
+    else set()
+)
 
 CAMERA_ITEMS = [
     ("SCENE", "Scene Camera", "Active camera of the scene"),
@@ -146,7 +154,6 @@ class RosyBake(bpy.types.PropertyGroup):
     frames: bpy.props.StringProperty(
         description="Frame range of a sequence, empty for a single picture"
     )
-    device: bpy.props.StringProperty(description="Device that drew the picture: cpu or gpu")
     key: bpy.props.StringProperty(description="What the key of the picture says, as JSON")
     state: bpy.props.StringProperty(
         description="State of the scene when a single picture was drawn, as JSON"
@@ -224,7 +231,7 @@ class RosyStrokes(bpy.types.PropertyGroup):
             description="Path of the .svg, .ply, .obj or .csv file",
             subtype="FILE_PATH",
             default="//strokes.svg",
-            options=path_property_options(),
+            options=_PATH_OPTIONS,
         ),
         "paper": bpy.props.BoolProperty(
             name="White Paper", description="Draw the strokes on white paper", default=True
@@ -327,7 +334,7 @@ class RosyScene(bpy.types.PropertyGroup):
         description="Folder for saved pictures, and for the frames of animations",
         subtype="DIR_PATH",
         default="//rosy/",
-        options=path_property_options(),
+        options=_PATH_OPTIONS,
     )
     image_format: bpy.props.EnumProperty(
         name="Format",
@@ -440,7 +447,7 @@ class RosyScene(bpy.types.PropertyGroup):
         description="Picture of the scene through its camera, such as a render. # characters are "
         "replaced by the frame number",
         subtype="FILE_PATH",
-        options=path_property_options(),
+        options=_PATH_OPTIONS,
     )
     remember_live: bpy.props.BoolProperty(
         name="Remember in File",

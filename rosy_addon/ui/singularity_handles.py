@@ -17,7 +17,7 @@ from ..core.errors import RosyError
 from ..scene.field_attributes import has_field
 from ..scene.meshes import vertex_positions
 from ..scene.singularity_points import mesh_of_own_vertices, read_editable_singularities
-from ..viewport.marks import is_occluded
+from ..viewport.overlays import is_occluded
 from ..viewport.view3d import redraw
 from . import overlay
 from .view_lines import draw_lines, to_pixels

@@ -6,11 +6,10 @@ changes, the picture may be a preview at reduced size. When the view is at rest,
 rendered in slices of time, one slice per redraw.
 
     view3d         queries about Blender's 3D views, and redraws
-    messages       text in a corner of a view
-    references     the reference renders of the tone "picture"
-    layers         the meshes of view layers, as they were read last
+    layers         the meshes of view layers, and reference renders, as they were read last
     flow_clock     the clock by which streaks drift
-    marks          dots at singularities and arrowheads, drawn over the pictures
+    overlays       dots at singularities, arrowheads and messages, drawn over the pictures
     progressive    previews and final pictures, within a time budget
     session        handlers, timers and drawing; `start` and `stop`
+    brush_mouse    places under the mouse for the tool *Comb Field*
 """

@@ -1,6 +1,6 @@
-"""The clock by which streaks drift in live views, besides Blender's timeline.
+"""The clock by which streaks drift in live views, in addition to Blender's timeline.
 
-Nothing of it is saved: it begins and ends with the session of the live views.
+It is not saved: it starts and ends with the session of the live views.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ MAX_FRAMES_PER_PICTURE = 2.0
 
 
 class FlowClock:
-    """Counts frames while it runs, in real time.
+    """A clock that counts frames in real time while it runs.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class FlowClock:
         self.is_playing, self._time = True, now
 
     def pause(self) -> None:
-        """Stand still. The frames are kept."""
+        """Stop. The frames are kept."""
         self.is_playing = False
 
     def skip(self, now: float) -> None:

@@ -1,20 +1,31 @@
-"""Cached meshes of each view layer, for the live view."""
+"""What live views read: the meshes of each view layer, and the reference renders of the tone "picture"."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Hashable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ..compositor.look import Look
-from ..scene.read_request import ReadRequest, read_request
+from ..compositor.target_tone import ReferenceRender
+from ..core.errors import REPORTED_ERRORS, RosyError, error_text
+from ..scene.cameras import render_camera
+from ..scene.look_inputs import (
+    ReadRequest,
+    load_luminance,
+    load_reference,
+    read_request,
+    reference_path,
+)
 from ..scene.scene_reader import SceneInstance, SceneReader
 from ..scene.visible_objects import shown_instances
 
-#: Types of data-blocks whose changes may change a picture.
+#: Types of datablocks that may change a picture if they change.
 RELEVANT_ID_TYPES = ("OBJECT", "MESH", "COLLECTION", "SCENE", "LIGHT", "ARMATURE", "KEY", "IMAGE")
 
 #: Seconds of one slice of reading.
@@ -29,15 +40,15 @@ class LayerState:
     ----------
     reader : SceneReader
     instances : list of SceneInstance
-        As they were read last.
+        The instances at the last reading.
     stale : bool
         Whether they must be read again.
     request : ReadRequest or None
         What was read.
     has_occluders : bool
-        Whether they were read with all other meshes, since they may occlude.
+        Whether meshes without a field were read too, as occluders.
     is_starting : bool
-        Whether they were not read completely yet. They are read in slices of time until then.
+        Whether the layer was never read completely. It is read in slices of time until then.
     """
 
     reader: SceneReader = field(default_factory=SceneReader)
@@ -51,15 +62,11 @@ class LayerState:
 class LayerStates:
     """The states of all view layers that are shown in live views.
 
-    Parameters
-    ----------
-    schedule_resolving : callable
-        Called without arguments while Blender draws. It must arrange for a later call of
-        `resolve_topologies`.
+    What Blender cannot read while it draws is read by `resolve_topologies`, which must be called later if
+    `SceneReader.has_unresolved` of a layer is true.
     """
 
-    def __init__(self, schedule_resolving: Callable[[], None]) -> None:
-        self._schedule_resolving = schedule_resolving
+    def __init__(self) -> None:
         self._layers: dict[tuple[str, str], LayerState] = {}
         self._is_resolving = False
 
@@ -93,9 +100,7 @@ class LayerStates:
             )
             layer.stale = not layer.reader.is_complete
             layer.request, layer.has_occluders = request, include_occluders
-            if layer.reader.has_unresolved:
-                self._schedule_resolving()
-            elif layer.reader.is_complete:
+            if layer.reader.is_complete and not layer.reader.has_unresolved:
                 layer.is_starting = False
         return layer
 
@@ -109,21 +114,22 @@ class LayerStates:
         self._layers.clear()
 
     def forget(self) -> None:
-        """Drop everything that was read."""
+        """Read everything again, except what is cached by its contents."""
         self._layers = {
-            # What is cached by its contents is still right.
             key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)
             for key, layer in self._layers.items()
         }
 
-    def invalidate(self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None) -> None:
+    def invalidate(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
+    ) -> None:
         """Mark what has changed in a scene, so that it is read again.
 
         Parameters
         ----------
         scene : bpy.types.Scene
-        depsgraph : bpy.types.Depsgraph or None
-            Its `updates` list what has changed. None: anything may have changed.
+        depsgraph : bpy.types.Depsgraph, optional
+            Its `updates` list what has changed. Without it, anything may have changed.
         """
         if self._is_resolving:
             return
@@ -182,7 +188,73 @@ class LayerStates:
 
 
 def _evaluate_windows() -> None:
-    """Evaluate the scenes of all windows, so that handlers are told of all changes so far."""
+    """Evaluate the scenes of all windows, so that Blender calls the handlers for all changes so far."""
     for window in bpy.context.window_manager.windows:
         with bpy.context.temp_override(window=window):
             bpy.context.evaluated_depsgraph_get()
+
+
+class ReferenceImages:
+    """Loads the picture that a tone comes from, outside of drawing.
+
+    Blender may not load files while it draws. If `current` returns None for the tone "picture",
+    `load_pending` must be called later.
+    """
+
+    def __init__(self) -> None:
+        #: By the name of a scene: path and modification time of its file, and the luminance, or the
+        #: message of the error of reading it. None: not loaded.
+        self._images: dict[str, tuple[tuple, np.ndarray | str | None]] = {}
+        #: By the name of a scene: the last result, and what it depends on.
+        self._current: dict[str, tuple[Hashable, ReferenceRender]] = {}
+
+    def load_pending(self) -> None:
+        """Load the files that have been requested."""
+        for name, (file_key, image) in list(self._images.items()):
+            if image is not None:
+                continue
+            try:
+                self._images[name] = file_key, load_luminance(file_key[0])
+            except REPORTED_ERRORS as error:
+                self._images[name] = file_key, error_text(error)
+
+    def current(
+        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, look: Look
+    ) -> ReferenceRender | None:
+        """Return the reference render of a scene.
+
+        Returns
+        -------
+        ReferenceRender or None
+            The same object as long as the file and the camera are unchanged. None if the tone does
+            not come from a picture, or the picture is not loaded yet.
+
+        Raises
+        ------
+        RosyError
+            If the file cannot be read, or there is no camera.
+        """
+        if look.tone != "picture":
+            return None
+        path = reference_path(scene)
+        file_key = path, _modified_time(path)
+        if scene.name not in self._images or self._images[scene.name][0] != file_key:
+            self._images[scene.name] = file_key, None
+        image = self._images[scene.name][1]
+        if isinstance(image, str):
+            raise RosyError(image)
+        if image is None:
+            return None
+        reference = load_reference(scene, depsgraph, render_camera(scene), look, image)
+        key = file_key, reference.camera.view.tobytes(), reference.camera.projection.tobytes()
+        if scene.name not in self._current or self._current[scene.name][0] != key:
+            self._current[scene.name] = key, reference
+        return self._current[scene.name][1]
+
+
+def _modified_time(path: Path) -> float | None:
+    """Return when a file was last modified; None if it does not exist."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return None

@@ -38,7 +38,7 @@ _MIN_MEGAPIXELS = 0.02
 
 
 class Request(NamedTuple):
-    """A picture that is wanted.
+    """A request for a picture.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Request(NamedTuple):
 
 @dataclass(eq=False)
 class Work:
-    """Work for a view that goes on from redraw to redraw: a picture, or its preparation.
+    """A picture of a view, or its preparation, on which the renderer works from redraw to redraw.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Work:
     buffer : int
         The image of a final picture.
     seconds : float
-        Seconds of work so far, without that of the helper.
+        Seconds of work so far, without the work of the helper.
     time : float
         Seconds, monotonic: when it was worked on last.
     """
@@ -139,7 +139,7 @@ class ViewState:
 
     @property
     def is_rendering(self) -> bool:
-        """Whether a picture is being rendered. Views that left the screen have stopped."""
+        """Return whether a picture is being rendered. Views that left the screen have stopped."""
         picture = self.picture
         return picture is not None and (
             not picture.runner.poll() or time.monotonic() < picture.time + ABANDON_SECONDS
@@ -161,9 +161,9 @@ class ProgressiveRenderer:
     while the view changes, and the final picture in slices of time once it is at rest. A picture that
     could not be rendered is not tried again.
 
-    What a helper process can do, it does; the views then show their last pictures until it is done.
-    What it has begun for a picture that is no longer wanted is finished for previews and preparations,
-    whose pictures are then shown, and abandoned for final pictures.
+    Calls of numeric functions are made by a helper process; meanwhile the views show their last pictures. If
+    a picture is no longer wanted, previews and preparations are still finished and shown, final pictures are
+    abandoned.
 
     If only streaks drift, there are no previews, which would flicker between the final pictures. These
     are rendered one after the other, and none is abandoned for the next one.
@@ -182,7 +182,7 @@ class ProgressiveRenderer:
     Attributes
     ----------
     views : dict of (int, int) to ViewState
-        By the pointers of space and region.
+        The key has the pointers of space and region.
     is_prepared : bool
         Whether the shaders are compiled, and the meshes of a first picture uploaded.
     """
@@ -201,7 +201,7 @@ class ProgressiveRenderer:
         self._schedule_redraw, self._schedule_poll = schedule_redraw, schedule_poll
         #: What is being prepared. Pictures wait until it is done.
         self._preparation: Work | None = None
-        #: A view that waits until that of another view is done, and since when (seconds, monotonic).
+        #: A view that waits for the picture of another view, and since when (seconds, monotonic).
         self._waiting_view: ViewState | None = None
         self._waiting_time = 0.0
         #: Estimated cost of a final picture; 0 until one is known.
@@ -209,11 +209,11 @@ class ProgressiveRenderer:
 
     @property
     def is_rendering(self) -> bool:
-        """Whether the picture of a view is being rendered."""
+        """Return whether the picture of a view is being rendered."""
         return any(view.is_rendering for view in self.views.values())
 
     def poll(self) -> bool:
-        """Return whether the views must be redrawn, as the helper has done its work or begun another."""
+        """Return whether the views must be redrawn: the helper has finished a call, or begun another one."""
         works = [self._preparation, *(view.picture for view in self.views.values())]
         waiting = [work for work in works if work is not None and not work.runner.poll()]
         if not waiting or any(work is not None and work.runner.has_answer for work in works):
@@ -252,7 +252,7 @@ class ProgressiveRenderer:
         Parameters
         ----------
         view_pointers : (int, int)
-            Of space and region.
+            Pointers of the space and the region.
         requested_key : hashable
             Changes whenever the picture would change.
         view_input : ViewInput
@@ -288,10 +288,10 @@ class ProgressiveRenderer:
         return view
 
     def _prepared(self, view: ViewState, request: Request) -> Request | None:
-        """Continue what is done before a picture. Return the request that is prepared, if one is.
+        """Continue the preparation of a picture. Return the prepared request, or None if it is not done.
 
-        It is an older one if the view has changed in the meantime: meshes may change faster than they
-        are prepared.
+        The returned request is an older one if the view has changed in the meantime: meshes may change
+        faster than they are prepared.
         """
         while True:
             work = self._preparation
@@ -389,7 +389,7 @@ class ProgressiveRenderer:
         self._render(view)
 
     def _must_wait(self, view: ViewState) -> bool:
-        """Whether another view has waited for the picture of this one, whose turn it then is."""
+        """Return whether another view has waited for the last picture of this view. Then it goes first."""
         return (
             self._waiting_view in self.views.values()
             and self._waiting_view is not view

@@ -6,45 +6,35 @@ import time
 import traceback
 from collections import defaultdict
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any
 
 import bpy
 
-from ..annotation.arrow_marks import ArrowMarks
-from ..annotation.singularity_settings import (
-    shows_hidden_singularities,
-    shows_indices,
-    shows_singularities,
-)
+from ..annotation.singularity_settings import shows_singularities
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
 from ..gpu.select import look_in_view, select_viewport_renderer
-from ..rendering.marks import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
-from ..scene.lights import read_lights
+from ..scene.look_inputs import check_sources, read_request
 from ..scene.look_properties import look_at_frame, read_look
-from ..scene.read_request import read_request
-from ..scene.scene_reader import check_sources
+from ..scene.read_view import read_lights
 from ..worker.helper import Helper
-from .background import view_background
 from .flow_clock import FlowClock
-from .layers import LayerState, LayerStates
-from .marks import (
-    SingularityDots,
-    draw_arrowheads,
-    draw_dots,
+from .layers import LayerState, LayerStates, ReferenceImages
+from .overlays import (
+    ViewOverlay,
     draw_labels,
+    draw_messages,
+    draw_singularities,
+    draw_view_arrowheads,
     look_up_singularities,
-    singularity_dots,
 )
-from .messages import draw_messages
 from .progressive import ProgressiveRenderer
-from .references import ReferenceImages
 from .view3d import (
     clip_planes,
     is_timeline_playing,
@@ -53,6 +43,7 @@ from .view3d import (
     redraw,
     redraw_sidebars,
     shows_surfaces,
+    view_background,
 )
 
 #: Seconds between two checks for views that were closed.
@@ -70,33 +61,8 @@ MAX_OBJECT_ERRORS = 4
 #: Opacity of the picture. In edit mode the mesh shows through.
 OPACITY, OPACITY_IN_EDIT_MODE = 1.0, 0.7
 
-#: Most triangles of a view among which hidden places of arrowheads are found exactly. Else they leave gaps.
-MAX_EXACT_TRIANGLES = 200_000
-
 #: Pointers of a space and of one of its regions.
 ViewPointers = tuple[int, int]
-
-
-@dataclass(eq=False)
-class ViewOverlay:
-    """What is drawn over the picture of a region of a live view.
-
-    Attributes
-    ----------
-    problem : str or None
-        Why it shows no picture, or one by another method.
-    lines : list of str
-        Its text, as it was drawn last.
-    labeled : (list of SingularityDots, float) or None
-        The dots that have labels, and their size.
-    arrowheads : (hashable, ArrowMarks) or None
-        Its arrowheads, after a key of what they depend on.
-    """
-
-    problem: str | None = None
-    lines: list[str] = field(default_factory=list)
-    labeled: tuple[list[SingularityDots], float] | None = None
-    arrowheads: tuple[Hashable, ArrowMarks] | None = None
 
 
 class ViewportSession:
@@ -115,7 +81,7 @@ class ViewportSession:
     fallback_reason : str or None
         Why the CPU draws instead of the graphics card.
     flow_clock : FlowClock
-        By which streaks drift in all views, in addition to the frames of the scene.
+        Frames by which streaks drift in all views, in addition to the frames of the scene.
 
     Raises
     ------
@@ -130,29 +96,29 @@ class ViewportSession:
         self.fallback_reason: str | None = None
         self._fallback_time = 0.0
         self.flow_clock = FlowClock()
-        #: Whether a view has shown streaks that drift since the clock was advanced.
+        #: Whether a view has shown drifting streaks since the clock was advanced.
         self._has_shown_flow = False
         self._overlays: defaultdict[ViewPointers, ViewOverlay] = defaultdict(ViewOverlay)
-        self.layers = LayerStates(lambda: self._schedule(0.0, self._resolve_topologies))
+        self.layers = LayerStates()
         #: Stores the singularities of fields, and the fields at corners for arrowheads.
         self._marks_cache = Cache()
-        self._references = ReferenceImages(lambda: self._schedule(0.0, self._load_references))
+        self._references = ReferenceImages()
         self._draw_handlers = [
             bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW"),
             bpy.types.SpaceView3D.draw_handler_add(self._draw_text, (), "WINDOW", "POST_PIXEL"),
         ]
         handlers = bpy.app.handlers
         self._app_handlers = [
-            (handlers.depsgraph_update_post, self._on_update),
-            (handlers.frame_change_post, self._on_update),
+            (handlers.depsgraph_update_post, self.layers.invalidate),
+            (handlers.frame_change_post, self.layers.invalidate),
             (handlers.undo_post, self._on_undo),
             (handlers.redo_post, self._on_undo),
             (handlers.load_pre, self._on_load),
         ]
         for handler_list, handler in self._app_handlers:
             handler_list.append(handler)
-        #: The functions that timers call. Blender identifies a timer by its function object, and each access
-        #: to a method makes a new one.
+        #: The methods that timers call. Blender identifies a timer by its function object, and each access to
+        #: a method makes a new one.
         self._timers: dict[Callable[[], float | None], Callable[[], float | None]] = {}
         self._schedule(CLOSED_VIEWS_INTERVAL_SECONDS, self._drop_closed_views)
 
@@ -207,11 +173,6 @@ class ViewportSession:
         redraw_sidebars()
 
     # --- handlers and timers ---------------------------------------------------------------------
-
-    def _on_update(
-        self, scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None
-    ) -> None:
-        self.layers.invalidate(scene, depsgraph)
 
     def _on_undo(self, *_: Any) -> None:
         self.layers.forget()
@@ -322,7 +283,6 @@ class ViewportSession:
         if view_input is None:
             return
         still_look = replace(view_input.look, flow_phase=0.0)
-        with_field = [entry for entry in view_input.instances if entry.field is not None]
         shows_dots = shows_singularities(look)
         view = self.progressive.update(
             _pointers(context),
@@ -331,7 +291,8 @@ class ViewportSession:
             _picture_key(replace(view_input, look=still_look)),
             [
                 partial(look_up_singularities, instance, self._marks_cache)
-                for instance in (with_field if shows_dots else ())
+                for instance in view_input.instances
+                if shows_dots and instance.field is not None
             ],
         )
         renderer = self.progressive.renderer
@@ -344,38 +305,15 @@ class ViewportSession:
         opacity = OPACITY_IN_EDIT_MODE if context.mode.startswith("EDIT") else OPACITY
         renderer.composite(view.texture, view.items, view_input, opacity)
         if look.arrows:
-            self._draw_arrowheads(context, view_input, look, overlay)
+            still = replace(
+                view_input, look=replace(look, flow_phase=0.0), lights=(), reference=None
+            )
+            draw_view_arrowheads(context, still, _picture_key(still), overlay, self._marks_cache)
         else:
             overlay.arrowheads = None
         if shows_dots:
-            found = [
-                singularity_dots(instance, self._marks_cache, view_input.clip_planes)
-                for instance in with_field
-            ]
-            dots = [one for one in found if one is not None]
-            draw_dots(
-                context, dots, look.singularity_size, shows_hidden=shows_hidden_singularities(look)
-            )
-            if shows_indices(look):
-                overlay.labeled = dots, look.singularity_size
+            draw_singularities(context, view_input, look, overlay, self._marks_cache)
         self._marks_cache.evict_over_limit()
-
-    def _draw_arrowheads(
-        self,
-        context: bpy.types.Context,
-        view_input: ViewInput,
-        look: Look,
-        overlay: ViewOverlay,
-    ) -> None:
-        """Draw arrowheads over the lines of a view."""
-        look = replace(look, flow_phase=0.0)
-        view = replace(view_input, look=look, lights=(), reference=None)
-        key = _picture_key(view)
-        if overlay.arrowheads is None or overlay.arrowheads[0] != key:
-            triangles = sum(len(instance.surface.triangles) for instance in view.instances)
-            is_exact = triangles <= MAX_EXACT_TRIANGLES
-            overlay.arrowheads = key, view_arrows(view, self._marks_cache, is_exact=is_exact)
-        draw_arrowheads(context, overlay.arrowheads[1])
 
     def _read_view(
         self,
@@ -389,14 +327,15 @@ class ViewportSession:
         Raises
         ------
         RosyError
-            If no field is visible and nothing else says why, or if the tone or the colors have no
-            source.
+            If no field is visible and no other message says why, or if the tone or the colors have no source.
         """
         # Dots and arrowheads are drawn over the picture.
         look = replace(look, singularity_dots="none", arrows=0.0)
         look, overlay.problem = look_in_view(look, self.progressive.renderer)
         include_occluders = self.progressive.renderer.needs_occluders or look.shadows
         layer = self.layers.read(context, depsgraph, look, include_occluders=include_occluders)
+        if layer.reader.has_unresolved:
+            self._schedule(0.0, self._resolve_topologies)
         if layer.is_starting:
             self._schedule_redraw(0.0)
             return None
@@ -413,10 +352,12 @@ class ViewportSession:
             raise RosyError(
                 "no object with a field is visible here: make a field, or show its object"
             )
-        check_sources(with_field, read_request(context.scene, look))
+        sources = [(entry.instance, entry.owner) for entry in with_field]
+        check_sources(sources, read_request(context.scene, look))
         reference = self._references.current(context.scene, depsgraph, look)
         if look.tone == "picture" and reference is None:
-            return None  # not loaded yet
+            self._schedule(0.0, self._load_references)
+            return None
         return ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
@@ -434,7 +375,7 @@ class ViewportSession:
         return look_at_frame(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
-        """Show what is being done, and why a field is not drawn."""
+        """Draw the messages and labels of a view."""
         context = bpy.context
         pointers = _pointers(context)
         if pointers[0] not in self.spaces:
@@ -463,14 +404,11 @@ class ViewportSession:
             lines.append(problem)
         errors = [error_text(error) for error in layer.reader.errors.values()] if layer else []
         lines += errors[:MAX_OBJECT_ERRORS]
-        if len(errors) > MAX_OBJECT_ERRORS:
-            lines.append(
-                f"{counted(len(errors) - MAX_OBJECT_ERRORS, 'more object')} cannot be drawn"
-            )
-        return lines
+        rest = len(errors) - MAX_OBJECT_ERRORS
+        return lines + [f"{counted(rest, 'more object')} cannot be drawn"] * (rest > 0)
 
     def messages(self, area: bpy.types.Area) -> list[str]:
-        """Return the text in the views of an area, as they were drawn last."""
+        """Return the messages in the views of an area, as they were drawn last."""
         space_pointer = area.spaces.active.as_pointer()
         views = ((space_pointer, region.as_pointer()) for region in area.regions)
         lines = (self._overlays[view].lines for view in views if view in self._overlays)
@@ -512,7 +450,7 @@ def is_live(space: bpy.types.SpaceView3D) -> bool:
 
 
 def messages(area: bpy.types.Area) -> list[str]:
-    """Return what the live views of an area say: what is being done, why a field is not drawn."""
+    """Return the messages in the live views of an area: progress, and why a field is not drawn."""
     return [] if _session is None else _session.messages(area)
 
 

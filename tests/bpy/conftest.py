@@ -57,3 +57,11 @@ def monkey(scene):
     from scenes import add_field, add_monkey
 
     return add_field(add_monkey())
+
+
+@pytest.fixture
+def wall(scene, camera):
+    """A square across the view, of four faces, with a field of degree 2."""
+    from scenes import add_field, add_plane
+
+    return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))

@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 from mathutils import Vector
 from rosy.rosy_addon.field.generate import GeneratorSettings, generate
+from rosy.rosy_addon.scene.look_inputs import FIELDS_ONLY
+from rosy.rosy_addon.scene.mesh_fields import write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
-from rosy.rosy_addon.scene.read_request import FIELDS_ONLY
 from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.visible_objects import shown_instances
-from rosy.rosy_addon.scene.write_field import write_mesh_field
 from rosy.rosy_addon.worker.job import Call
 
 
@@ -27,6 +27,10 @@ def each_step(steps):
             answer = step() if isinstance(step, Call) else None
     finally:
         steps.close()
+
+
+def depsgraph():
+    return bpy.context.evaluated_depsgraph_get()
 
 
 def link(obj):
@@ -173,3 +177,13 @@ def read_live(reader, request=FIELDS_ONLY, **options):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     instances = shown_instances(depsgraph, include_occluders=False)
     return reader.read(instances, request, **options)
+
+
+def assert_same_directions(first, second, degrees=0.5, percentile=99.0):
+    """Most directions of two G-buffers are the same."""
+    same = np.intersect1d(first.pixel, second.pixel, return_indices=True)[1:]
+    assert len(same[0]) > 0.99 * len(first.pixel)
+    z, w = first.representation[same[0]], second.representation[same[1]]
+    usable = np.abs(z) > 1e-3 * np.abs(z).max()
+    error = np.degrees(np.abs(np.angle(z * w.conj()))) / 4
+    assert np.percentile(error[usable], percentile) < degrees

@@ -14,19 +14,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon import animation
-from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.core.errors import RosyError
-from rosy.rosy_addon.gpu.select import select_device
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.projection import project as projection
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import frame_camera
-from rosy.rosy_addon.scene.file_names import picture_stem
+from rosy.rosy_addon.scene.files import picture_stem
 from rosy.rosy_addon.scene.pictures import OutputSettings
-from rosy.rosy_addon.ui.main_panel import bake_label
-from rosy.rosy_addon.worker.frame_workers import format_frames, parse_frames, run_local
+from rosy.rosy_addon.worker.frame_workers import run_local
 from scenes import add_camera, contents, link, pixels, render
 
 ROOT = Path(__file__).parents[2]
@@ -56,18 +51,6 @@ def moving(scene, camera, monkey):
 def frames_of(folder):
     """Return the bytes of the pictures by name."""
     return {path.name: path.read_bytes() for path in sorted(folder.glob("*.png"))}
-
-
-def test_ranges():
-    assert parse_frames("7") == range(7, 8)
-    assert parse_frames("1-5") == range(1, 6)
-    assert list(parse_frames("-2-4:3")) == [-2, 1, 4]
-    for text in ("5-1", "a", "1-5:0", "", "1-", "1-1048575", "9" * 5000, "1_0", "\u0663"):
-        with pytest.raises(RosyError, match="expected") as caught:
-            parse_frames(text)
-        assert len(str(caught.value)) < 200
-    for frames in (range(3, 4), range(1, 9), range(-4, 9, 3)):
-        assert parse_frames(format_frames(frames)) == range(frames[0], frames[-1] + 1, frames.step)
 
 
 def test_a_frame_is_what_a_bake_draws(moving, tmp_path):
@@ -159,6 +142,7 @@ def test_cameras_and_scenes_have_files_of_their_own(moving, tmp_path):
     assert len({name.casefold() for name in files}) == 5 and "RoSy_Cam_A_0001.png" in files
     # One camera alone has the same file as among others.
     (again,) = bake_animation(moving, [1], cameras=cameras[:1], settings=settings)
+    assert again.camera == names[0]
     assert again.skipped == (1,)
     stills = tmp_path / "stills"
     for camera in cameras:
@@ -177,39 +161,13 @@ def test_names_of_files_are_short_and_differ_on_every_file_system(scene):
     assert len(keys) == len(names)
 
 
-def test_only_affected_frames_are_drawn_again(moving, tmp_path):
-    settings = OutputSettings(folder=tmp_path)
-    bake_animation(moving, range(1, 5), settings=settings)
-    monkey = bpy.data.objects["Suzanne"]
-    for curve in _curves(monkey):
-        if curve.data_path == "rotation_euler":
-            point = curve.keyframe_points.insert(4, 0.3)
-            point.interpolation = "LINEAR"
-            curve.keyframe_points.insert(3, curve.evaluate(3))
-            curve.keyframe_points.insert(2, curve.evaluate(2))
-            for point in curve.keyframe_points:
-                point.interpolation = "CONSTANT"
-    (again,) = bake_animation(moving, range(1, 5), settings=settings)
-    assert 1 in again.skipped and 4 in again.rendered
-
-
-def _curves(obj):
-    action = obj.animation_data.action
-    if hasattr(action, "fcurves"):
-        return action.fcurves
-    return [curve for layer in action.layers for strip in layer.strips for bag in strip.channelbags
-            for curve in bag.fcurves]  # fmt: skip
-
-
 def test_markers_choose_the_camera(moving, tmp_path):
     other = link(bpy.data.objects.new("Other", bpy.data.cameras.new("Other")))
     other.matrix_world = moving.camera.matrix_world.copy()
     other.location.z += 1.5
     for name, frame, camera in (("a", 1, moving.camera), ("b", 4, other)):
         moving.timeline_markers.new(name, frame=frame).camera = camera
-    assert [frame_camera(moving, frame) == other for frame in (0, 1, 3, 4, 9)] == [
-        False, False, False, True, True,
-    ]  # fmt: skip
+    assert [frame for frame in (0, 1, 3, 4, 9) if frame_camera(moving, frame) == other] == [4, 9]
     (result,) = bake_animation(moving, range(3, 5), settings=OutputSettings(folder=tmp_path))
     moving.timeline_markers.clear()
     moving.camera = other
@@ -218,27 +176,6 @@ def test_markers_choose_the_camera(moving, tmp_path):
     frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
     np.testing.assert_allclose(pixels(single.image), frame, atol=1 / 255)
     assert result.rendered == (3, 4)
-
-
-def test_one_sequence_for_each_camera(moving, tmp_path):
-    other = link(bpy.data.objects.new("Other", bpy.data.cameras.new("Other")))
-    other.matrix_world = moving.camera.matrix_world.copy()
-    results = bake_animation(
-        moving,
-        range(1, 3),
-        cameras=[moving.camera, other],
-        settings=OutputSettings(folder=tmp_path),
-    )
-    assert [result.camera for result in results] == [moving.camera.name, "Other"]
-    assert len(frames_of(tmp_path)) == 4
-
-
-def test_the_button_after_an_animation_bakes_a_still(moving, tmp_path):
-    assert bake_label(list_bakes(moving)) == "Bake"
-    bake_animation(moving, range(4, 5), settings=OutputSettings(folder=tmp_path / "frames"))
-    assert bake_label(list_bakes(moving)) == "Bake Still"
-    bake(moving)
-    assert bake_label(list_bakes(moving)) == "Bake Again"
 
 
 def test_materials_play_the_frames(moving, tmp_path):
@@ -333,9 +270,7 @@ def test_killed_processes_can_be_continued(file, tmp_path):
         initial_count = len(frames_of(folder)) if folder.exists() else 0
         deadline = time.monotonic() + 60
         while process.poll() is None and time.monotonic() < deadline:
-            if folder.exists() and len(frames_of(folder)) >= initial_count + generator.randint(
-                1, 3
-            ):
+            if folder.exists() and len(frames_of(folder)) > initial_count:
                 break
             time.sleep(0.01)
         time.sleep(generator.random() * 0.05)
@@ -365,17 +300,8 @@ def test_jobs_share_the_frames(file, tmp_path):
 
 
 def test_failed_frames_are_named(file, tmp_path, monkeypatch):
-    command = [
-        sys.executable,
-        "-m",
-        "rosy_addon",
-        "bake",
-        str(file),
-        "--out",
-        str(tmp_path / "out"),
-        "--camera",
-        "Nobody",
-    ]
+    command = [sys.executable, "-m", "rosy_addon", "bake", str(file)]
+    command += ["--out", str(tmp_path / "out"), "--camera", "Nobody"]
     monkeypatch.chdir(ROOT)
     with pytest.raises(RosyError, match=r"frames 1-5:2: there is no camera 'Nobody'"):
         list(run_local(command, range(1, 7), 2))
@@ -405,23 +331,6 @@ def test_a_cluster_renders_all_frames(file, tmp_path, cluster):
     assert frames_of(tmp_path / "two") == frames_of(tmp_path / "one")
 
 
-def test_a_cluster_names_failed_frames(file, tmp_path, cluster):
-    monkey = bpy.data.objects["Suzanne"]
-    for frame, x in ((4, 0.0), (5, 500.0), (6, 0.0)):
-        monkey.location.x = x
-        monkey.keyframe_insert("location", frame=frame)
-    for curve in _curves(monkey):
-        for point in curve.keyframe_points:
-            point.interpolation = "CONSTANT"
-    bpy.ops.wm.save_mainfile()
-    address = cluster.scheduler_address
-    process = start(file, tmp_path / "out", "--frames", "3-7", "--scheduler", address)
-    _, err = process.communicate(timeout=200)
-    assert process.returncode == 2
-    assert err.startswith("rosy: frame 5: no RoSy object is in view") and err.count("\n") == 1, err
-    assert len(frames_of(tmp_path / "out")) == 4
-
-
 def test_invalid_options_are_refused(file, tmp_path, monkeypatch):
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "1s")
     for options, expected in (
@@ -433,50 +342,6 @@ def test_invalid_options_are_refused(file, tmp_path, monkeypatch):
         process = start(file, tmp_path / "out", *options)
         _, err = process.communicate(timeout=120)
         assert process.returncode == 2 and expected in err, err
-
-
-def test_the_device_is_chosen_for_each_frame(moving, tmp_path, monkeypatch):
-    """The graphics card does not draw the method "members": the choice is made for each frame."""
-    look = moving.rosy.look
-    for frame, method in ((1, "sheets"), (2, "members"), (3, "sheets")):
-        look.method = method
-        look.keyframe_insert("method", frame=frame)
-    chosen = []
-
-    def select(device, look):
-        chosen.append((moving.frame_current, device, look.method))
-        return select_device(device, look)
-
-    monkeypatch.setattr(animation, "select_device", select)
-    settings = OutputSettings(folder=tmp_path, device="auto")
-    bake_animation(moving, [1, 2, 3], settings=settings)
-    assert chosen[:2] == [(1, "auto", "sheets"), (2, "auto", "members")]
-    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0002.png")))
-    moving.frame_set(2)
-    np.testing.assert_allclose(pixels(bake(moving)[0].image), frame, atol=1 / 255)
-
-
-def test_frames_in_which_only_streaks_move_share_their_work(
-    scene, camera, monkey, tmp_path, monkeypatch
-):
-    """Their noise is carried along the field once, and the meshes are projected once."""
-    scene.render.resolution_x, scene.render.resolution_y = 96, 72
-    look, calls = scene.rosy.look, []
-    look.method, look.flow = "ibfv", 1.0
-    for frame, phase in ((1, 0.0), (11, 1.0)):
-        look.flow_phase = phase
-        look.keyframe_insert("flow_phase", frame=frame)
-    for module, name in ((projection, "project"), (stages, "streak_waves")):
-        real = getattr(module, name)
-        monkeypatch.setattr(
-            module, name, lambda *args, real=real, name=name: calls.append(name) or real(*args)
-        )
-    bake_animation(scene, [2, 3, 4], settings=OutputSettings(folder=tmp_path))
-    assert sorted(calls) == ["project", "streak_waves"]
-    assert len(set(frames_of(tmp_path).values())) == 3
-    scene.frame_set(4)
-    frame = pixels(bpy.data.images.load(str(tmp_path / "RoSy_Scene_0004.png")))
-    np.testing.assert_allclose(pixels(bake(scene)[0].image), frame, atol=1 / 255)
 
 
 # --- turntables ------------------------------------------------------------------------------

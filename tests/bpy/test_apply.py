@@ -13,23 +13,20 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
-from rosy.rosy_addon.scene.look_properties import apply_look, read_look
 from rosy.rosy_addon.scene.pictures import show_bake
 from scenes import (
     add_camera,
-    add_field,
-    add_plane,
     contents,
+    depsgraph,
     each_step,
     link,
     pixels,
-    set_vectors,
 )
 
 
 def material_of(obj):
     """Return the material of all faces of an evaluated object."""
-    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = obj.evaluated_get(depsgraph())
     mesh = evaluated.to_mesh()
     materials = {mesh.materials[face.material_index] for face in mesh.polygons}
     evaluated.to_mesh_clear()
@@ -120,27 +117,6 @@ def test_baking_again_replaces(scene, camera, monkey):
     assert contents() == before
 
 
-def test_an_earlier_bake_does_not_change_the_next(scene, camera, monkey):
-    first = bake(scene)[0].picture.rgba
-    second = bake(scene)[0].picture.rgba
-    np.testing.assert_array_equal(first, second)
-
-
-def test_remove_leaves_no_trace(scene, camera, monkey):
-    monkey.data.materials.append(bpy.data.materials.new("Own"))
-    monkey.modifiers.new("Subdivision", "SUBSURF")
-    other = add_field(add_plane("Other"), kind="axis")
-    other.location.x = 1.0
-    add_camera("Second", (3.0, -4.0, 1.0))
-    before = contents()
-    bake(scene, cameras=scene_cameras(scene))
-    assert contents() != before
-    removed = remove_bakes(scene)
-    assert removed == (2, 2)
-    assert contents() == before
-    assert remove_bakes(scene).objects == 0
-
-
 def test_remove_what_lost_its_record_or_users(scene, camera, monkey):
     """The user deleted the image, the modifier or the record, or copied the object."""
     before = contents()
@@ -214,74 +190,6 @@ def test_several_cameras(scene, camera, monkey):
     assert second.name == "Second"
 
 
-def change_look(scene, camera, monkey):
-    scene.rosy.look.seed += 1
-    return "look"
-
-
-def change_camera(scene, camera, monkey):
-    camera.data.lens += 5.0
-    return "camera 'Camera' was changed"
-
-
-def move_camera(scene, camera, monkey):
-    camera.location.x += 0.1
-    bpy.context.view_layer.update()
-    return "camera 'Camera' was changed"
-
-
-def move_object(scene, camera, monkey):
-    monkey.location.x += 0.1
-    bpy.context.view_layer.update()
-    return "'Suzanne' was moved"
-
-
-def change_field(scene, camera, monkey):
-    set_vectors(monkey.data, np.zeros((len(monkey.data.polygons), 3)))
-    return "mesh or field of 'Suzanne'"
-
-
-def change_mesh(scene, camera, monkey):
-    monkey.data.vertices[7].co.x += 0.1
-    return "mesh or field of 'Suzanne'"
-
-
-def change_degree(scene, camera, monkey):
-    monkey.data.rosy.degree = 2
-    return "mesh or field of 'Suzanne'"
-
-
-def delete_object(scene, camera, monkey):
-    bpy.data.objects.remove(monkey)
-    return "'Suzanne' was deleted"
-
-
-def delete_camera(scene, camera, monkey):
-    bpy.data.objects.remove(camera)
-    return "'Camera' was deleted"
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        change_look,
-        change_camera,
-        move_camera,
-        move_object,
-        change_field,
-        change_mesh,
-        change_degree,
-        delete_object,
-        delete_camera,
-    ],
-)
-def test_stale_reasons(scene, camera, monkey, change):
-    bake(scene)
-    assert list_bakes(scene)[0].stale_reason == ""
-    reason = change(scene, camera, monkey)
-    assert reason in list_bakes(scene)[0].stale_reason
-
-
 def test_warnings(scene, camera, monkey):
     assert bake(scene)[0].warnings == ()
     scene.view_settings.view_transform = "Filmic"
@@ -290,46 +198,10 @@ def test_warnings(scene, camera, monkey):
     assert scene.view_settings.view_transform == "Filmic"
 
 
-def test_settings_of_a_look(scene):
-    assert read_look(scene.rosy) == Look()
-    look = Look(
-        method="brute",
-        gain=1.234,
-        density=0.999,
-        seed=2**31 - 1,
-        hue="magnitude",
-        magnitude_length=True,
-    )
-    apply_look(scene.rosy, look)
-    assert read_look(scene.rosy) == look
-    for name, setting in ((entry.name, entry.metadata["setting"]) for entry in look_fields()):
-        description = scene.rosy.look.bl_rna.properties[name].description
-        assert description == setting.text
-
-
-def look_fields():
-    from dataclasses import fields
-
-    return fields(Look)
-
-
 def test_same_scene_same_bytes(scene, camera, monkey):
     first = bytes(bake(scene)[0].image.packed_file.data)
     remove_bakes(scene)
     assert bytes(bake(scene)[0].image.packed_file.data) == first
-
-
-def test_lights_of_the_scene(scene, camera, monkey):
-    data = bpy.data.lights.new("Sun", "SUN")
-    data.energy = 3.0
-    sun = link(bpy.data.objects.new("Sun", data))
-    sun.rotation_euler = (0.0, np.pi / 2, 0.0)
-    look = Look(light="scene", shading=1.0)
-    rgba = bake(scene, look=look)[0].picture.rgba
-    columns = np.arange(rgba.shape[1])
-    brightness = (rgba[..., 0] * rgba[..., 3]).sum(axis=0)
-    middle = (rgba[..., 3].sum(axis=0) * columns).sum() / rgba[..., 3].sum()
-    assert brightness[columns > middle].sum() > 2 * brightness[columns < middle].sum()
 
 
 def test_undo_restores_the_previous_picture(scene, camera, monkey):
@@ -349,14 +221,3 @@ def test_undo_restores_the_previous_picture(scene, camera, monkey):
 def test_a_look_argument_does_not_make_a_bake_stale(scene, camera, monkey):
     bake(scene, look=Look(seed=3))
     assert list_bakes(scene)[0].stale_reason == ""
-
-
-def test_a_bake_of_a_3d_view(scene, monkey):
-    """Its camera is not an object of the scene."""
-    from rosy.rosy_addon.projection.camera import look_at, perspective_camera
-    from rosy.rosy_addon.scene.cameras import VIEW_NAME
-
-    view = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 80, 60, name=VIEW_NAME)
-    (baked,) = bake(scene, cameras=[view])
-    assert tuple(baked.image.size) == (80, 60)
-    assert [(entry.camera, entry.stale_reason) for entry in list_bakes(scene)] == [("3D View", "")]

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from unittest.mock import Mock
-
-import bpy
 import numpy as np
 import pytest
 from rosy.rosy_addon.compositor.look import Look
@@ -13,29 +10,16 @@ from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes
-from rosy.rosy_addon.scene.color_inputs import color_attribute_of
-from rosy.rosy_addon.scene.look_properties import read_look
-from rosy.rosy_addon.scene.read_request import ReadRequest
+from rosy.rosy_addon.scene.look_inputs import ReadRequest
 from rosy.rosy_addon.scene.read_view import read_turntable
-from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from rosy.rosy_addon.ui.look_panels import _draw_color_source
-from scenes import add_field, add_plane, pixels, read_live
-
-
-def depsgraph():
-    return bpy.context.evaluated_depsgraph_get()
+from rosy.rosy_addon.scene.scene_reader import read_scene
+from scenes import depsgraph, pixels
 
 
 def set_values(mesh, values, domain="POINT", kind="FLOAT", name="Angle"):
     attribute = mesh.attributes.get(name) or mesh.attributes.new(name, kind, domain)
     attribute.data.foreach_set("value", values)
     mesh.update()
-
-
-@pytest.fixture
-def wall(scene, camera):
-    """A square across the view, of four faces."""
-    return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))
 
 
 def values_of(name, obj):
@@ -69,56 +53,6 @@ def test_mistakes_are_one_line_that_lists_the_attributes(wall):
         read_scene(depsgraph(), None, ReadRequest(color_attribute=""))
     with pytest.raises(RosyError, match="object 'Plane', attribute 'rosy': expected a number"):
         read_scene(depsgraph(), None, ReadRequest(color_attribute="rosy"))
-
-
-def test_looks_that_color_an_attribute(scene):
-    scene.rosy.color_attribute = "Angle"
-    assert color_attribute_of(scene, Look()) is None
-    assert color_attribute_of(scene, Look(hue="values")) == "Angle"
-    assert color_attribute_of(scene, Look(hue="magnitude")) is None
-
-
-def test_settings_in_a_file(scene, tmp_path):
-    scene.rosy.color_attribute = "Angle"
-    scene.rosy.look.hue, scene.rosy.look.color_range = "values", (-2.5, 1.1)
-    path = str(tmp_path / "colors.blend")
-    bpy.ops.wm.save_as_mainfile(filepath=path)
-    bpy.ops.wm.read_homefile(use_empty=True)
-    bpy.ops.wm.open_mainfile(filepath=path)
-    settings = bpy.context.scene.rosy
-    assert settings.color_attribute == "Angle"
-    look = read_look(settings)
-    assert (look.hue, look.color_range) == ("values", (-2.5, 1.1))
-
-
-@pytest.mark.parametrize(
-    ("hue", "shown"), [("one", False), ("families", False), ("magnitude", False), ("values", True)]
-)
-def test_when_the_panel_shows_the_attribute(scene, wall, hue, shown):
-    """With a search in the attributes of the active mesh."""
-    scene.rosy.look.hue = hue
-    bpy.context.view_layer.objects.active = wall
-    column = Mock()
-    _draw_color_source(column, bpy.context)
-    assert column.row.called == shown
-    if shown:
-        row = column.row.return_value
-        row.prop_search.assert_called_once_with(
-            scene.rosy, "color_attribute", wall.data, "attributes"
-        )
-
-
-def test_a_live_view_reads_numbers_again_when_they_change(wall):
-    set_values(wall.data, np.zeros(9))
-    reader, request = SceneReader(), ReadRequest(color_attribute="Angle")
-    first, second = (read_live(reader, request)[0] for _ in range(2))
-    assert second.instance is first.instance and not first.instance.color_values.any()
-    set_values(wall.data, np.ones(9))
-    reader.invalidate({"Plane"})
-    (changed,) = read_live(reader, request)
-    assert changed.instance is not first.instance and changed.instance.color_values.all()
-    (without,) = read_live(reader)
-    assert without.instance.color_values is None
 
 
 @pytest.fixture

@@ -9,15 +9,16 @@ from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
 from rosy.rosy_addon.scene.meshes import mesh_surface
-from rosy.rosy_addon.scene.read_field import read_mesh_field
 from rosy.rosy_addon.scene.scene_reader import SceneReader
-from rosy.rosy_addon.scene.write_field import write_mesh_field
 from scenes import (
     add_field,
     add_monkey,
     add_plane,
     aim,
+    assert_same_directions,
+    depsgraph,
     member_vectors,
     read_instances,
     read_live,
@@ -26,10 +27,6 @@ from scenes import (
 
 #: Turned about all axes, so that no symmetry of the objects hides a mistake.
 ANGLES = (0.5, -0.3, 1.1)
-
-
-def depsgraph():
-    return bpy.context.evaluated_depsgraph_get()
 
 
 def projected(camera, instances=None):
@@ -42,16 +39,6 @@ def live_instances():
     read_live(reader)
     reader.resolve_topologies(depsgraph())
     return [entry.instance for entry in read_live(reader)], reader.errors
-
-
-def assert_same_directions(first, second, degrees=0.5, percentile=99.0):
-    """Most directions of two G-buffers are the same."""
-    same = np.intersect1d(first.pixel, second.pixel, return_indices=True)[1:]
-    assert len(same[0]) > 0.99 * len(first.pixel)
-    z, w = first.representation[same[0]], second.representation[same[1]]
-    usable = np.abs(z) > 1e-3 * np.abs(z).max()
-    error = np.degrees(np.abs(np.angle(z * w.conj()))) / 4
-    assert np.percentile(error[usable], percentile) < degrees
 
 
 def select_only(*objects):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -10,19 +9,15 @@ from rosy.rosy_addon.scene import scene_reader
 from rosy.rosy_addon.scene.scene_reader import SceneReader
 from scenes import (
     add_field,
-    add_mesh,
     add_plane,
     contents,
+    depsgraph,
     link,
     member_vectors,
     read_instances,
     read_live,
     set_vectors,
 )
-
-
-def depsgraph():
-    return bpy.context.evaluated_depsgraph_get()
 
 
 def read(reader):
@@ -63,21 +58,6 @@ def remesh(obj):
     modifier.mode, modifier.voxel_size = "VOXEL", 0.2
 
 
-def skin(obj):
-    # Around all of Suzanne, this modifier takes half a minute.
-    mesh = bmesh.new()
-    mesh.from_mesh(obj.data)
-    mesh.faces.ensure_lookup_table()
-    bmesh.ops.delete(mesh, geom=mesh.faces[40:], context="FACES")
-    mesh.to_mesh(obj.data)
-    mesh.free()
-    obj.modifiers.new("Skin", "SKIN")
-
-
-def new_geometry(obj):
-    add_nodes(obj, "GeometryNodeMeshCube")
-
-
 def removed_attribute(obj):
     group = add_nodes(obj, "GeometryNodeRemoveAttribute")
     group.nodes["Remove Named Attribute"].inputs["Name"].default_value = "rosy"
@@ -92,20 +72,11 @@ def masked(obj):
     obj.modifiers.new("Hide All", "MASK").vertex_group = "None"
 
 
-def edges_only(obj):
-    group = add_nodes(obj, "GeometryNodeDeleteGeometry")
-    node = group.nodes["Delete Geometry"]
-    node.domain, node.mode = "FACE", "ONLY_FACE"
-
-
 LOSSES = {
     "remesh": (remesh, ["(Rebuild)", "no attribute 'rosy'"]),
-    "skin": (skin, ["(Skin)", "no attribute 'rosy'"]),
-    "new geometry": (new_geometry, ["(Nodes)", "no attribute 'rosy'"]),
     "removed attribute": (removed_attribute, ["(Nodes)", "no attribute 'rosy'"]),
     "points only": (points_only, ["(Nodes)", "no faces"]),
     "masked": (masked, ["(Hide All)", "no faces"]),
-    "edges only": (edges_only, ["(Nodes)", "no faces"]),
 }
 
 
@@ -192,9 +163,9 @@ def test_reading_in_slices_ends(scene):
         plane = add_plane(f"Plane {index}")
         add_field(plane, kind="axis")
         if index % 3 == 0:
-            new_geometry(plane)
+            removed_attribute(plane)
         elif index % 3 == 1:
-            edges_only(plane)
+            masked(plane)
     entries = read_live(reader, deadline=0.0)
     while not reader.is_complete or reader.has_unresolved:
         calls += 1
@@ -235,20 +206,6 @@ def test_faces_that_differ_at_each_evaluation_end_in_an_error(monkey, monkeypatc
             break
         reader.resolve_topologies(depsgraph())
     assert "at each evaluation" in str(reader.errors["Suzanne"])
-
-
-def test_other_objects_are_drawn(monkey):
-    plane = add_field(add_plane(), kind="axis")
-    remesh(monkey)
-    reader = SceneReader()
-    assert read(reader) == [plane.name] and list(reader.errors) == ["Suzanne"]
-
-
-def test_a_mesh_without_faces_is_named(scene):
-    bare = add_mesh("Bare", [(0, 0, 0), (1, 0, 0)], [])
-    bare.data.attributes.new("rosy", "FLOAT_VECTOR", "FACE")
-    reader = SceneReader()
-    assert read(reader) == [] and "no faces" in str(reader.errors["Bare"])
 
 
 @pytest.mark.parametrize("mesh_kind", ["bare", "remesh"])

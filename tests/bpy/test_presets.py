@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import bpy
 import pytest
 from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.preset_files import store
-from rosy.rosy_addon.preset_files.store import Preset, default_user_folder, preset_keys, save_preset
+from rosy.rosy_addon.preset_files.store import Preset, preset_keys, save_preset
 from rosy.rosy_addon.scene.look_properties import read_look
-from rosy.rosy_addon.scene.paths import user_presets_folder
 from rosy.rosy_addon.ui import preset_library
 
 LOOK = Look(ink="hatch", gain=1.23456789, guiding_angle=0.1, ink_color="#ABCDEF", seed=7)
@@ -19,11 +17,6 @@ LOOK = Look(ink="hatch", gain=1.23456789, guiding_angle=0.1, ink_color="#ABCDEF"
 def user_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("ROSY_PRESETS", str(tmp_path / "own"))
     return tmp_path / "own"
-
-
-def test_user_folder_without_the_extension(monkeypatch):
-    monkeypatch.delenv("ROSY_PRESETS", raising=False)
-    assert user_presets_folder() == default_user_folder()
 
 
 def test_a_new_scene_has_the_default(scene, user_folder):
@@ -99,15 +92,6 @@ def test_presets_are_applied_by_name_and_by_path(scene, user_folder, tmp_path):
     (user_folder / "my-ink.json").rename(elsewhere)
     preset_library.apply_preset(scene.rosy, str(elsewhere))
     assert scene.rosy.preset_name == str(elsewhere) == scene.rosy.preset
-
-
-def test_the_name_is_saved_and_copied_with_the_scene(scene, user_folder, tmp_path):
-    scene.rosy.preset = "woodcut"
-    other = scene.copy()
-    assert other.rosy.preset == "woodcut"
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    assert bpy.context.scene.rosy.preset == "woodcut"
 
 
 def test_edited_files_are_read_again(scene, user_folder, monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
+from rosy.rosy_addon.scene.pictures import show_bake
 from scenes import add_camera, add_field, add_plane, contents, link
 
 
@@ -50,11 +51,6 @@ def nothing(tmp_path):
 def duplicate(tmp_path):
     select("Sheet", "Plain")
     bpy.ops.object.duplicate()
-
-
-def duplicate_linked(tmp_path):
-    select("Sheet", "Plain")
-    bpy.ops.object.duplicate(linked=True)
 
 
 def join(tmp_path):
@@ -108,15 +104,6 @@ def apply_and_bake_again(tmp_path):
     bake(bpy.context.scene)
 
 
-def convert(tmp_path):
-    select("Plain")
-    bpy.ops.object.convert(target="MESH", keep_original=True)
-
-
-def hide(tmp_path):
-    obj("Plain").hide_render = obj("Plain").hide_viewport = True
-
-
 def exclude(tmp_path):
     collection = bpy.data.collections.new("Away")
     bpy.context.scene.collection.children.link(collection)
@@ -135,14 +122,6 @@ def copy_modifier(tmp_path):
     other.modifiers.new("Picture", "NODES").node_group = obj("Plain").modifiers[-1].node_group
 
 
-def remove_modifier(tmp_path):
-    obj("Plain").modifiers.clear()
-
-
-def delete_record(tmp_path):
-    bpy.context.scene.rosy.bakes.clear()
-
-
 def save_and_open(tmp_path):
     path = str(tmp_path / "scene.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -155,32 +134,21 @@ def bake_with_another_camera(tmp_path):
 
 
 ACTIONS = {
-    function.__name__ if name is None else name: function
-    for name, function in (
-        (None, nothing),
-        (None, duplicate),
-        (None, duplicate_linked),
-        (None, join),
-        (None, delete),
-        (None, delete_camera),
-        (None, rename),
-        ("apply", apply("Sheet", "Plain")),
-        ("apply one", apply("Plain")),
-        (None, apply_and_duplicate),
-        (None, apply_and_join),
-        (None, apply_and_edit),
-        (None, apply_and_bake_again),
-        (None, convert),
-        (None, hide),
-        (None, exclude),
-        (None, unlink),
-        (None, copy_modifier),
-        (None, remove_modifier),
-        (None, delete_record),
-        (None, save_and_open),
-        (None, bake_with_another_camera),
+    function.__name__: function
+    for function in (
+        *(nothing, duplicate, join, delete, delete_camera, rename, apply_and_duplicate),
+        *(
+            apply_and_join,
+            apply_and_edit,
+            apply_and_bake_again,
+            exclude,
+            unlink,
+            copy_modifier,
+            save_and_open,
+            bake_with_another_camera,
+        ),
     )
-}
+} | {"apply": apply("Sheet", "Plain"), "apply one": apply("Plain")}
 
 #: Actions on the modifiers of the user, or on RoSy's alone, without a picture.
 NEEDS_PICTURE = ("copy_modifier", "apply_and_bake_again", "bake_with_another_camera")
@@ -312,11 +280,8 @@ def test_materials_of_strokes_stay(tmp_path):
     obj("Plain").data.materials.append(ink)
     bake(scene)
     remove_bakes(scene)
-    assert [material.name for material in obj("Plain").data.materials] == [
-        "Own",
-        "Other",
-        "RoSy Ink",
-    ]
+    names = [material.name for material in obj("Plain").data.materials]
+    assert names == ["Own", "Other", "RoSy Ink"]
 
 
 def test_a_duplicate_shows_the_picture_of_another_camera(tmp_path):
@@ -325,8 +290,6 @@ def test_a_duplicate_shows_the_picture_of_another_camera(tmp_path):
     rename(tmp_path)
     select("My Plain")
     bpy.ops.object.duplicate()
-    from rosy.rosy_addon.scene.pictures import show_bake
-
     show_bake(scene, "Second")
     shown = {info.camera: info.is_shown for info in list_bakes(scene)}
     assert shown == {"Second": True, "My Camera": False}

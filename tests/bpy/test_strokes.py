@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-import pytest
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.surface import build_surface
 from rosy.rosy_addon.line_drawing.pipeline import draw_instances
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
-from rosy.rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy.rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy.rosy_addon.projection.camera import orbit_camera
 from rosy.rosy_addon.projection.gbuffer import MeshInstance
 from rosy.tests.harness.outline_marks import visible_silhouettes
-from rosy.tests.harness.stroke_spacing import lateral_gaps
-from rosy.tests.harness.stroke_tracing import trace_strokes
+from scenes import depsgraph
 from scipy.spatial import cKDTree
 
 
@@ -25,23 +22,11 @@ def suzanne(levels=2):
     monkey = bpy.context.object
     if levels:
         monkey.modifiers.new("smooth", "SUBSURF").levels = levels
-    mesh = monkey.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    mesh = monkey.evaluated_get(depsgraph()).to_mesh()
     points = [tuple(vertex.co) for vertex in mesh.vertices]
     faces = [list(polygon.vertices) for polygon in mesh.polygons]
     starts = np.cumsum([0, *map(len, faces)])
     return build_surface(points, np.concatenate(faces), starts, name="Suzanne")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("degree", [2, 4, 6])
-def test_spacing_on_suzanne(scene, degree):
-    surface = suzanne()
-    instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", degree))
-    gaps = lateral_gaps(
-        build_tangent_mesh(instance), trace_strokes(instance, 0.012 * surface.extent)
-    )
-    assert gaps.evenness() >= 0.9
-    assert gaps.nearest_distance.min() >= 0.5
 
 
 def test_outlines_of_a_coarse_mesh_have_no_gaps(scene):

@@ -12,7 +12,7 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture
 from rosy.rosy_addon.scene.bake_records import list_bakes, remove_bakes
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import add_field, contents, render
+from scenes import add_field, contents, depsgraph, render
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def stale_reason(scene):
 def test_the_texture_is_on_the_evaluated_mesh(scene, textured):
     """In a plain material on the UV map, which the modifier sets. The user's slots stay empty."""
     bpy.context.view_layer.update()
-    evaluated = textured.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = textured.evaluated_get(depsgraph())
     (material,) = evaluated.data.materials
     nodes = {node.bl_idname: node for node in material.original.node_tree.nodes}
     assert nodes["ShaderNodeUVMap"].uv_map == textured.data.uv_layers.active.name
@@ -55,14 +55,15 @@ def test_what_makes_a_texture_out_of_date(scene, textured):
     scene.rosy.look.shading = 0.1
     bpy.context.view_layer.update()
     assert stale_reason(scene) == ""
-    for change, undo, expected in (
-        (lambda: setattr(scene.rosy.look, "grain", 3.0), lambda: setattr(scene.rosy.look, "grain", 1.5), "look"),
-        (lambda: setattr(scene.rosy, "texture_size", 64), lambda: setattr(scene.rosy, "texture_size", 128), "64 x 64"),
-        (lambda: setattr(scene.rosy, "texture_margin", 3), lambda: setattr(scene.rosy, "texture_margin", 16), "UV map"),
-    ):  # fmt: skip
-        change()
+    for owner, name, value, expected in (
+        (scene.rosy.look, "grain", 3.0, "look"),
+        (scene.rosy, "texture_size", 64, "64 x 64"),
+        (scene.rosy, "texture_margin", 3, "UV map"),
+    ):
+        before = getattr(owner, name)
+        setattr(owner, name, value)
         assert expected in stale_reason(scene)
-        undo()
+        setattr(owner, name, before)
         assert stale_reason(scene) == ""
     textured.data.uv_layers.active.uv[0].vector = (0.5, 0.5)
     textured.data.update_tag()
@@ -104,10 +105,8 @@ def test_copies_share_a_texture_until_they_are_baked(scene, textured):
     add_field(copy, kind="axis")
     bpy.context.view_layer.update()
     bake_texture(scene, [copy])
-    assert [(info.camera, info.stale_reason) for info in list_bakes(scene)] == [
-        ("Copy", ""),
-        ("Renamed", ""),
-    ]
+    infos = [(info.camera, info.stale_reason) for info in list_bakes(scene)]
+    assert infos == [("Copy", ""), ("Renamed", "")]
     bpy.data.objects.remove(copy)
     bpy.context.view_layer.update()
     assert len(bpy.data.objects) == 2
@@ -123,13 +122,6 @@ def test_remove_leaves_nothing(scene, camera, monkey):
     assert contents() != before
     remove_bakes(scene)
     assert contents() == before
-
-
-def test_folder_gets_a_file(scene, camera, monkey, tmp_path):
-    scene.rosy.texture_size = 64
-    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path)
-    bake_texture(scene, [monkey])
-    assert [file.name for file in tmp_path.iterdir()] == [f"RoSy_{monkey.name}_texture.png"]
 
 
 def test_tiles_are_pictures_of_their_own(scene, textured, tmp_path):

@@ -12,23 +12,18 @@ from rosy.rosy_addon.core.color import to_linear
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.scene.occlusion import OCCLUSION_ATTRIBUTE, store_occlusion
-from rosy.rosy_addon.scene.pictures import read_output_settings
-from rosy.rosy_addon.scene.read_request import ReadRequest
-from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from rosy.rosy_addon.scene.tone_inputs import (
+from rosy.rosy_addon.scene.computed_attributes import OCCLUSION_ATTRIBUTE, store_occlusion
+from rosy.rosy_addon.scene.look_inputs import (
+    ReadRequest,
     ToneRequest,
     image_luminance,
     load_reference,
-    make_tone_request,
 )
-from scenes import add_field, add_mesh, add_plane, link, pixels, read_live
+from rosy.rosy_addon.scene.pictures import read_output_settings
+from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
+from scenes import add_field, add_mesh, depsgraph, link, pixels, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
-
-def depsgraph():
-    return bpy.context.evaluated_depsgraph_get()
 
 
 def add_attribute(mesh, name, domain, kind, values):
@@ -57,12 +52,6 @@ def save_picture(path, values):
     image.filepath_raw, image.file_format = str(path), "PNG"
     image.save()
     bpy.data.images.remove(image)
-
-
-@pytest.fixture
-def wall(scene, camera):
-    """A square across the view, of four faces."""
-    return add_field(add_plane(cuts=2), "axis", 2, (1.0, 0.0, 0.2))
 
 
 def tone_of(tone_request, name="Plane"):
@@ -101,20 +90,6 @@ def test_the_default_is_the_active_color_attribute(wall):
     wall.data.color_attributes.active_color_name = "Paint"
     tone = tone_of(ToneRequest("attribute")).values
     np.testing.assert_allclose(tone, 0.7, atol=1e-6)
-
-
-def test_modifiers_copy_attributes(wall):
-    add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.linspace(0, 1, 9))
-    wall.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
-    tone = tone_of(ToneRequest("attribute", "Ink")).values
-    assert len(tone) == 4 * 16
-    mesh = depsgraph().id_eval_get(wall).data
-    positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
-    corner = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corner)
-    x, _, z = positions.reshape(-1, 3)[corner].T
-    np.testing.assert_allclose(tone[:, 0], 0.5 + x / 8 + 3 * z / 8, atol=1e-5)
 
 
 def test_objects_without_the_attribute_have_no_tone(wall, monkey):
@@ -196,7 +171,7 @@ def test_missing_images_and_uv_maps(wall):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     wall.rosy.tone_image = add_image()
     bpy.context.view_layer.update()
-    with pytest.raises(RosyError, match="object 'Plane': its mesh has no UV map"):
+    with pytest.raises(RosyError, match="object 'Plane' has no UV map: unwrap"):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     add_uv(wall.data)
     assert tone_of(ToneRequest("image")).image.shape == (2, 2)
@@ -281,27 +256,29 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
 # --- requests, shadows and occlusion --------------------------------------------------------------
 
 
-def test_tone_requests_of_looks(scene):
-    scene.rosy.tone_attribute = "Ink"
-    assert make_tone_request(scene, Look()) is None
-    assert make_tone_request(scene, Look(tone="attribute")) == ToneRequest("attribute", "Ink")
-    assert make_tone_request(scene, Look(tone="image")) == ToneRequest("image")
-    assert make_tone_request(scene, Look(tone="picture")) is None
-
-
-def test_a_live_view_reads_tones_again_when_they_change(wall):
+@pytest.mark.parametrize(
+    ("request_for_ink", "values_of"),
+    [
+        (
+            ReadRequest(tone=ToneRequest("attribute", "Ink")),
+            lambda mesh: mesh.tone and mesh.tone.values,
+        ),
+        (ReadRequest(color_attribute="Ink"), lambda mesh: mesh.color_values),
+    ],
+    ids=["tone", "numbers"],
+)
+def test_a_live_view_reads_values_again_when_they_change(wall, request_for_ink, values_of):
     add_attribute(wall.data, "Ink", "POINT", "FLOAT", np.zeros(9))
-    reader, request = SceneReader(), ReadRequest(tone=ToneRequest("attribute", "Ink"))
-    (first,) = read_live(reader, request)
-    (second,) = read_live(reader, request)
-    assert second.instance is first.instance and not first.instance.tone.values.any()
+    reader = SceneReader()
+    first, second = (read_live(reader, request_for_ink)[0].instance for _ in range(2))
+    assert second is first and not values_of(first).any()
     wall.data.attributes["Ink"].data.foreach_set("value", np.ones(9, dtype=np.float32))
     wall.data.update()
     reader.invalidate({"Plane"})
-    (changed,) = read_live(reader, request)
-    assert changed.instance is not first.instance and changed.instance.tone.values.all()
-    (without_tone,) = read_live(reader)
-    assert without_tone.instance.tone is None
+    (changed,) = read_live(reader, request_for_ink)
+    assert changed.instance is not first and values_of(changed.instance).all()
+    (without,) = read_live(reader)
+    assert values_of(without.instance) is None
 
 
 def test_shadows_of_objects_that_renders_show(scene, wall):
@@ -355,6 +332,6 @@ def test_occlusion_of_meshes_with_new_faces(scene, wall):
 
 def test_occlusion_does_not_replace_other_attributes(scene, wall):
     add_attribute(wall.data, OCCLUSION_ATTRIBUTE, "POINT", "FLOAT", np.arange(9))
-    with pytest.raises(RosyError, match="object 'Plane' already has an attribute 'Occlusion'"):
+    with pytest.raises(RosyError, match="mesh 'Plane' already has an attribute 'Occlusion'"):
         store_occlusion(depsgraph(), [wall], direction_count=4)
     assert wall.data.attributes[OCCLUSION_ATTRIBUTE].data[3].value == 3

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from rosy_addon.core.errors import RosyError
-from rosy_addon.worker.frame_workers import run_local
+from rosy_addon.worker.frame_workers import format_frames, parse_frames, run_local
 
 
 def command(script):
@@ -54,3 +54,15 @@ def test_each_process_that_fails_is_named():
     script = "print('rosy: frame 2: no camera')\nsys.exit(2 if frames[-1] == '2' else 0)"
     with pytest.raises(RosyError, match=r"^frames 2: no camera$"):
         list(run_local(command(script), [1, 2], 2))
+
+
+def test_ranges():
+    assert parse_frames("7") == range(7, 8)
+    assert parse_frames("1-5") == range(1, 6)
+    assert list(parse_frames("-2-4:3")) == [-2, 1, 4]
+    for text in ("5-1", "a", "1-5:0", "", "1-", "1-1048575", "9" * 5000, "1_0", "\u0663"):
+        with pytest.raises(RosyError, match="expected") as caught:
+            parse_frames(text)
+        assert len(str(caught.value)) < 200
+    for frames in (range(3, 4), range(1, 9), range(-4, 9, 3)):
+        assert parse_frames(format_frames(frames)) == range(frames[0], frames[-1] + 1, frames.step)

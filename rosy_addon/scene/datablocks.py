@@ -1,11 +1,18 @@
-"""Datablocks that RoSy created: how they are recognized, deleted, and rolled back after an error."""
+"""Datablocks: which ones RoSy created, and which ones are linked, missing or editable.
+
+Datablocks that RoSy creates have a tag, by which they are recognized and deleted. If a library is missing,
+Blender keeps an empty as a placeholder for each of its objects.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Literal
 
 import bpy
+
+from ..core.errors import RosyError
 
 #: Custom property on every datablock that RoSy created.
 OWNED_TAG = "rosy_made"
@@ -18,7 +25,7 @@ KEY_TAG = "rosy_key"
 
 
 def is_rosy_modifier(modifier: bpy.types.Modifier) -> bool:
-    """Whether RoSy added a modifier that shows a picture."""
+    """Return whether RoSy added a modifier that shows a picture."""
     group = getattr(modifier, "node_group", None) if modifier.type == "NODES" else None
     return group is not None and bool(group.get(OWNED_TAG)) and not group.get(STROKES_TAG)
 
@@ -36,7 +43,7 @@ def removable_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def user_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Return the modifiers of an object without those that RoSy added."""
+    """Return the modifiers of an object that RoSy did not add."""
     return [modifier for modifier in obj.modifiers if not is_rosy_modifier(modifier)]
 
 
@@ -79,3 +86,45 @@ def delete_unused() -> int:
         ]
         bpy.data.batch_remove(unused)
     return len(unused)
+
+
+def check_object_type(obj: bpy.types.Object, kind: Literal["MESH", "CAMERA"]) -> None:
+    """Check that an object is of a type.
+
+    Raises
+    ------
+    RosyError
+        If it is of another type, or is missing in its library.
+    """
+    check_not_missing(obj)
+    if obj.type != kind:
+        label = obj.bl_rna.properties["type"].enum_items[obj.type].name
+        raise RosyError(f"object '{obj.name}' is not a {kind.lower()}, but of type {label}")
+
+
+def check_not_missing(obj: bpy.types.Object) -> None:
+    """Raise an error if an object or its data is a placeholder for data missing in a library."""
+    for datablock in (obj, obj.data):
+        if datablock is not None and datablock.is_missing:
+            path = datablock.library.filepath
+            if datablock.library.is_missing:
+                raise RosyError(f"object '{obj.name}': its library {path} is missing: relink it")
+            raise RosyError(
+                f"object '{obj.name}': its library {path} does not contain '{datablock.name}': relink it"
+            )
+
+
+def remedy_for_absence(otherwise: str) -> str:
+    """Return what to do if something is not there: relink libraries that are missing, if any."""
+    paths = [library.filepath for library in bpy.data.libraries if library.is_missing]
+    return f"relink the missing library {', '.join(paths)}" if paths else otherwise
+
+
+def has_rosy_properties() -> bool:
+    """Return whether RoSy's properties are registered. They are while the extension is enabled."""
+    return hasattr(bpy.types.Scene, "rosy") and hasattr(bpy.types.Mesh, "rosy")
+
+
+def is_editable(datablock: bpy.types.ID) -> bool:
+    """Return whether a datablock can be changed: it is local, or a library override."""
+    return datablock.library is None and getattr(datablock, "is_editable", True)

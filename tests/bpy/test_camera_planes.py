@@ -1,4 +1,4 @@
-"""Keys: what explains pictures in renders."""
+"""Planes in front of cameras: keys, which explain pictures, and backdrops, the paper behind them."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from rosy.rosy_addon.annotation.key_contents import PictureKey
 from rosy.rosy_addon.compositor.look import Look
-from rosy.rosy_addon.core.color import to_linear
+from rosy.rosy_addon.core.color import from_hex, to_linear
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.bake_records import baked_objects, list_bakes, remove_bakes
+from rosy.rosy_addon.scene.camera_planes import frame_corners, update_backdrops
 from rosy.rosy_addon.scene.cameras import camera_of_object
-from rosy.rosy_addon.scene.font_shapes import FontShapes
-from rosy.rosy_addon.scene.keys import round_length, update_keys
+from rosy.rosy_addon.scene.keys import FontShapes, round_length, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
-from scenes import add_camera, aim, contents, pixels, read_instances, render
+from scenes import add_camera, aim, contents, depsgraph, pixels, read_instances, render
 
 LOOK = Look(hue="magnitude", singularity_dots="visible", supersampling=2)
 
@@ -51,15 +51,6 @@ def test_text_is_read_without_a_trace(scene):
     assert fonts.width("HH") > 2 * fonts.width("H") > 1
     assert fonts.width("") == fonts.width(" ") == 0
     assert contents() == before
-
-
-def test_letters_have_the_area_of_their_outlines(scene):
-    """An H of Blender's font consists of three bars."""
-    a, b, c = np.moveaxis(FontShapes().triangles("H"), 1, 0)
-    area = np.abs(np.cross(b - a, c - a)).sum() / 2
-    low, high = np.min([a, b, c], axis=(0, 1)), np.max([a, b, c], axis=(0, 1))
-    box = np.prod(high - low)
-    assert 0.2 * box < area < 0.5 * box
 
 
 # --- the plane -----------------------------------------------------------------------------------
@@ -239,3 +230,75 @@ def test_renders_show_the_image_in_the_frame(colored, tmp_path, kind):
     # Samples at the very edge of a pixel may meet the next one.
     assert np.quantile(difference, 0.995) < 2e-3 and difference.max() < 0.05
     np.testing.assert_allclose(rendered[opaque][:, 3], 1, atol=1e-3)
+
+
+# --- backdrops -----------------------------------------------------------------------------------
+
+PAPER = Look(ink="hatch", paper_color="#c08040")
+
+
+def backdrops():
+    return [obj for obj in bpy.data.objects if obj.get("rosy_backdrop")]
+
+
+@pytest.fixture
+def hatched(monkey, camera, scene):
+    """A scene whose look has brown paper."""
+    apply_look(scene.rosy, PAPER)
+    return scene
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_corners_are_those_of_the_frame(scene, camera, kind):
+    camera.data.type, camera.data.shift_x, camera.data.shift_y = kind, 0.2, -0.1
+    scene.render.resolution_x = 192
+    view = camera_of_object(scene, depsgraph(), camera)
+    corners = frame_corners(view, 30.0)
+    np.testing.assert_allclose(corners[:, 2], -30.0)
+    clip = np.c_[corners, np.ones(4)] @ view.projection.T
+    ndc = clip[:, :2] / clip[:, 3:]
+    np.testing.assert_allclose(ndc, [(-1, -1), (1, -1), (1, 1), (-1, 1)], atol=1e-9)
+
+
+def test_without_the_switch_or_without_paper_there_is_none(hatched):
+    bake(hatched)
+    assert not backdrops()
+    apply_look(hatched.rosy, Look())
+    hatched.rosy.backdrop = True
+    bake(hatched)
+    assert not backdrops()
+
+
+def test_the_switch_shows_and_hides_the_backdrop(hatched):
+    before = contents()
+    bake(hatched)
+    baked = contents()
+    hatched.rosy.backdrop = True
+    (obj,) = backdrops()
+    assert obj.parent == hatched.camera and obj.hide_select and not obj.visible_shadow
+    hatched.rosy.backdrop = False
+    assert contents() == baked
+    hatched.rosy.backdrop = True
+    remove_bakes(hatched)
+    update_backdrops(hatched)
+    assert contents() == before
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_renders_show_paper_all_over_the_background(hatched, tmp_path, kind):
+    data = hatched.camera.data
+    data.type, data.ortho_scale, data.shift_x, data.shift_y = kind, 6.0, 0.3, 0.1
+    hatched.camera.scale = (2.0, 0.5, 3.0)
+    hatched.render.resolution_x = 192
+    hatched.rosy.backdrop = True
+    (result,) = bake(hatched)
+    rendered = render(hatched, tmp_path / "render.exr")
+    background = pixels(result.image)[..., 3] == 0
+    for axis in (0, 1):  # without the pixels at the edge of the object
+        background &= np.roll(background, 1, axis) & np.roll(background, -1, axis)
+    assert 0.3 < background.mean() < 0.95
+    np.testing.assert_allclose(
+        rendered[background],
+        [*to_linear(from_hex(PAPER.paper_color)), 1.0] * np.ones((background.sum(), 1)),
+        atol=1e-3,
+    )

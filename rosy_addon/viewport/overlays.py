@@ -1,9 +1,10 @@
-"""Marks in a 3D view: dots at singularities, with labels of their indices, and arrowheads over the lines."""
+"""What is drawn over the picture of a 3D view: dots at singularities, their labels, arrowheads, messages."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import textwrap
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -26,12 +27,17 @@ from ..annotation.singularity_marks import (
     OUTLINE_COLOR,
     dot_diameters,
 )
+from ..annotation.singularity_settings import shows_hidden_singularities, shows_indices
+from ..compositor.look import Look
 from ..core.cache import Cache
 from ..core.color import from_hex
+from ..core.errors import as_sentence
 from ..field.singularities import find_singularities
 from ..gpu.preparation import Preparation
 from ..projection.gbuffer import MeshInstance
 from ..projection.visible_vertices import is_cut_away
+from ..rendering.marks import view_arrows
+from ..rendering.view_input import ViewInput
 from ..worker.job import Call
 
 #: Number of sides of the polygon that approximates a disc.
@@ -46,9 +52,14 @@ LABEL_SIZE = 4 / 3
 #: Seconds for each triangle of a mesh that finding its singularities takes.
 SINGULARITY_SECONDS = 1.2e-6
 
-#: How far arrowheads are in front of their places, and their outlines behind them, in lengths. Those beside their
-#: places are nearer still, by so many times the distance, so that slanted surfaces do not hide them.
+#: Offsets toward the eye, so that surfaces do not hide arrowheads: of arrowheads, and how much less of their
+#: outlines, in lengths of an arrowhead; and an additional offset as a multiple of the distance of an arrowhead
+#: from its place on the surface, for slanted surfaces.
 NEARNESS, OUTLINE_DISTANCE, SLOPE = 1.5, 0.5, 2.5
+
+#: Largest number of triangles of a view for which hidden places of arrowheads are found exactly. In views with
+#: more, arrowheads leave gaps.
+MAX_EXACT_TRIANGLES = 200_000
 
 #: Points of the arc around a corner of an outline.
 ARC_POINTS = 4
@@ -62,7 +73,7 @@ class PixelFrames(NamedTuple):
     right, up : (K, 3) float64 ndarray
         World space, parallel to the view.
     nearer : (K, 3) float64 ndarray
-        As far along the axis of the view, toward the eye. The point stays where it is in the view.
+        A step of the same length toward the eye, along which the point stays at its place in the view.
     """
 
     right: np.ndarray
@@ -111,6 +122,28 @@ class SingularityDots:
     degree: int
 
 
+@dataclass(eq=False)
+class ViewOverlay:
+    """The marks and messages over the picture of a region of a live view.
+
+    Attributes
+    ----------
+    problem : str or None
+        Why it shows no picture, or one by another method.
+    lines : list of str
+        Its text, as it was drawn last.
+    labeled : (list of SingularityDots, float) or None
+        The dots that have labels, and their size.
+    arrowheads : (hashable, ArrowMarks) or None
+        Its arrowheads, after a key of what they depend on.
+    """
+
+    problem: str | None = None
+    lines: list[str] = field(default_factory=list)
+    labeled: tuple[list[SingularityDots], float] | None = None
+    arrowheads: tuple[Hashable, ArrowMarks] | None = None
+
+
 def look_up_singularities(
     instance: MeshInstance, cache: Cache
 ) -> tuple[np.ndarray, np.ndarray] | Preparation:
@@ -118,12 +151,12 @@ def look_up_singularities(
 
     They are the same for all deformations of a mesh.
     """
-    surface, field = instance.surface, instance.field
-    key = "singularities", surface.rest_shape_key, field
+    surface = instance.surface
+    key = "singularities", surface.rest_shape_key, instance.field
     found = cache.get(key)
     if found is not None:
         return found
-    arguments = surface.in_rest_shape(), field
+    arguments = surface.in_rest_shape(), instance.field
     call = Call(find_singularities, arguments, label="finding singularities")
     return Preparation(call, SINGULARITY_SECONDS * len(surface.triangles), partial(cache.put, key))
 
@@ -131,7 +164,7 @@ def look_up_singularities(
 def singularity_dots(
     instance: MeshInstance, cache: Cache, clip_planes: np.ndarray | None
 ) -> SingularityDots | None:
-    """Return the singularities of an instance with a field, without those that are cut away.
+    """Return the singularities of an instance with a field that the view does not cut away.
 
     Parameters
     ----------
@@ -162,7 +195,7 @@ def draw_dots(
     *,
     shows_hidden: bool = False,
 ) -> None:
-    """Draw dots in a view, behind what is in front of them.
+    """Draw dots in a view. Surfaces in front hide them.
 
     Parameters
     ----------
@@ -180,6 +213,25 @@ def draw_dots(
     gpu.state.depth_test_set("LESS_EQUAL")
     _draw_all(context, objects, size, 1.0)
     gpu.state.depth_test_set("NONE")
+
+
+def draw_singularities(
+    context: bpy.types.Context,
+    view_input: ViewInput,
+    look: Look,
+    overlay: ViewOverlay,
+    cache: Cache,
+) -> None:
+    """Draw the dots of a view, and store the dots that get labels in its overlay."""
+    found = [
+        singularity_dots(instance, cache, view_input.clip_planes)
+        for instance in view_input.instances
+        if instance.field is not None
+    ]
+    dots = [one for one in found if one is not None]
+    draw_dots(context, dots, look.singularity_size, shows_hidden=shows_hidden_singularities(look))
+    if shows_indices(look):
+        overlay.labeled = dots, look.singularity_size
 
 
 def _draw_all(
@@ -260,10 +312,9 @@ def draw_labels(
 
 
 def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
-    """Return whether something is between a point in world space and the camera.
+    """Return whether a surface is between a point in world space and the camera.
 
-    What is closer to the point than a small part of the view does not count, so that the point may be on
-    a surface.
+    Surfaces very close to the point do not count, so that the point may lie on one; see `NEAR_SURFACE`.
     """
     point = Vector(point)
     view_to_world = context.region_data.view_matrix.inverted()
@@ -277,14 +328,29 @@ def is_occluded(context: bpy.types.Context, point: np.ndarray) -> bool:
     return context.scene.ray_cast(context.view_layer.depsgraph, start, view_direction)[0]
 
 
+def draw_view_arrowheads(
+    context: bpy.types.Context,
+    view: ViewInput,
+    key: Hashable,
+    overlay: ViewOverlay,
+    cache: Cache,
+) -> None:
+    """Draw arrowheads over the lines of a view. They are placed again if the key of the view changes."""
+    if overlay.arrowheads is None or overlay.arrowheads[0] != key:
+        triangles = sum(len(instance.surface.triangles) for instance in view.instances)
+        is_exact = triangles <= MAX_EXACT_TRIANGLES
+        overlay.arrowheads = key, view_arrows(view, cache, is_exact=is_exact)
+    draw_arrowheads(context, overlay.arrowheads[1])
+
+
 def draw_arrowheads(context: bpy.types.Context, marks: ArrowMarks) -> None:
-    """Draw arrowheads in a view, behind what is in front of them.
+    """Draw arrowheads in a view. Surfaces in front hide them.
 
     Parameters
     ----------
     context : bpy.types.Context
     marks : ArrowMarks
-        Of this view.
+        Arrowheads of this view.
     """
     gpu.state.depth_test_set("LESS_EQUAL")
     for grown, code, nearness in (
@@ -316,9 +382,9 @@ def _head_triangles(
 
 
 def _outline_triangles(outline: np.ndarray, grown: float) -> np.ndarray:
-    """Return the (n, 2) corners of triangles that fill an arrowhead whose outline is moved outward.
+    """Return the (n, 2) corners of triangles that fill an arrowhead, enlarged by a margin with round corners.
 
-    Its corners are round; see `head_outline`.
+    See `head_outline`.
     """
     tip, barb, notch = outline
     # The sides run counter-clockwise from the tip, so their right sides are outside.
@@ -336,3 +402,46 @@ def _unit_vectors(first: float, last: float) -> np.ndarray:
     """Return (`ARC_POINTS`, 2) unit vectors at angles from the first to the last, in radians."""
     angles = np.linspace(first, last, ARC_POINTS)
     return np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+#: RGBA, display values.
+_COLOR = 1.0, 0.6, 0.2, 1.0
+
+#: Pixels at a user interface scale of 1: size of the font, and distances from the view's corner.
+_FONT_SIZE, _LINE_HEIGHT, _LEFT, _BOTTOM = 12, 18, 16, 64
+
+#: Characters of a row in the narrowest view.
+_MIN_CHARACTERS = 20
+
+
+def draw_messages(messages: Sequence[str], context: bpy.types.Context) -> None:
+    """Draw messages in the lower left corner of the context's region, the first one lowest.
+
+    They are wrapped to the part of the region that the sidebar does not cover.
+    """
+    if not messages:
+        return
+    ui_scale = context.preferences.system.ui_scale
+    blf.size(0, _FONT_SIZE * ui_scale)
+    blf.color(0, *_COLOR)
+    width = _uncovered_width(context.area, context.region) - 2 * _LEFT * ui_scale
+    character_width = blf.dimensions(0, "abcdefghijklmnopqrst")[0] / 20
+    max_characters = max(int(width / character_width), _MIN_CHARACTERS)
+    rows = [
+        row
+        for message in messages
+        for row in reversed(textwrap.wrap(f"RoSy: {as_sentence(message)}", max_characters))
+    ]
+    for index, row in enumerate(rows):
+        blf.position(0, _LEFT * ui_scale, (_BOTTOM + _LINE_HEIGHT * index) * ui_scale, 0)
+        blf.draw(0, row)
+
+
+def _uncovered_width(area: bpy.types.Area, region: bpy.types.Region) -> int:
+    """Return the width of a region, in pixels, up to a sidebar that overlaps it."""
+    sidebars = (
+        other.x - region.x
+        for other in area.regions
+        if other.type == "UI" and other.alignment == "RIGHT" and other.width > 1
+    )
+    return min(region.width, *(left for left in sidebars if left > 0), region.width)

@@ -1,0 +1,223 @@
+"""Jobs that compute mesh attributes: tangents, the difference of two fields, ambient occlusion.
+
+Each reads meshes, makes the numeric call, and stores the result. If something cannot be stored, an error
+is raised before anything is computed or changed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ..core.errors import RosyError
+from ..field.analysis import FieldComparison, compare_fields
+from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
+from ..projection.gbuffer import MeshInstance
+from ..surface_texture.direction_maps import corner_tangents
+from ..worker.job import Call, Steps, call_steps, job
+from .field_attributes import (
+    VECTOR_TYPE,
+    attribute_name,
+    check_attribute_type,
+    get_or_create_attribute,
+)
+from .guides import GUIDE_ATTRIBUTE
+from .look_inputs import ReadRequest
+from .mesh_fields import check_writable, read_mesh_field
+from .meshes import mesh_label, mesh_surface
+from .scene_reader import SceneData, read_scene
+
+#: Default names of the attributes. The difference is in degrees, and NaN where a field is undefined.
+TANGENT_ATTRIBUTE = "rosy_tangent"
+DIFFERENCE_ATTRIBUTE = "Difference"
+OCCLUSION_ATTRIBUTE = "Occlusion"
+
+
+# --- tangents ------------------------------------------------------------------------------------
+
+
+@job
+def mesh_tangents(mesh: bpy.types.Mesh, guiding_angle: float, name: str = "") -> Steps[np.ndarray]:
+    """Compute one direction of a mesh's field on each corner, for the Tangent input of shaders.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    guiding_angle : float
+        Angle from the horizontal direction, in radians, of the line that the direction is near to.
+    name : str
+        Name of the attribute that will store them; see `assign_tangents`.
+
+    Returns
+    -------
+    (C, 3) float32 ndarray
+        Unit vectors in object space; 0 where the field is undefined.
+
+    Raises
+    ------
+    RosyError
+        If there is no field, or no attribute of this name can store tangents.
+    """
+    _check_tangents_storable(mesh, name)
+    surface = mesh_surface(mesh)
+    field = read_mesh_field(mesh, surface=surface)
+    return call_steps(corner_tangents, surface, field, guiding_angle)
+
+
+def assign_tangents(tangents: Mapping[bpy.types.Mesh, np.ndarray], name: str = "") -> None:
+    """Store tangents on the corners of meshes, all or none of them.
+
+    Parameters
+    ----------
+    tangents : mapping of bpy.types.Mesh to (C, 3) float32 ndarray
+    name : str
+        Name of the attribute; `TANGENT_ATTRIBUTE` if it is empty.
+
+    Raises
+    ------
+    RosyError
+        If a mesh is linked from a library or in edit mode, or has an attribute of the name with
+        another type or domain. Nothing is changed in this case.
+    """
+    for mesh in tangents:
+        _check_tangents_storable(mesh, name)
+    for mesh, vectors in tangents.items():
+        attribute = get_or_create_attribute(mesh, name or TANGENT_ATTRIBUTE, VECTOR_TYPE, "CORNER")
+        attribute.data.foreach_set("vector", vectors.ravel())
+        mesh.update()
+
+
+def _check_tangents_storable(mesh: bpy.types.Mesh, name: str) -> None:
+    check_writable(mesh)
+    check_attribute_type(mesh, name or TANGENT_ATTRIBUTE, VECTOR_TYPE, "CORNER")
+
+
+# --- difference of two fields --------------------------------------------------------------------
+
+
+def other_field_names(mesh: bpy.types.Mesh) -> list[str]:
+    """Return the names of the attributes that may hold another field of a mesh."""
+    no_fields = (attribute_name(mesh), "position", GUIDE_ATTRIBUTE, TANGENT_ATTRIBUTE)
+    return [
+        attribute.name
+        for attribute in mesh.attributes
+        if attribute.data_type == VECTOR_TYPE
+        and attribute.name not in no_fields
+        and not re.fullmatch(r"\..*|dir\d+", attribute.name)
+    ]
+
+
+@job
+def store_difference(
+    mesh: bpy.types.Mesh, other: str, name: str = DIFFERENCE_ATTRIBUTE
+) -> Steps[tuple[str, int, FieldComparison]]:
+    """Compute the angle between the field of a mesh and another one, and store it on the faces.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+    other : str
+        Attribute of the other field, which has the degree of the mesh's. If empty, the only one that there
+        is.
+    name : str
+        Attribute that gets the angles in degrees.
+
+    Returns
+    -------
+    other : str
+        Attribute of the other field.
+    degree : int
+        Degree of both fields.
+    comparison : FieldComparison
+
+    Raises
+    ------
+    RosyError
+        If there is no such field, or the attribute cannot be written.
+    """
+    check_writable(mesh)
+    label = mesh_label(mesh)
+    names = other_field_names(mesh)
+    if not other and len(names) == 1:
+        (other,) = names
+    if not other or other == attribute_name(mesh):
+        choice = " or ".join(f"'{known}'" for known in names)
+        hint = f"choose {choice}" if choice else "make one with another name of the attribute"
+        raise RosyError(f"{label}: needs another field to compare with: {hint}")
+    check_attribute_type(mesh, name, "FLOAT")
+    surface = mesh_surface(mesh, label)
+    field = read_mesh_field(mesh, surface=surface)
+    other_field = read_mesh_field(mesh, other, field.degree, surface)
+    comparison = yield Call(compare_fields, (surface, field, other_field))
+    attribute = get_or_create_attribute(mesh, name, "FLOAT")
+    attribute.data.foreach_set("value", np.degrees(comparison.angles).astype(np.float32))
+    mesh.update()
+    return other, field.degree, comparison
+
+
+# --- ambient occlusion ---------------------------------------------------------------------------
+
+
+@job
+def store_occlusion(
+    depsgraph: bpy.types.Depsgraph,
+    objects: Sequence[bpy.types.Object],
+    name: str = OCCLUSION_ATTRIBUTE,
+    direction_count: int = DIRECTION_COUNT,
+) -> Steps[None]:
+    """Compute the ambient occlusion of objects, and store it on their meshes for the tone.
+
+    Everything that is visible in renders of the view layer occludes. The evaluated mesh is used if
+    the modifiers keep the faces, the original mesh otherwise. Modifiers then copy the attribute to
+    the evaluated mesh.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+    objects : sequence of bpy.types.Object
+        Original objects with a field.
+    name : str
+        Name of the attribute: a float on corners, from 0 (no sky visible) to 1 (all of it).
+    direction_count : int
+        Number of light directions.
+
+    Raises
+    ------
+    RosyError
+        If the scene cannot be read (see `read_scene`), or a mesh is linked, in edit mode, or has an
+        attribute of that name with another type or domain.
+    """
+    for obj in objects:
+        check_writable(obj.data)
+        check_attribute_type(obj.data, name, "FLOAT", "CORNER")
+    scene_data = read_scene(depsgraph, objects, ReadRequest("zero"))
+    values_by_mesh: dict[bpy.types.Mesh, np.ndarray] = {}
+    for index, obj in enumerate(objects):
+        start, stop = index / len(objects), (index + 1) / len(objects)
+        inputs = *_with_original_faces(scene_data, obj), direction_count
+        values_by_mesh[obj.data] = yield Call(ambient_occlusion, inputs, start, stop)
+    for mesh, values in values_by_mesh.items():
+        attribute = get_or_create_attribute(mesh, name, "FLOAT", "CORNER")
+        attribute.data.foreach_set("value", values)
+        mesh.update()
+
+
+def _with_original_faces(
+    scene_data: SceneData, obj: bpy.types.Object
+) -> tuple[list[MeshInstance], int]:
+    """Return the mesh instances of a scene, and the index of an object's instance.
+
+    The instance gets the object's original surface if its modifiers change the faces.
+    """
+    instance_index = scene_data.objects.index(obj)
+    instances = list(scene_data.instances)
+    evaluated = instances[instance_index].surface
+    original = mesh_surface(obj.data, f"object '{obj.name}'")
+    same_faces = np.array_equal(original.face_start, evaluated.face_start)
+    if not (same_faces and np.array_equal(original.corner_vertex, evaluated.corner_vertex)):
+        instances[instance_index] = replace(instances[instance_index], surface=original)
+    return instances, instance_index

@@ -1,0 +1,145 @@
+"""Files and folders: .blend files, the names of picture files, and the folder of the user's presets."""
+
+from __future__ import annotations
+
+import os
+import unicodedata
+import zlib
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import RosyError
+from ..core.file_io import check_readable
+from ..preset_files.store import default_user_folder
+
+
+def open_blend(path: Path) -> None:
+    """Open a .blend file. It replaces the file that is open.
+
+    Raises
+    ------
+    RosyError
+        If the file is missing or cannot be read.
+    """
+    check_readable(path)
+    try:
+        bpy.ops.wm.open_mainfile(filepath=os.path.realpath(path), load_ui=False)
+    except RuntimeError as reason:
+        raise RosyError(f"{path}: cannot be read: {_one_line(reason)}") from None
+
+
+def save_blend() -> str:
+    """Save the open file under its name, and return its path.
+
+    Raises
+    ------
+    RosyError
+        If the file was never saved, or cannot be written.
+    """
+    path = bpy.data.filepath
+    if not path:
+        raise RosyError(
+            "--save: the open file was never saved and has no name: save it in Blender first"
+        )
+    try:
+        bpy.ops.wm.save_mainfile()
+    except RuntimeError as reason:
+        raise RosyError(f"{path}: cannot be written: {_one_line(reason)}") from None
+    return path
+
+
+def _one_line(error: RuntimeError) -> str:
+    """Return the message of one of Blender's errors as one line."""
+    lines = [line.removeprefix("Error:").strip() for line in str(error).splitlines()]
+    return "; ".join(line for line in lines if line)
+
+
+#: Largest number of bytes of a stem. File systems allow 255 for a whole name, which also has a hash, a
+#: number and suffixes.
+MAX_STEM_BYTES = 180
+
+#: Kinds of pictures that are not named in the stem.
+PLAIN_KINDS = ("camera", "scene")
+
+
+def picture_stem(name: str, kind: str = "camera") -> str:
+    """Return the stem of the picture files of a camera or a scene, such as ``RoSy_Camera``.
+
+    For an object it names the kind of texture, such as ``RoSy_Cube_texture``.
+
+    Characters that file systems do not allow become underscores, and long names are cut. If cameras
+    or scenes would then have the same file, also where file systems ignore case, one of them has
+    the plain name, and the stems of the others end in a hash. Which one depends only on the names
+    in the .blend file, so several processes agree.
+    """
+    siblings = {("camera", obj.name) for obj in bpy.data.objects if obj.type == "CAMERA"}
+    siblings |= {("scene", scene.name) for scene in bpy.data.scenes}
+    if kind not in PLAIN_KINDS:
+        siblings |= {(kind, obj.name) for obj in bpy.data.objects if obj.type == "MESH"}
+    siblings.add((kind, name))
+    stem = _clean_stem(*_label(kind, name))
+    rivals = [key for key in siblings if _file_key(_clean_stem(*_label(*key))) == _file_key(stem)]
+    first = min(rivals, key=lambda key: (_clean_stem(*_label(*key)) != f"RoSy_{key[1]}", key))
+    if (kind, name) == first:
+        return stem
+    return f"{stem}-{zlib.crc32(f'{kind} {name}'.encode()):08x}"
+
+
+def _label(kind: str, name: str) -> tuple[str, str]:
+    """Return the name in a stem, and the text that follows it."""
+    return name, "" if kind in PLAIN_KINDS else f" {kind}"
+
+
+def _clean_stem(name: str, ending: str) -> str:
+    """Return the stem with underscores for characters that are not allowed, cut to its length."""
+    stem = bpy.path.clean_name(f"RoSy {name}").encode()[:MAX_STEM_BYTES]
+    return stem.decode(errors="ignore") + bpy.path.clean_name(ending)
+
+
+def _file_key(stem: str) -> str:
+    """Return a key that is equal for stems that some file system treats as equal."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", stem).casefold())
+
+
+#: Package name of the extension in Blender. This file is two packages below it.
+EXTENSION_ID = __package__.rsplit(".", 2)[0]
+
+
+def user_presets_folder() -> Path:
+    """Return the folder of the user's own presets. It may not exist yet.
+
+    It is in the folder that Blender provides for the files of an extension. If RoSy does not run as
+    an extension, or the environment variable ROSY_PRESETS is set, it is `default_user_folder`.
+    """
+    if not os.environ.get("ROSY_PRESETS"):
+        try:
+            return Path(bpy.utils.extension_path_user(EXTENSION_ID, path="presets"))
+        except ValueError:  # not installed as an extension
+            pass
+    return default_user_folder()
+
+
+def output_folder(scene: bpy.types.Scene) -> Path:
+    """Return the folder in which the pictures of a scene are saved.
+
+    Raises
+    ------
+    RosyError
+        If there is none, or it is relative to the .blend file, and this was never saved.
+    """
+    directory = scene.rosy.directory
+    if not directory.strip():
+        raise RosyError(f"scene '{scene.name}' has no folder for pictures: choose one (Output)")
+    if directory.startswith("//") and not bpy.data.filepath:
+        raise RosyError(f"{directory}: save the .blend file first, or choose an absolute path")
+    # Blender would take a path that is relative to the working directory for another one later.
+    return Path(bpy.path.abspath(directory)).absolute()
+
+
+def is_beside_blend(folder: Path) -> bool:
+    """Return whether a folder is that of the .blend file, or below it. Links are followed."""
+    blend = bpy.data.filepath
+    return bool(blend) and Path(os.path.realpath(folder)).is_relative_to(
+        os.path.realpath(Path(blend).parent)
+    )

@@ -1,0 +1,376 @@
+"""What a look draws from besides fields: tones, numbers for the color map, and reference renders.
+
+A `ReadRequest` says what a look needs of the meshes. Tones come from mesh attributes or from images on
+meshes, numbers from mesh attributes, and reference renders from files.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..compositor.look import Look, colors_values
+from ..compositor.target_tone import ReferenceRender
+from ..core.cache import Cache, content_hash
+from ..core.color import luminance, to_linear
+from ..core.errors import RosyError
+from ..core.file_io import check_readable
+from ..projection.gbuffer import MeshInstance
+from ..projection.surface_tone import SurfaceTone
+from .cameras import camera_of_object, render_size
+from .datablocks import has_rosy_properties
+from .face_values import COLOR_TYPES, corner_scalars, filled_attribute
+from .meshes import read_uvs
+
+
+@dataclass(frozen=True)
+class ToneRequest:
+    """The source of the surface tones.
+
+    Attributes
+    ----------
+    kind : {"attribute", "image"}
+    attribute : str
+        Name of the attribute. If empty, the active color attribute of each mesh.
+    """
+
+    kind: str
+    attribute: str = ""
+
+
+@dataclass(frozen=True)
+class ReadRequest:
+    """What a look needs of the meshes of a scene besides their shapes and fields.
+
+    Attributes
+    ----------
+    nonfinite : {"error", "zero"}
+        Raise an error if a vector is not finite, or treat it as undefined.
+    tone : ToneRequest or None
+        The source of the surface tones.
+    color_attribute : str or None
+        Name of the attribute with the numbers for the color map.
+    """
+
+    nonfinite: str = "error"
+    tone: ToneRequest | None = None
+    color_attribute: str | None = None
+
+
+#: Shapes and fields alone.
+FIELDS_ONLY = ReadRequest()
+
+
+def read_request(scene: bpy.types.Scene, look: Look) -> ReadRequest:
+    """Return what a look asks of the meshes of a scene, by the settings of the scene."""
+    tone = None
+    if look.tone == "attribute":
+        tone = ToneRequest("attribute", scene.rosy.tone_attribute)
+    elif look.tone == "image":
+        tone = ToneRequest("image")
+    return ReadRequest(nonfinite_policy(scene), tone, color_attribute_of(scene, look))
+
+
+def nonfinite_policy(scene: bpy.types.Scene) -> str:
+    """Return the scene's policy for vectors that are not finite: "zero" or "error"."""
+    return "zero" if scene.rosy.undefined else "error"
+
+
+def color_attribute_of(scene: bpy.types.Scene, look: Look) -> str | None:
+    """Return the name of the attribute with the numbers that a look colors; None if it colors none."""
+    return scene.rosy.color_attribute if colors_values(look) else None
+
+
+# --- tones and numbers ------------------------------------------------------------------------------
+
+
+def read_tone(
+    mesh: bpy.types.Mesh,
+    owner: bpy.types.Object,
+    tone_request: ToneRequest | None,
+    cache: Cache | None = None,
+) -> SurfaceTone | None:
+    """Read the surface tone of a mesh.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Evaluated.
+    owner : bpy.types.Object
+        The original object.
+    tone_request : ToneRequest or None
+    cache : Cache, optional
+        Keeps tones that have not changed since an earlier call.
+
+    Returns
+    -------
+    SurfaceTone or None
+        None if the mesh has no such attribute, or no image is chosen.
+
+    Raises
+    ------
+    RosyError
+        If the type of the attribute is not supported, a value is not finite, the image cannot be
+        read, or there is no UV map.
+    """
+    if tone_request is None:
+        return None
+    label, image = f"object '{owner.name}'", None
+    if tone_request.kind == "attribute":
+        name = tone_request.attribute or mesh.color_attributes.active_color_name
+        attribute = filled_attribute(mesh, name)
+        if attribute is None:
+            return None
+        source = f"{label}, attribute '{attribute.name}'"
+        numbers = corner_scalars(attribute, mesh, source)
+        if not np.isfinite(numbers).all():
+            raise RosyError(f"{source}: has values that are not finite")
+        values = numbers[:, None].astype(np.float32)
+    else:
+        tone_image = owner.rosy.tone_image if has_rosy_properties() else None
+        if tone_image is None:
+            return None
+        values = read_uvs(mesh, owner.rosy.tone_uv_map, label)
+        image = image_luminance(tone_image)
+    if cache is None:
+        return SurfaceTone(values, image)
+    key = "tone", content_hash(values, image)
+    return cache.get_or_create(key, lambda: SurfaceTone(values, image))
+
+
+def tone_digest(
+    mesh: bpy.types.Mesh, owner: bpy.types.Object, tone_request: ToneRequest | None
+) -> bytes:
+    """Return a digest of what `read_tone` reads; empty if the mesh has no tone.
+
+    If the tone cannot be read, it is the digest of the error.
+    """
+    try:
+        tone = read_tone(mesh, owner, tone_request)
+    except RosyError as error:
+        return content_hash(str(error))
+    return b"" if tone is None else content_hash(tone.values, tone.image)
+
+
+def tone_image_key(owner: bpy.types.Object, tone_request: ToneRequest | None) -> tuple[str, ...]:
+    """Return a cache key for the tone image and the UV map that are chosen on an object."""
+    if tone_request is None or tone_request.kind != "image" or not has_rosy_properties():
+        return ()
+    image = owner.rosy.tone_image
+    return ("" if image is None else image.name_full, owner.rosy.tone_uv_map)
+
+
+def read_color_values(
+    mesh: bpy.types.Mesh,
+    name: str | None,
+    label: str,
+    cache: Cache | None = None,
+) -> np.ndarray | None:
+    """Read the numbers of an attribute.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        Evaluated.
+    name : str or None
+        Name of the attribute.
+    label : str
+        The object in messages.
+    cache : Cache, optional
+        Keeps numbers that have not changed since an earlier call.
+
+    Returns
+    -------
+    (C,) float32 ndarray or None
+        At the corners; NaN where a number is not finite. None if the mesh has no such attribute.
+
+    Raises
+    ------
+    RosyError
+        If the type of the attribute is not supported.
+    """
+    attribute = filled_attribute(mesh, name) if name else None
+    if attribute is None:
+        return None
+    source = f"{label}, attribute '{attribute.name}'"
+    values = corner_scalars(attribute, mesh, source).astype(np.float32)
+    values[~np.isfinite(values)] = np.nan
+    if cache is None:
+        return values
+    return cache.get_or_create(("color values", content_hash(values)), lambda: values)
+
+
+def color_values_digest(mesh: bpy.types.Mesh, name: str | None) -> bytes:
+    """Return a digest of what `read_color_values` reads; empty if the mesh has no such attribute.
+
+    If it cannot be read, it is the digest of the error.
+    """
+    try:
+        values = read_color_values(mesh, name, mesh.name)
+    except RosyError as error:
+        return content_hash(str(error))
+    return b"" if values is None else content_hash(values)
+
+
+def check_sources(
+    with_field: Sequence[tuple[MeshInstance, bpy.types.Object]], request: ReadRequest
+) -> None:
+    """Check that at least one mesh with a field has the requested tone, and one the requested numbers.
+
+    Parameters
+    ----------
+    with_field : sequence of (MeshInstance, bpy.types.Object)
+        The instances, and their original objects.
+    request : ReadRequest
+        What was read.
+
+    Raises
+    ------
+    RosyError
+        If none has. The message lists the attributes that exist.
+    """
+    tone, numbers = request.tone, request.color_attribute
+    owners = list(dict.fromkeys(owner for _, owner in with_field))
+    names = ", ".join(f"'{owner.name}'" for owner in owners)
+    if tone is not None and all(instance.tone is None for instance, _ in with_field):
+        if tone.kind == "image":
+            raise RosyError(
+                f"{names}: choose an image for the tone, in the properties of the object"
+            )
+        if not tone.attribute:
+            raise RosyError(
+                f"{names}: there is no color attribute: choose an attribute for the tone"
+            )
+        listing = _attribute_listing(owners, ("FLOAT", *COLOR_TYPES))
+        raise RosyError(
+            f"{names}: there is no attribute '{tone.attribute}' for the tone, only {listing}"
+        )
+    if numbers is not None and all(instance.color_values is None for instance, _ in with_field):
+        # Booleans are mostly Blender's own.
+        listing = _attribute_listing(owners, ("FLOAT", "INT", *COLOR_TYPES))
+        if not numbers:
+            raise RosyError(
+                f"{names}: choose an attribute for the colors, under Look > Color: {listing}"
+            )
+        raise RosyError(
+            f"{names}: there is no attribute '{numbers}' for the colors, only {listing}"
+        )
+
+
+def _attribute_listing(owners: Sequence[bpy.types.Object], types: Sequence[str]) -> str:
+    """Return the names of the attributes of some types that meshes have, for a message."""
+    available = dict.fromkeys(
+        attribute.name
+        for owner in owners
+        for attribute in owner.data.attributes
+        if attribute.data_type in types
+        and attribute.domain in ("POINT", "FACE", "CORNER")
+        and not attribute.name.startswith(".")
+    )
+    return ", ".join(f"'{name}'" for name in available) or "no suitable one"
+
+
+# --- reference renders -------------------------------------------------------------------------------
+
+
+def reference_path(scene: bpy.types.Scene) -> Path:
+    """Return the file of the reference render for the current frame of a scene.
+
+    In the path, a run of ``#`` is replaced by the frame number, padded with zeros to its length.
+
+    Raises
+    ------
+    RosyError
+        If no file is chosen.
+    """
+    pattern = scene.rosy.tone_picture
+    if not pattern:
+        raise RosyError("tone 'picture' needs a picture: choose a file under Look > Tone")
+    filename = re.sub("#+", lambda match: f"{scene.frame_current:0{len(match[0])}d}", pattern)
+    return Path(bpy.path.abspath(filename))
+
+
+def load_reference(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    camera: bpy.types.Object,
+    look: Look,
+    picture_luminance: np.ndarray | None = None,
+) -> ReferenceRender | None:
+    """Return the reference render for the tone of a look; None if the look does not use one.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        At the frame of the reference render.
+    depsgraph : bpy.types.Depsgraph
+    camera : bpy.types.Object
+        The camera of the reference render.
+    look : Look
+    picture_luminance : (H, W) ndarray, optional
+        The luminance of the reference render, if it has been read already.
+
+    Raises
+    ------
+    RosyError
+        If no file is chosen, it cannot be read, or it does not have the aspect ratio of renders.
+    """
+    if look.tone != "picture":
+        return None
+    path = reference_path(scene)
+    reference_camera = camera_of_object(scene, depsgraph, camera, *render_size(scene))
+    return ReferenceRender(
+        load_luminance(path) if picture_luminance is None else picture_luminance,
+        reference_camera,
+        str(path),
+    )
+
+
+def load_luminance(path: Path) -> np.ndarray:
+    """Read the linear luminance, (H, W) float32, of an image file with Blender.
+
+    Raises
+    ------
+    RosyError
+        If Blender cannot read the file, or it is not a regular file.
+    """
+    check_readable(path)
+    try:
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError as reason:
+        message = str(reason).strip().splitlines()[-1].removeprefix("Error: ")
+        raise RosyError(f"{path}: cannot be read: {message}") from None
+    try:
+        return image_luminance(image)
+    except RosyError:
+        raise RosyError(f"{path}: is not a picture that Blender can read") from None
+    finally:
+        bpy.data.images.remove(image)
+
+
+def image_luminance(image: bpy.types.Image) -> np.ndarray:
+    """Return the linear luminance of an image, (H, W) float32, composited over white.
+
+    Raises
+    ------
+    RosyError
+        If the image has no pixels.
+    """
+    width, height = image.size
+    if not (width and height and len(image.pixels)):
+        raise RosyError(f"image '{image.name}' has no pixels: check the path of its file")
+    rgba = np.empty(4 * width * height, dtype=np.float32)
+    image.pixels.foreach_get(rgba)
+    rgba = rgba.reshape(height, width, 4)
+    alpha = rgba[..., 3:]
+    if image.is_float:
+        # Float images are premultiplied.
+        np.divide(rgba[..., :3], alpha, out=rgba[..., :3], where=alpha > 0)
+    elif image.colorspace_settings.name != "Non-Color":
+        rgba[..., :3] = to_linear(rgba[..., :3])
+    return luminance(rgba)

@@ -1,0 +1,303 @@
+"""Strokes as data of Blender: Curves with attributes for Geometry Nodes, or Grease Pencil.
+
+Curves can follow the surface that they were drawn on, by a modifier with a node group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial, reduce
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.color import from_hex, to_linear
+from ..line_drawing.drawing_outputs import StrokeGeometry, SurfacePoints
+from ..line_drawing.outline import OUTLINE_KINDS
+from .datablocks import OWNED_TAG, STROKES_TAG
+from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
+
+#: Called with each datablock that is created and the name that it should have.
+RegisterDatablock = Callable[[bpy.types.ID, str], None]
+
+#: Attribute of the curves: the color of the family, RGBA, linear.
+INK_ATTRIBUTE = "ink"
+
+#: Value of Blender's ``curve_type`` attribute for polylines.
+POLY_CURVE_TYPE = 1
+
+
+def new_curves(
+    name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock
+) -> bpy.types.ID:
+    """Create Curves data from strokes: polylines with a radius, and a material with the ink colors.
+
+    Parameters
+    ----------
+    name : str
+    geometry : StrokeGeometry
+    frame : int
+        Not used: curves have no frames. `new_grease_pencil` has the same parameters.
+    register : callable
+        Called with each new datablock and its name.
+    """
+    data = bpy.data.hair_curves.new(name)
+    register(data, name)
+    strokes = geometry.strokes
+    data.add_curves(np.diff(strokes.start).tolist())
+    colors = np.array([[*to_linear(from_hex(color)), 1.0] for color in geometry.colors])
+    set_attribute(data, "position", "FLOAT_VECTOR", "POINT", geometry.points)
+    set_attribute(data, "radius", "FLOAT", "POINT", geometry.radius)
+    set_attribute(data, "curve_type", "INT8", "CURVE", np.full(len(strokes), POLY_CURVE_TYPE))
+    # Blender caches the number of curves of each type when curves are added. If these counts are
+    # out of date, it writes past the end of its arrays. Adding no curves updates them.
+    data.add_curves([])
+    set_attribute(data, "family", "INT", "CURVE", strokes.family)
+    set_attribute(data, "object", "INT", "CURVE", geometry.instance_index)
+    set_attribute(data, INK_ATTRIBUTE, "FLOAT_COLOR", "CURVE", colors[strokes.family])
+    set_attribute(data, "opacity", "FLOAT", "POINT", np.ones(len(geometry.points)))
+    set_attribute(data, "spacing", "FLOAT", "POINT", strokes.spacing)
+    set_attribute(data, "member", "FLOAT_VECTOR", "POINT", strokes.member)
+    set_attribute(data, "surface_normal", "FLOAT_VECTOR", "POINT", strokes.normal)
+    set_attribute(data, "face_index", "INT", "POINT", strokes.face)
+    if geometry.places is not None:
+        for key, (data_type, column) in attribute_values(geometry.places).items():
+            set_attribute(data, key, data_type, "POINT", column)
+    material = new_emissive_material(name, INK_ATTRIBUTE)
+    register(material, name)
+    data.materials.append(material)
+    return data
+
+
+def set_attribute(data: Any, name: str, data_type: str, domain: str, values: np.ndarray) -> None:
+    """Write the values of an attribute of Curves or of a drawing, and create it if it is missing."""
+    attribute = data.attributes.get(name) or data.attributes.new(name, data_type, domain)
+    key = {"FLOAT_VECTOR": "vector", "FLOAT_COLOR": "color"}.get(data_type, "value")
+    dtype = {"INT": np.int32, "INT8": np.int8}.get(data_type, np.float32)
+    attribute.data.foreach_set(key, np.ascontiguousarray(values, dtype=dtype).ravel())
+
+
+#: Name of the layer for outlines: silhouettes, creases and borders.
+OUTLINE_LAYER = "Outline"
+
+#: Before Blender 4.3, a stroke has an integer line width: its units for one unit of radius, and its
+#: largest value.
+LEGACY_WIDTH_PER_UNIT = 2000
+MAX_LEGACY_WIDTH = 1000
+
+
+def has_grease_pencil_drawings() -> bool:
+    """Return whether Grease Pencil frames hold drawings with attributes (Blender 4.3 and later)."""
+    return hasattr(bpy.types, "GreasePencilDrawing")
+
+
+def new_grease_pencil(
+    name: str, geometry: StrokeGeometry, frame: int, register: RegisterDatablock
+) -> bpy.types.ID:
+    """Create Grease Pencil data from strokes, with one layer and one material for each family.
+
+    All kinds of outline share one layer.
+
+    Parameters
+    ----------
+    name : str
+    geometry : StrokeGeometry
+    frame : int
+        First frame at which the strokes are visible.
+    register : callable
+        Called with each new datablock and its name.
+    """
+    collection = getattr(bpy.data, "grease_pencils_v3", bpy.data.grease_pencils)
+    data = collection.new(name)
+    register(data, name)
+    data.stroke_depth_order = "3D"
+    add_strokes = _add_to_drawing if has_grease_pencil_drawings() else _add_to_frame
+    strokes = geometry.strokes
+    layer_names = [
+        OUTLINE_LAYER if family_name in OUTLINE_KINDS else family_name.capitalize()
+        for family_name in strokes.names
+    ]
+    for material_index, layer_name in enumerate(dict.fromkeys(layer_names)):
+        material = _new_material(
+            f"RoSy {layer_name}", geometry.colors[layer_names.index(layer_name)]
+        )
+        register(material, f"RoSy {layer_name}")
+        data.materials.append(material)
+        layer = data.layers.new(layer_name)
+        layer.use_lights = False
+        stroke_mask = (np.array(layer_names) == layer_name)[strokes.family]
+        layer_frame = layer.frames.new(frame)
+        if not stroke_mask.any():
+            continue
+        point_mask = np.repeat(stroke_mask, np.diff(strokes.start))
+        add_strokes(
+            layer_frame,
+            np.diff(strokes.start)[stroke_mask],
+            geometry.points[point_mask].astype(np.float32),
+            geometry.radius[point_mask].astype(np.float32),
+            material_index,
+        )
+    return data
+
+
+def _add_to_drawing(
+    frame: Any,
+    point_counts: np.ndarray,
+    points: np.ndarray,
+    radius: np.ndarray,
+    material_index: int,
+) -> None:
+    """Add strokes to a frame in Blender 4.3 and later."""
+    drawing = frame.drawing
+    drawing.add_strokes(point_counts.tolist())
+    set_attribute(drawing, "position", "FLOAT_VECTOR", "POINT", points)
+    set_attribute(drawing, "radius", "FLOAT", "POINT", radius)
+    set_attribute(drawing, "opacity", "FLOAT", "POINT", np.ones(len(points)))
+    materials = np.full(len(point_counts), material_index)
+    set_attribute(drawing, "material_index", "INT", "CURVE", materials)
+    drawing.tag_positions_changed()
+
+
+def _add_to_frame(
+    frame: Any,
+    point_counts: np.ndarray,
+    points: np.ndarray,
+    radius: np.ndarray,
+    material_index: int,
+) -> None:
+    """Add strokes to a frame before Blender 4.3.
+
+    There, the width at a point is the integer width of the stroke times the pressure at the point.
+    """
+    line_width = int(np.clip(np.ceil(LEGACY_WIDTH_PER_UNIT * radius.max()), 1, MAX_LEGACY_WIDTH))
+    ends = np.cumsum(point_counts)
+    for start, end in zip((ends - point_counts).tolist(), ends.tolist(), strict=True):
+        stroke = frame.strokes.new()
+        stroke.points.add(end - start)
+        stroke.points.foreach_set("co", points[start:end].ravel())
+        stroke.points.foreach_set(
+            "pressure", radius[start:end] * (LEGACY_WIDTH_PER_UNIT / line_width)
+        )
+        stroke.points.foreach_set("strength", np.ones(end - start, dtype=np.float32))
+        stroke.line_width, stroke.material_index = line_width, material_index
+
+
+def _new_material(name: str, color: str) -> bpy.types.Material:
+    """Create a Grease Pencil material with a hex color."""
+    material = bpy.data.materials.new(name)
+    bpy.data.materials.create_gpencil_data(material)
+    material.grease_pencil.color = (*to_linear(from_hex(color)).tolist(), 1.0)
+    return material
+
+
+#: Name of the modifier.
+MODIFIER_NAME = "Follow Surface"
+
+#: Attributes of the points: the vertices of their triangles, the weights of these, and the height.
+VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
+WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
+
+
+def attribute_values(places: SurfacePoints) -> dict[str, tuple[str, object]]:
+    """Return the data types and values of the attributes of the points, by their names."""
+    values: dict[str, tuple[str, object]] = {
+        name: ("INT", places.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
+    }
+    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", places.weights)
+    values[HEIGHT_ATTRIBUTE] = ("FLOAT", places.height)
+    return values
+
+
+def follow_surface(obj: bpy.types.Object, surface: bpy.types.Object, vertex_count: int) -> None:
+    """Let strokes follow the surface of an object by a modifier. An older one is replaced.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        Curves with the attributes of `attribute_values`.
+    surface : bpy.types.Object
+        The object that the strokes were drawn on.
+    vertex_count : int
+        Number of vertices of its evaluated mesh. If it changes, the strokes stay where they are.
+    """
+    group = _new_group(f"{obj.name} {MODIFIER_NAME}", surface, vertex_count)
+    modifier = _modifier_of(obj)
+    if modifier is None:
+        modifier = obj.modifiers.new(MODIFIER_NAME, "NODES")
+        obj.modifiers.move(obj.modifiers.find(modifier.name), 0)
+    old_group, modifier.node_group = modifier.node_group, group
+    _delete_unused(old_group)
+
+
+def stop_following(obj: bpy.types.Object) -> None:
+    """Remove the modifier of `follow_surface`, if there is one."""
+    modifier = _modifier_of(obj)
+    if modifier is not None:
+        group = modifier.node_group
+        obj.modifiers.remove(modifier)
+        _delete_unused(group)
+
+
+def _modifier_of(obj: bpy.types.Object) -> bpy.types.Modifier | None:
+    """Return the modifier of `follow_surface`; None if there is none."""
+    for modifier in obj.modifiers:
+        group = modifier.node_group if modifier.type == "NODES" else None
+        if group is not None and group.get(STROKES_TAG):
+            return modifier
+    return None
+
+
+def _delete_unused(group: bpy.types.NodeTree | None) -> None:
+    if group is not None and not group.users:
+        bpy.data.node_groups.remove(group)
+
+
+def _new_group(name: str, surface: bpy.types.Object, vertex_count: int) -> bpy.types.NodeTree:
+    """Create the node group, which moves points to their places on the evaluated surface."""
+    group, build, strokes = new_modifier_group(name)
+    group[OWNED_TAG] = group[STROKES_TAG] = True
+    info = build("GeometryNodeObjectInfo", {"Object": surface}, transform_space="RELATIVE")
+    mesh = info.outputs["Geometry"]
+    weights = build("ShaderNodeSeparateXYZ", {0: _named(build, WEIGHTS_ATTRIBUTE, "FLOAT_VECTOR")})
+    position, normal = (
+        _weighted_mean(build, mesh, build(kind).outputs[0], weights)
+        for kind in ("GeometryNodeInputPosition", "GeometryNodeInputNormal")
+    )
+    unit_normal = build.vector_math("NORMALIZE", normal)
+    height = build.scaled(unit_normal, _named(build, HEIGHT_ATTRIBUTE, "FLOAT"))
+    size = build("GeometryNodeAttributeDomainSize", {0: mesh}).outputs["Point Count"]
+    inputs = {"A": size, "B": vertex_count}
+    is_same = build("FunctionNodeCompare", inputs, data_type="INT", operation="EQUAL")
+    moved = build(
+        "GeometryNodeSetPosition",
+        {
+            "Geometry": strokes,
+            "Selection": is_same.outputs[0],
+            "Position": build.vector_math("ADD", position, height),
+        },
+    )
+    build("NodeGroupOutput", {"Geometry": moved.outputs["Geometry"]})
+    return group
+
+
+def _named(build: NodeBuilder, name: str, data_type: str) -> bpy.types.NodeSocket:
+    """Add a node that reads an attribute of the points, and return its output."""
+    kind = "GeometryNodeInputNamedAttribute"
+    return enabled_output(build(kind, {"Name": name}, data_type=data_type))
+
+
+def _weighted_mean(
+    build: NodeBuilder,
+    mesh: bpy.types.NodeSocket,
+    value: bpy.types.NodeSocket,
+    weights: bpy.types.Node,
+) -> bpy.types.NodeSocket:
+    """Add nodes that interpolate a vector of the vertices of the triangle of a point."""
+    terms = []
+    for name, weight in zip(VERTEX_ATTRIBUTES, weights.outputs, strict=True):
+        inputs = {"Geometry": mesh, "Value": value, "Index": _named(build, name, "INT")}
+        kind = "GeometryNodeSampleIndex"
+        sample = build(kind, inputs, data_type="FLOAT_VECTOR", domain="POINT")
+        terms.append(build.scaled(enabled_output(sample), weight))
+    return reduce(partial(build.vector_math, "ADD"), terms)

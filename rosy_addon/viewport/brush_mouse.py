@@ -1,0 +1,130 @@
+"""Places on an object under the mouse, for the tool *Comb Field* and its operator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import (
+    region_2d_to_location_3d,
+    region_2d_to_origin_3d,
+    region_2d_to_vector_3d,
+)
+from mathutils import Vector
+
+from ..core.cache import BAKE_CACHE
+from ..scene.brush_surface import BrushSurface
+from ..scene.field_attributes import attribute_name, field_degree, is_face_vector_field
+from ..scene.guides import GUIDE_ATTRIBUTE, STROKE_FIRMNESS
+from ..scene.meshes import mesh_surface, read_attribute
+
+
+class BrushMouse:
+    """Finds places on an object under the mouse, in a region of a 3D view."""
+
+    def __init__(self, context: bpy.types.Context, obj: bpy.types.Object) -> None:
+        self._region, self._view = context.region, context.region_data
+        self._obj = obj
+        surface = mesh_surface(obj.data, cache=BAKE_CACHE)
+        self._surface = BrushSurface(obj, context.evaluated_depsgraph_get(), surface)
+
+    def place(self, mouse: tuple[float, float]) -> np.ndarray | None:
+        """Return the place at rest, (3,) float32 in object space; None beside the object."""
+        origin = region_2d_to_origin_3d(self._region, self._view, mouse)
+        direction = region_2d_to_vector_3d(self._region, self._view, mouse)
+        return self._surface.cast_ray(origin, direction)
+
+    def radius(self, place: np.ndarray, pixels: float) -> float:
+        """Return the length in object space of a number of pixels at a place."""
+        world = self._obj.matrix_world @ Vector(place.tolist())
+        x, y = self._region.width / 2, self._region.height / 2
+        start, end = (
+            region_2d_to_location_3d(self._region, self._view, position, world)
+            for position in ((x, y), (x + 1, y))
+        )
+        return pixels * (end - start).length / (self._obj.matrix_world.median_scale or 1.0)
+
+    def dashes(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return short lines along the field around a place.
+
+        Returns
+        -------
+        ends : (K, 2, 3) float64 ndarray
+            World space.
+        is_guided : (K,) bool ndarray
+            Whether there is a firm guide.
+        """
+        mesh = self._obj.data
+        if not is_face_vector_field(mesh):
+            return np.empty((0, 2, 3)), np.empty(0, dtype=bool)
+        vectors = read_attribute(mesh, attribute_name(mesh), np.float32, 3)
+        ends, face = self._surface.dashes(vectors, field_degree(mesh), place, radius)
+        is_guided = np.zeros(len(face), dtype=bool)
+        if is_face_vector_field(mesh, GUIDE_ATTRIBUTE):
+            guides = read_attribute(mesh, GUIDE_ATTRIBUTE, np.float32, 3)
+            is_guided = np.linalg.norm(guides[face], axis=1) > STROKE_FIRMNESS
+        matrix = np.array(self._obj.matrix_world)
+        return ends @ matrix[:3, :3].T + matrix[:3, 3], is_guided
+
+
+#: The mouse on the object that was read last, by the name of the object and the pointer of the region.
+_current: tuple[tuple[str, int], BrushMouse] | None = None
+
+#: Whether it stays, as a stroke is being drawn, which changes the mesh.
+_is_held = False
+
+
+def current_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
+    """Return the mouse on an object in the region of the context, read again after each change."""
+    key = obj.name, context.region.as_pointer()
+    if _current is None or (_current[0] != key and not _is_held):
+        _read(context, obj)
+    return _current[1]
+
+
+def hold_mouse(context: bpy.types.Context, obj: bpy.types.Object) -> BrushMouse:
+    """Read an object for the mouse, and keep it until `release_mouse`, whatever changes."""
+    global _is_held
+    _read(context, obj)
+    _is_held = True
+    return _current[1]
+
+
+def release_mouse(*_: Any) -> None:
+    """Forget the object. Blender calls this also before it loads other data."""
+    global _current, _is_held
+    _current, _is_held = None, False
+
+
+def unregister() -> None:
+    """Forget the object, and stop watching for changes."""
+    release_mouse()
+    for handlers, handler in _app_handlers():
+        if handler in handlers:
+            handlers.remove(handler)
+
+
+def _read(context: bpy.types.Context, obj: bpy.types.Object) -> None:
+    global _current
+    _current = (obj.name, context.region.as_pointer()), BrushMouse(context, obj)
+    for handlers, handler in _app_handlers():
+        if handler not in handlers:
+            handlers.append(handler)
+
+
+def _app_handlers() -> list[tuple[Any, Any]]:
+    """Return the lists of application handlers, and the handler that belongs in each."""
+    handlers = bpy.app.handlers
+    return [
+        (handlers.depsgraph_update_post, _after_change),
+        (handlers.load_pre, release_mouse),
+        (handlers.undo_pre, release_mouse),
+        (handlers.redo_pre, release_mouse),
+    ]
+
+
+def _after_change(*_: Any) -> None:
+    """Let the object be read again at the next redraw of the cursor."""
+    if not _is_held:
+        release_mouse()

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..core.progress import progress, report
 from ..field.blocks import blocks_by_count, concatenated_ranges
-from ..field.frames import normalize
-from .stroke_set import Strokes
+from ..field.frames import dot, normalize
+from .stroke_set import POINT_COLUMNS, Strokes
 
 #: Pairs of segments that are intersected at once. Bounds memory.
 PAIR_BATCH_SIZE = 1 << 20
@@ -65,12 +65,9 @@ def find_crossings(strokes: Strokes) -> Crossings:
         batches.append(_intersect_segments(strokes.points, stroke, first, second))
     if not batches:
         return Crossings(np.empty((0, 2), dtype=np.int64), np.empty((0, 2)))
-    first, second, fraction_first, fraction_second = (
-        np.concatenate(column) for column in zip(*batches, strict=True)
-    )
+    first, second, *fractions = (np.concatenate(column) for column in zip(*batches, strict=True))
     order = np.lexsort((second, first, strokes.triangle[first]))
-    pairs = np.stack([first, second], axis=1)[order]
-    fraction = np.stack([fraction_first, fraction_second], axis=1)[order]
+    pairs, fraction = (np.stack(both, axis=1)[order] for both in ((first, second), fractions))
     arc = arc[pairs - 1] + fraction * (arc[pairs] - arc[pairs - 1])
     kept = _first_of_each(stroke[pairs], arc, SAME_CROSSING * strokes.spacing[pairs[:, 0]])
     return Crossings(stroke[pairs[kept]], arc[kept])
@@ -191,12 +188,11 @@ def _intersect_segments(
     p, q = points[first - 1], points[second - 1]
     r, s = points[first] - p, points[second] - q
     normal = np.cross(r, s)
-    norm_squared = np.einsum("ni,ni->n", normal, normal)
-    lengths_squared = np.einsum("ni,ni->n", r, r) * np.einsum("ni,ni->n", s, s)
-    is_oblique = norm_squared > MIN_SINE**2 * lengths_squared
+    norm_squared = dot(normal, normal)
+    is_oblique = norm_squared > MIN_SINE**2 * (dot(r, r) * dot(s, s))
     denominator = np.where(is_oblique, norm_squared, 1)
-    t = np.einsum("ni,ni->n", np.cross(q - p, s), normal) / denominator
-    u = np.einsum("ni,ni->n", np.cross(q - p, r), normal) / denominator
+    t = dot(np.cross(q - p, s), normal) / denominator
+    u = dot(np.cross(q - p, r), normal) / denominator
     low, high = -END_TOLERANCE, 1 + END_TOLERANCE
     crosses = is_oblique & (t > low) & (t < high) & (u > low) & (u < high)
     return first[crosses], second[crosses], t[crosses], u[crosses]
@@ -262,45 +258,36 @@ def cut_intervals(
     arc, point_stroke = strokes.arc, strokes.stroke
     stride = 2 * (float(arc.max(initial=0)) + float(np.max(high - low, initial=0))) + 1
     stroke_length = strokes.length[stroke]
-    clamped_low, clamped_high = np.maximum(low, 0), np.minimum(high, stroke_length)
-    key = np.concatenate(
-        [point_stroke * stride + arc, stroke * stride + clamped_low, stroke * stride + clamped_high]
+    reaches_start, reaches_end = low <= 0, high >= stroke_length
+    owner = np.concatenate([point_stroke, stroke, stroke])
+    key = owner * stride + np.concatenate(
+        [arc, np.maximum(low, 0), np.minimum(high, stroke_length)]
     )
     # Order at equal arc length: ends of intervals, points, beginnings of intervals. An interval
     # that reaches an end of the stroke also removes the point there.
     point_count, interval_count = len(point_stroke), len(stroke)
-    reaches_start, reaches_end = low <= 0, high >= stroke_length
-    zeros = np.zeros(point_count)
-    tie_break = np.concatenate(
-        [zeros, np.where(reaches_start, -2, 1), np.where(reaches_end, 2, -1)]
+    event = np.repeat([0, 1, -1], [point_count, interval_count, interval_count])
+    tie_break, survives = event.copy(), event == 0
+    tie_break[point_count:] = np.where(
+        np.concatenate([reaches_start, reaches_end]), -2 * event[point_count:], event[point_count:]
     )
+    survives[point_count:] = ~np.concatenate([reaches_start, reaches_end])
     order = np.lexsort((tie_break, key))
-    event = np.concatenate([zeros, np.ones(interval_count), np.full(interval_count, -1)])[order]
-    survives = np.concatenate([zeros == 0, ~reaches_start, ~reaches_end])[order]
+    event, survives, owner = event[order], survives[order], owner[order]
     depth = np.cumsum(event)
     # Keep the points outside all intervals, and the new points at the ends of the intervals.
     kept = ((depth == 0) | ((depth == 1) & (event == 1))) & survives
-    after = np.clip(np.searchsorted(key[:point_count], key[order], side="left"), 0, point_count - 1)
-    owner = np.concatenate([point_stroke, stroke, stroke])[order]
-    after = np.minimum(np.maximum(after, strokes.start[owner] + 1), strokes.start[owner + 1] - 1)
-    arc_position = key[order] - owner * stride
+    new = np.flatnonzero(event)
+    after = np.clip(np.searchsorted(key[:point_count], key[order[new]]), 0, point_count - 1)
+    after = np.clip(after, strokes.start[owner[new]] + 1, strokes.start[owner[new] + 1] - 1)
+    arc_position = key[order[new]] - owner[new] * stride
     segment_length = arc[after] - arc[after - 1]
-    fraction = np.clip(
-        (arc_position - arc[after - 1]) / np.where(segment_length > 0, segment_length, 1), 0, 1
-    )
-    is_original = event == 0
-    source = np.concatenate([np.arange(point_count), np.zeros(2 * interval_count, dtype=np.int64)])[
-        order
-    ]
-
-    cut = strokes.take_points(np.where(is_original, source, after))
-    new = np.flatnonzero(~is_original)
-    before, after = after[new] - 1, after[new]
-    for name in ("points", "normal", "spacing", "width"):
-        values = getattr(strokes, name)
-        weight = fraction[new].reshape((-1,) + (1,) * (values.ndim - 1))
-        getattr(cut, name)[new] = values[before] + weight * (values[after] - values[before])
-    cut.weights[new] = np.nan
+    fraction = (arc_position - arc[after - 1]) / np.where(segment_length > 0, segment_length, 1)
+    inserted = strokes.between(after, np.clip(fraction, 0, 1))
+    inserted.weights[:] = np.nan
+    cut = strokes.take_points(np.where(event == 0, order, 0))
+    for name in POINT_COLUMNS:
+        getattr(cut, name)[new] = getattr(inserted, name)
     counts = np.bincount(owner, minlength=len(strokes))
     with_cuts = replace(
         cut, normal=normalize(cut.normal), start=np.concatenate([[0], np.cumsum(counts)])

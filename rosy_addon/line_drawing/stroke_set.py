@@ -38,7 +38,7 @@ class Strokes:
         Number of the first point of each stroke, then n.
     family : (S,) int32 ndarray
         Family of each stroke, from 0. Families are the lines that a field has at a point; for
-        `outline` they are the kinds of line.
+        `outline_strokes` they are the kinds of line.
     names : tuple of str
         Names of the families.
     face : (n,) int32 ndarray
@@ -116,6 +116,22 @@ class Strokes:
     def take_points(self, point: np.ndarray) -> Strokes:
         """Return a copy with some points, by number. The caller replaces what is no longer true."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
+
+    def between(self, after: np.ndarray, fraction: np.ndarray) -> Strokes:
+        """Return a copy with (m,) points on segments: from the point before each of `after` to that point.
+
+        `fraction` is (m,), from 0 to 1. Normals are not of unit length. The weights of points before the end
+        of a segment are NaN: those of its two ends may be in different triangles.
+        """
+        before = np.maximum(after - 1, 0)
+        result = self.take_points(after)
+        for name in ("points", "normal", "spacing", "width"):
+            values, previous = getattr(result, name), getattr(self, name)[before]
+            values -= previous
+            values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
+            values += previous
+        result.weights[fraction < 1] = np.nan
+        return result
 
     def runs_where(
         self,
@@ -216,18 +232,7 @@ class Strokes:
         last = np.cumsum(counts) - 1
         row = np.repeat(np.arange(len(counts)), counts)
         fraction = (np.arange(len(row)) - (last - counts)[row]) / counts[row]
-        point = row + start[0]
-        before = np.maximum(point - 1, 0)
-
-        divided = self.take_points(point)
-        for name in ("points", "normal", "spacing", "width"):
-            values, previous = getattr(divided, name), getattr(self, name)[before]
-            values -= previous
-            values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-            values += previous
-        # The weights of the previous point may be in another triangle, so they are not
-        # interpolated.
-        divided.weights[fraction < 1] = np.nan
+        divided = self.between(row + start[0], fraction)
         return replace(
             divided,
             start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),

@@ -1,9 +1,9 @@
-"""Visibility of strokes: projection to pixels, and clipping to the frame and by a depth buffer."""
+"""Strokes in the picture: projection to pixels, clipping by the frame and a depth buffer, smoothing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
@@ -38,6 +38,22 @@ DEPTH_BIAS_PX = 1.5
 #: tangent of the angle between the normal and the direction to the camera.
 MAX_BIAS_STEEPNESS = 4.0
 
+#: Standard deviation of the binomial filter in pixels. It moves a corner of 20 degrees by half a pixel,
+#: and an arc with a radius of 20 pixels by a fifth.
+FILTER_PX = 3.0
+
+#: The same in spacings, if this is less: strokes that are near each other bend more.
+FILTER_SPACINGS = 0.3
+
+#: Sharper turns in the picture are meant and stay, in radians: those of outlines, and those of strokes.
+MAX_OUTLINE_TURN, MAX_STROKE_TURN = np.radians(45), np.radians(100)
+
+#: Rounds of the filter: each has half the variance of the distance between points.
+ROUNDS = round(2 * (FILTER_PX / SAMPLE_STEP_PX) ** 2)
+
+#: Points of strokes that are smoothed at once.
+SMOOTHED_POINTS = 1 << 15
+
 
 def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Project points to pixel coordinates.
@@ -61,8 +77,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
         ndc = clip[:, :2] / clip[:, 3:]
     pixels = (ndc + 1) * (np.array([camera.width, camera.height]) / 2)
     pixels[(clip[:, 3] <= 0) | (clip[:, 2] < -clip[:, 3])] = np.nan
-    depth_row = camera.view[2]
-    return pixels, -(points @ depth_row[:3] + depth_row[3])
+    return pixels, camera.depths(points)
 
 
 def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
@@ -72,8 +87,7 @@ def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
     """
     if not camera.is_perspective:
         return np.full(len(points), 1 / camera.pixels_per_unit)
-    depth_row = camera.view[2]
-    depth = -(points @ depth_row[:3] + depth_row[3])
+    depth = camera.depths(points)
     return np.maximum(depth, 1e-6 * np.abs(depth).max(initial=0)) / camera.pixels_per_unit
 
 
@@ -385,3 +399,51 @@ def clean_runs(
             flip &= ~ends[first] & ~ends[last + 1]
         visible = visible ^ flip[np.cumsum(starts_run) - 1]
     return visible
+
+
+# --- smoothing --------------------------------------------------------------------------------------
+
+
+def smooth(strokes: Strokes, camera: Camera) -> Strokes:
+    """Filter the points of lines, so that they do not have corners where the mesh has edges.
+
+    Parameters
+    ----------
+    strokes : Strokes
+        As `clip_to_visible` returns them, with points at most `SAMPLE_STEP_PX` pixels apart.
+    camera : Camera
+
+    Returns
+    -------
+    Strokes
+        Ends and sharp corners are where they were. The lines leave the surface by a fraction of a pixel.
+    """
+    points = strokes.points.copy()
+    block_index = strokes.start[1:] // SMOOTHED_POINTS
+    cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
+    for first, stop in pairwise(cuts):
+        report(first / max(len(strokes), 1), "smoothing strokes")
+        block = slice(strokes.start[first], strokes.start[stop])
+        points[block] = _smoothed_points(strokes.select(np.arange(first, stop)), camera)
+    return replace(strokes, points=points)
+
+
+def _smoothed_points(strokes: Strokes, camera: Camera) -> np.ndarray:
+    """Return the (n, 3) filtered points of strokes."""
+    points = strokes.points
+    before, after = np.arange(len(points)) - 1, np.arange(len(points)) + 1
+    first, last = strokes.start[:-1], strokes.start[1:] - 1
+    before[first] = np.where(strokes.closed, last - 1, first)
+    after[last] = np.where(strokes.closed, first + 1, last)
+    pixels, _ = project_to_pixels(points, camera)
+    incoming, outgoing = pixels - pixels[before], pixels[after] - pixels
+    norm = np.hypot(*incoming.T) * np.hypot(*outgoing.T)
+    # False at ends, where a vector is zero, and behind the camera, where it is NaN.
+    spacing = strokes.spacing / pixel_size(points, camera)
+    max_turn = np.where(spacing > 0, MAX_STROKE_TURN, MAX_OUTLINE_TURN)
+    moves = dot(incoming, outgoing) > np.cos(max_turn) * norm
+    width = np.where(spacing > 0, FILTER_SPACINGS * spacing, FILTER_PX)
+    strength = moves * 0.25 * np.minimum(width / FILTER_PX, 1) ** 2
+    for _ in range(ROUNDS):
+        points = points + strength[:, None] * (points[before] + points[after] - 2 * points)
+    return points

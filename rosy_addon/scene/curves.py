@@ -56,8 +56,8 @@ def new_curves(
     set_attribute(data, "member", "FLOAT_VECTOR", "POINT", strokes.member)
     set_attribute(data, "surface_normal", "FLOAT_VECTOR", "POINT", strokes.normal)
     set_attribute(data, "face_index", "INT", "POINT", strokes.face)
-    if geometry.places is not None:
-        for key, (data_type, column) in attribute_values(geometry.places).items():
+    if geometry.attachment is not None:
+        for key, (data_type, column) in attribute_values(geometry.attachment).items():
             set_attribute(data, key, data_type, "POINT", column)
     material = new_emissive_material(name, INK_ATTRIBUTE)
     register(material, name)

@@ -110,7 +110,7 @@ def store_strokes(
     collection : bpy.types.Collection, optional
         The collection of a new object, by default that of the scene. Also if it cannot be changed.
     vertex_count : int
-        Of the evaluated mesh of `owner`, if the geometry has the places of its points on it.
+        Of the evaluated mesh of `owner`, if the points of the geometry are attached to it.
 
     Returns
     -------
@@ -144,7 +144,7 @@ def store_strokes(
     obj.parent = owner
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
-    if kind == "CURVES" and geometry.places is not None:
+    if kind == "CURVES" and geometry.attachment is not None:
         follow_surface(obj, owner, vertex_count)
     else:
         stop_following(obj)

@@ -6,7 +6,7 @@ from functools import partial, reduce
 
 import bpy
 
-from ..line_drawing.drawing_outputs import SurfacePoints
+from ..line_drawing.drawing_outputs import SurfaceAttachment
 from .node_builder import NodeBuilder, enabled_output, new_modifier_group
 from .owned_data import OWNED_TAG, STROKES_TAG
 
@@ -18,13 +18,13 @@ VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
 WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
 
 
-def attribute_values(places: SurfacePoints) -> dict[str, tuple[str, object]]:
+def attribute_values(attachment: SurfaceAttachment) -> dict[str, tuple[str, object]]:
     """Return the data types and values of the attributes of the points, by their names."""
     values: dict[str, tuple[str, object]] = {
-        name: ("INT", places.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
+        name: ("INT", attachment.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
     }
-    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", places.weights)
-    values[HEIGHT_ATTRIBUTE] = ("FLOAT", places.height)
+    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", attachment.weights)
+    values[HEIGHT_ATTRIBUTE] = ("FLOAT", attachment.height)
     return values
 
 

@@ -13,8 +13,8 @@ from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
-from rosy_addon.line_drawing.overshoot import MIN_EXTENSION_RATIO, extend_free_ends
 from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
+from rosy_addon.line_drawing.stroke_ends import MIN_EXTENSION_RATIO, extend_free_ends
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen, svg_text
 from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth

@@ -27,8 +27,7 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
 from rosy_addon.line_drawing.families import global_labels
-from rosy_addon.line_drawing.head_on_ends import head_on_ends
-from rosy_addon.line_drawing.outline import outline
+from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.seeding import singularities
 from rosy_addon.line_drawing.separation import enforce_separation
 from rosy_addon.line_drawing.spacing import (
@@ -39,6 +38,7 @@ from rosy_addon.line_drawing.spacing import (
     values_at_points,
     weight_by_tone,
 )
+from rosy_addon.line_drawing.stroke_ends import head_on_ends
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
@@ -732,13 +732,13 @@ def test_strokes_are_clipped_by_occluders_and_by_the_frame():
 def test_outlines_of_simple_shapes():
     sphere = MeshInstance(icosphere(4), IDENTITY)
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 400, 400, scale=2.5)
-    lines = outline(sphere, camera)
+    lines = outline_strokes(sphere, camera)
     assert len(lines) == 1 and lines.closed[0] and lines.names[lines.family[0]] == "silhouettes"
     assert np.abs(lines.points[:, 1]).max() < 0.01
     assert np.isclose(lines.length[0], 2 * np.pi, rtol=0.01)
-    box = outline(MeshInstance(sharp_cube(), IDENTITY), camera)
+    box = outline_strokes(MeshInstance(sharp_cube(), IDENTITY), camera)
     assert np.isclose(box.length.sum(), 12) and set(box.family.tolist()) == {1}
-    edge = outline(MeshInstance(plane(), IDENTITY), camera)
+    edge = outline_strokes(MeshInstance(plane(), IDENTITY), camera)
     assert np.isclose(edge.length.sum(), 8) and set(edge.family.tolist()) == {2}
 
 

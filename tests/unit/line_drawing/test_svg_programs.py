@@ -19,7 +19,7 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import generate
-from rosy_addon.line_drawing.outline import outline
+from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.stroke_set import Strokes
 from rosy_addon.line_drawing.style import StrokeStyle
@@ -146,7 +146,7 @@ def strokes(scene):
         0.8, 0.15
     )
     return visible_strokes(
-        Strokes.concatenate(lines, outline(instance, camera)), [instance], camera
+        Strokes.concatenate(lines, outline_strokes(instance, camera)), [instance], camera
     )
 
 
@@ -174,7 +174,7 @@ def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
         trace_strokes(crossed, 10.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
     )
     lines = Strokes.concatenate(
-        lines, visible_strokes(outline(instance, camera), [instance], camera)
+        lines, visible_strokes(outline_strokes(instance, camera), [instance], camera)
     )
     assert lines.closed.sum() >= 3
     pictures = []

@@ -423,8 +423,6 @@ def strokes(monkey):
     randomize(monkey, settings, style, 0.2)
     if settings.unit == "world" or settings.spacing < 3:  # any number of strokes
         settings.unit, settings.spacing = "pixels", monkey.pick([4.0, 9.0, 1e4])
-    if settings.spacing < 9:  # and so do crossings of many strokes in one face
-        settings.gaps = 0.0
     settings.selected = monkey.chance(0.2)
     settings.plotter, settings.paper = monkey.chance(0.3), monkey.chance(0.5)
     kind = monkey.pick(["PENCIL", "CURVES", "FILE"])

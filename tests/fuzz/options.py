@@ -163,7 +163,6 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "layering": _number(0, 1, (0.3,)),
     "swell": _number(0, 1, (0.5, 1.0)),
     "curvature": _number(0, 1, (0.5,)),
-    "gaps": _number(0, 4, (0.3,)),
     "taper": _number(0, 50, (3.0,)),
     "arrows": _number(0, 1000, (5.0, 12.0)),
     "overshoot": _number(0, 256, (5.0,)),

@@ -220,10 +220,9 @@ def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
     """Return the pairs of a given sample and another of its family that is near on the surface."""
+    radius = SEARCH_RADIUS * samples.spacing[sample]
     query, neighbor = samples.grid.pairs_within(
-        samples.position[sample],
-        SEARCH_RADIUS * samples.spacing[sample],
-        samples.direction[sample],
+        samples.position[sample], radius, samples.direction[sample]
     )
     blocks = [
         _comparable_block(samples, sample, query[part], neighbor[part])
@@ -243,10 +242,7 @@ def _comparable_block(
     keep = samples.stroke.take(current) != samples.stroke.take(neighbor)
     keep = np.flatnonzero(keep | (arc_gap > MIN_SELF_ARC * samples.spacing.take(current)))
     query, current, neighbor = query.take(keep), current.take(keep), neighbor.take(keep)
-    frame, neighbor_frame = (
-        samples.frame.take(current, axis=0),
-        samples.frame.take(neighbor, axis=0),
-    )
+    frame, neighbor_frame = (samples.frame.take(one, axis=0) for one in (current, neighbor))
     normal_cosine = dot(frame[:, 1], neighbor_frame[:, 1])
     keep = normal_cosine > MIN_NORMAL_COSINE
     keep &= samples.mesh.is_same_family(
@@ -280,11 +276,8 @@ def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
     If both were added in the same step, the sample of the stroke with the lower number is older.
     """
     step, neighbor_step = samples.step[pairs.sample], samples.step[pairs.neighbor]
-    older = neighbor_step < step
-    older |= (neighbor_step == step) & (
-        samples.stroke[pairs.neighbor] < samples.stroke[pairs.sample]
-    )
-    return older
+    has_lower_stroke = samples.stroke[pairs.neighbor] < samples.stroke[pairs.sample]
+    return (neighbor_step < step) | ((neighbor_step == step) & has_lower_stroke)
 
 
 def _left_component(vectors: np.ndarray, frame: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.creases import find_creases
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
@@ -30,8 +30,8 @@ from .visibility import (
 #: `Strokes.names` of an outline: the kind of line of each family.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")
 
-#: Shortest crease in pixels if it is as sharp as the angle, in radians. Sharper ones may be shorter, but
-#: count as at most a right angle; blunter ones have to be longer.
+#: Shortest crease in pixels, and its angle in radians. The shortest length is inversely proportional to the
+#: angle, of which at most a right angle counts.
 MIN_CREASE_PX, REFERENCE_ANGLE = 12.0, np.radians(60)
 
 #: End points are the same if they differ by less than about this fraction of the extent of all.
@@ -40,12 +40,12 @@ SAME_POINT_RATIO = 1e-7
 #: Where more than two segments meet, two are joined if they turn by less than this, in radians.
 MAX_JUNCTION_TURN = np.radians(50)
 
-#: A silhouette is also visible if it would be after a move outward by one of these distances, in pixels:
-#: it passes behind the edges of the triangles, where these stand out of the smooth surface.
+#: A silhouette is also visible if it is visible after a move outward by one of these distances, in pixels:
+#: edges of triangles that lie outside of the smooth surface hide it.
 OUTWARD_STEPS_PX = (1.0, 2.0)
 
-#: A silhouette is not hidden by triangles that share a vertex with its own and are in front of it by less
-#: than this fraction of the longest edge of its own.
+#: A silhouette is not hidden by triangles that share a vertex with its triangle and are in front of it by less
+#: than this fraction of the longest edge of its triangle.
 MAX_RING_DEPTH = 1.0
 
 #: Shorter gaps in outlines are closed, and shorter outlines are left out, in pixels.
@@ -69,7 +69,7 @@ class Segments(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """The (T, 3, 3) corners of triangles, the shading normals there and the normals of triangles."""
+    """The (T, 3, 3) corners and shading normals of triangles, and the (T, 3) normals of triangles."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -87,14 +87,13 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     ----------
     instance : MeshInstance
     camera : Camera
-        Camera of the silhouettes. Creases are left out that are too short and blunt in its pixels.
+        Camera of the silhouettes. Creases that are too short and blunt in its pixels are left out.
 
     Returns
     -------
     Strokes
         World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
-    label = "finding outlines"
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     points = instance.world_points()[surface.triangle_vertex]
@@ -102,15 +101,14 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
     corners = _Corners(points, normals[surface.triangles], flat)
     vertex = surface.triangle_vertex.ravel()
-    with progress(0.0, 0.3, label):
+    with progress(0.0, 0.3, "finding outlines"):
         edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    with progress(0.3, 0.7, label):
+    with progress(0.3, 0.7, "finding outlines"):
         is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])
-    report(0.8, label)
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
     is_blunt = is_sharp_edge(surface, a, b) & ~is_crease
@@ -119,12 +117,13 @@ def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     silhouettes = Segments(*(np.concatenate(pair) for pair in zip(smooth, sharp, strict=True)))
     angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
     salience = _pixel_salience(creases, angle, camera)
-    families = [
-        _strokes(silhouettes, 0, surface),
-        _strokes(creases, 1, surface, salience),
-    ]
-    report(0.9, label)
-    return Strokes.join([*families, _strokes(_edge_segments(corners, borders), 2, surface)])
+    return Strokes.join(
+        [
+            _strokes(silhouettes, 0, surface),
+            _strokes(creases, 1, surface, salience),
+            _strokes(_edge_segments(corners, borders), 2, surface),
+        ]
+    )
 
 
 def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
@@ -161,13 +160,8 @@ def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: 
     segments = _edge_segments(corners, a)
     to_eye = camera.view_directions(segments.ends)
     # The other triangle runs along the edge in the opposite direction.
-    facing = np.stack(
-        [
-            dot(segments.normals, to_eye),
-            dot(_edge_segments(corners, b).normals[:, ::-1], to_eye),
-        ],
-        axis=1,
-    )
+    other_normals = _edge_segments(corners, b).normals[:, ::-1]
+    facing = np.stack([dot(segments.normals, to_eye), dot(other_normals, to_eye)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = np.clip(np.nan_to_num(facing[..., 0] / (facing[..., 0] - facing[..., 1])), 0, 1)
     cuts = np.sort(np.concatenate([zero, np.zeros((len(a), 1)), np.ones((len(a), 1))], axis=1))
@@ -187,11 +181,9 @@ def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: 
 def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
     """Return the edges of triangles that start at the given corners (3 t + k)."""
     triangle, k = starts // 3, starts % 3
-    following = (k + 1) % 3
+    row, ends = triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)
     return Segments(
-        np.stack([corners.points[triangle, k], corners.points[triangle, following]], axis=1),
-        np.stack([corners.normals[triangle, k], corners.normals[triangle, following]], axis=1),
-        triangle.astype(np.int64),
+        corners.points[row, ends], corners.normals[row, ends], triangle.astype(np.int64)
     )
 
 
@@ -240,11 +232,7 @@ def _strokes(
     chains = _chain_segments(keys[has_length], segments.ends)
     if salience is not None:
         salience = salience[has_length]
-        chains = [
-            (chain, closed)
-            for chain, closed in chains
-            if salience[chain[::2] >> 1].sum() >= MIN_CREASE_PX
-        ]
+        chains = [pair for pair in chains if salience[pair[0][::2] >> 1].sum() >= MIN_CREASE_PX]
     # Each end of a segment, but the second of two that meet; and the segment that ends there.
     none = np.empty(0, dtype=np.int64)
     point = np.concatenate([none, *(np.append(chain[::2], chain[-1]) for chain, _ in chains)])
@@ -369,7 +357,7 @@ def clip_outline(
 
 
 class _OutlineTest:
-    """The depth test of an outline: the triangles of its instance in world space, and what occludes.
+    """The depth test of the outline of an instance.
 
     Attributes
     ----------

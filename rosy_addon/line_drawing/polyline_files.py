@@ -147,7 +147,6 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
             report((index + block.start / max(len(rows), 1)) / 4, "writing strokes")
             lines = (form % tuple(row) for row in values[rows[block]].tolist())
             blocks.append("".join(lines).encode())
-    report(0.75, "writing strokes")
     number = np.cumsum(kept)
     number[~kept] = number[first_of_closed]
     text, family = [], -1
@@ -164,7 +163,6 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
 def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return a binary file with the points as vertices and the segments as edges."""
-    report(0.0, "writing strokes")
     first_of_closed, kept = _without_repeated_points(strokes)
     stroke = strokes.stroke
     vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)

@@ -29,9 +29,8 @@ from .visibility import (
 #: Shortest extension of an end, as a fraction of the longest.
 MIN_EXTENSION_RATIO = 0.3
 
-#: Distance in pixels before an end at which the extension leaves the stroke. The direction of the
-#: extension is measured over the same length. Both are at most the second constant as a fraction
-#: of the length of the stroke.
+#: Distance in pixels before an end at which the extension leaves the stroke, and largest distance as a
+#: fraction of the length of the stroke. The direction of the extension is measured over the same length.
 BACKTRACK_PX, MAX_BACKTRACK_RATIO = 6.0, 0.25
 
 #: Longest extension of an end, as a fraction of the length of the stroke.
@@ -99,18 +98,15 @@ def extend_free_ends(
     mark_free_boundary_ends : Marks the ends at borders.
     Strokes.runs_where : Marks the ends at removed points.
     """
-    label = "extending strokes"
-    report(0.0, label)
+    report(0.0, "extending strokes")
     if depth_buffer is None:
         strokes = strokes.subdivided(pixel_counts(strokes, camera))
-        report(0.2, label)
     screen = np.nan_to_num(project_to_pixels(strokes.points, camera)[0])
     arc = arc_lengths(screen, strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
-    report(0.3, label)
     extend = _extension_in_space if depth_buffer is None else _extension_in_picture
     start_point, origin, step = extend(
         strokes, arc, end, np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total), camera
@@ -120,11 +116,9 @@ def extend_free_ends(
     )
     length = length + np.abs(arc[end] - arc[start_point])
     is_valid = step.any(axis=1) & np.isfinite(step).all(axis=1)
-    report(0.5, label)
     extended, distance = _append_extensions(
         strokes, *(column[is_valid] for column in (start_point, side, origin, step, length))
     )
-    report(0.9, label)
     if depth_buffer is None:
         return extended
     return _drop_onto_surfaces(extended, distance, depth_buffer, camera)
@@ -175,11 +169,8 @@ def _extension_in_picture(
     before_pixel, _ = project_to_pixels(strokes.points[before], camera)
     _, end_depth = project_to_pixels(strokes.points[end], camera)
     origin = _move_to_depth(strokes.points[start_point], depth, end_depth, camera)
-    return (
-        start_point,
-        origin,
-        _pixel_steps_to_world(normalize(start_pixel - before_pixel), end_depth, camera),
-    )
+    step = _pixel_steps_to_world(normalize(start_pixel - before_pixel), end_depth, camera)
+    return start_point, origin, step
 
 
 def _point_before_end(
@@ -278,13 +269,9 @@ def _append_extensions(
     point, distance = point[order], distance[order]
     extended = strokes.take_points(point)
     counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
-    extended = replace(
-        extended,
-        points=points[order],
-        weights=np.where(distance[:, None] > 0, np.nan, extended.weights),
-        start=np.concatenate([[0], np.cumsum(counts)]),
-    )
-    return extended, distance
+    extended.weights[distance > 0] = np.nan
+    start = np.concatenate([[0], np.cumsum(counts)])
+    return replace(extended, points=points[order], start=start), distance
 
 
 def _drop_onto_surfaces(
@@ -300,10 +287,8 @@ def _drop_onto_surfaces(
     frame_size = np.array([camera.width, camera.height])
     column, row = np.clip(np.nan_to_num(pixels), 0, frame_size - 1).astype(np.int64).T
     target_depth = depth_buffer.depth[row, column]
-    tolerance = (
-        MAX_BIAS_STEEPNESS * (distance[extended] + BACKTRACK_PX) * pixel_size(points, camera)
-    )
-    moves = target_depth < depth + tolerance
+    reach = MAX_BIAS_STEEPNESS * (distance[extended] + BACKTRACK_PX)
+    moves = target_depth < depth + reach * pixel_size(points, camera)
     extended = extended[moves]
     moved, normal = strokes.points.copy(), strokes.normal.copy()
     moved[extended] = _move_to_depth(points[moves], depth[moves], target_depth[moves], camera)

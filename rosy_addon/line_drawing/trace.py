@@ -152,10 +152,7 @@ def _add_uncovered_seeds(
 
     The points of the seeds are about `seed_spacing` apart, in spacings; all are tried if it is 0.
     """
-    label = "looking for gaps"
-    report(placer.samples.coverage, label)
     seeds = uncovered_seeds(placer.samples, candidates)
-    report(placer.samples.coverage, label)
     if seed_spacing and len(seeds):
         median = float(np.median(placer.spacing.values))
         ratio = placer.samples.spacing_at(seeds) / median
@@ -179,7 +176,6 @@ def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
             # Each call closes the sides that it tried. Try others twice more.
             if not placer.seed_neighbors() and not placer.seed_neighbors():
                 return
-        report(placer.samples.coverage, TRACING)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:

@@ -26,7 +26,7 @@ BLOCK_POINTS = 1 << 16
 #: Pixels whose depth is computed at once.
 BLOCK_PIXELS = 1 << 20
 
-#: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of the
+#: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of
 #: rasterization.
 MIN_RUN_PX = 2.5
 
@@ -42,13 +42,13 @@ MAX_BIAS_STEEPNESS = 4.0
 #: and an arc with a radius of 20 pixels by a fifth.
 FILTER_PX = 3.0
 
-#: The same in spacings, if this is less: strokes that are near each other bend more.
+#: Largest standard deviation in spacings: strokes that are near each other bend more.
 FILTER_SPACINGS = 0.3
 
-#: Sharper turns in the picture are meant and stay, in radians: those of outlines, and those of strokes.
+#: Turns in the picture that are sharper than this are corners and stay, in outlines and in strokes, in radians.
 MAX_OUTLINE_TURN, MAX_STROKE_TURN = np.radians(45), np.radians(100)
 
-#: Rounds of the filter: each has half the variance of the distance between points.
+#: Rounds of the filter (1, 2, 1) / 4, whose variance is half a squared distance between points.
 ROUNDS = round(2 * (FILTER_PX / SAMPLE_STEP_PX) ** 2)
 
 #: Points of strokes that are smoothed at once.
@@ -146,17 +146,12 @@ def visible_runs(
     max_gap, min_run : float
         Lengths in pixels below which hidden runs are filled and visible runs are removed.
     """
-    label = "finding visible strokes"
-    report(0.0, label)
     if not len(strokes):
         return strokes
     clipped = []
     counts = pixel_counts(strokes, camera)
-    # Each block ends with the stroke that reaches the next multiple of its size.
-    block_index = np.cumsum(counts)[strokes.start[1:] - 1] // BLOCK_POINTS
-    cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
-    for first, stop in pairwise(cuts):
-        report(first / len(strokes), label)
+    for first, stop in _stroke_blocks(np.cumsum(counts)[strokes.start[1:] - 1], BLOCK_POINTS):
+        report(first / len(strokes), "finding visible strokes")
         block = strokes.subdivided(counts, first, stop)
         pixels, _ = project_to_pixels(block.points, camera)
         inside = in_frame(pixels, camera)
@@ -167,8 +162,15 @@ def visible_runs(
         block = block.take_points(order)
         visible = clean_runs(visible[order], pixels[order], block.start, max_gap, min_run)
         clipped.append(block.runs_where(visible, free_at_removed=inside[order]))
-    report(1.0, label)
     return Strokes.join(clipped)
+
+
+def _stroke_blocks(point_count: np.ndarray, size: int) -> Iterator[tuple[int, int]]:
+    """Return the first and last strokes of blocks, given the number of points up to each stroke.
+
+    Each block ends with the stroke that reaches the next multiple of its size.
+    """
+    return pairwise([0, *np.flatnonzero(np.diff(point_count // size)) + 1, len(point_count)])
 
 
 def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
@@ -193,9 +195,9 @@ def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def pixel_counts(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """Return (n,) int64: the parts of at most `SAMPLE_STEP_PX` pixels of the segment before a point.
+    """Return (n,) int64: how many parts of at most `SAMPLE_STEP_PX` pixels the segment before a point has.
 
-    As for `Strokes.subdivided`. A segment that is partly behind the camera is not divided.
+    They are the counts of `Strokes.subdivided`. A segment that is partly behind the camera is not divided.
     """
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixel_distance = np.zeros(len(pixels))
@@ -235,7 +237,6 @@ class DepthBuffer:
 def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthBuffer:
     """Rasterize mesh instances to a depth buffer."""
     label = "finding the nearest surface"
-    report(0.0, label)
     corners = np.concatenate([_camera_triangles(instance, camera) for instance in instances])
     flat_corners = corners.reshape(-1, 3)
     clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
@@ -249,7 +250,6 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
         report(0.8, label)
         corner_depth = corners[fragments.triangle[block], :, 2]
         depth.flat[fragments.pixel[block]] = -dot(fragments.barycentric[block], corner_depth)
-    report(0.9, label)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     start = tuple(accumulate((len(i.surface.triangles) for i in instances), initial=0))
     return DepthBuffer(camera, start, triangle, depth, normal, dot(normal, corners[:, 0]))
@@ -288,8 +288,8 @@ def _is_hidden(
     for plane in planes_around(points, pixels, depth_buffer):
         faces_away = np.sign(plane.facing) * facing < 0
         hidden &= plane.hides
-        # A point that faces away is behind a triangle that does not, or the reverse: at a
-        # silhouette, one of the four pixels is enough, without a bias.
+        # At a silhouette, a point that faces away is behind a triangle that does not, or the reverse. Then
+        # one of the four pixels is enough, without a bias.
         behind_front |= (plane.triangle >= 0) & faces_away & (plane.distance > 0)
     return hidden | behind_front
 
@@ -345,9 +345,8 @@ def planes_around(
             with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 distance = np.where(facing != 0, behind_plane / facing, 0) * length
                 steepness = np.sqrt(np.maximum(length**2 / facing**2 - 1, 0))
-            steepness = np.minimum(
-                np.nan_to_num(steepness, posinf=MAX_BIAS_STEEPNESS), MAX_BIAS_STEEPNESS
-            )
+            # NaN if the square of `facing` is 0 and the length as well.
+            steepness = np.minimum(np.nan_to_num(steepness), MAX_BIAS_STEEPNESS)
             bias = footprint * (DEPTH_BIAS_PX + steepness)
             hides = (triangle >= 0) & (distance > bias)
             yield PlanesAround(triangle, facing, distance, hides)
@@ -419,9 +418,7 @@ def smooth(strokes: Strokes, camera: Camera) -> Strokes:
         Ends and sharp corners are where they were. The lines leave the surface by a fraction of a pixel.
     """
     points = strokes.points.copy()
-    block_index = strokes.start[1:] // SMOOTHED_POINTS
-    cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
-    for first, stop in pairwise(cuts):
+    for first, stop in _stroke_blocks(strokes.start[1:], SMOOTHED_POINTS):
         report(first / max(len(strokes), 1), "smoothing strokes")
         block = slice(strokes.start[first], strokes.start[stop])
         points[block] = _smoothed_points(strokes.select(np.arange(first, stop)), camera)

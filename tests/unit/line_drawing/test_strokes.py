@@ -30,7 +30,7 @@ from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.seeding import singularities
 from rosy_addon.line_drawing.separation import enforce_separation
 from rosy_addon.line_drawing.spacing import (
-    headlight_tone,
+    lit_tone,
     spacing_by_curvature,
     spacing_by_tone,
     spacing_in_picture,
@@ -553,7 +553,7 @@ def test_curvature_and_light():
     spacing = spacing_by_curvature(surface, 1.0, 0.5)
     assert spacing.shape == (len(surface.vertices),) and np.ptp(spacing) > 0
     camera = orbit_camera(surface.vertices, 0, 90, 100, 100, perspective=False)
-    tone = headlight_tone(MeshInstance(surface, IDENTITY), camera)
+    tone = lit_tone(MeshInstance(surface, IDENTITY), camera, ())
     assert np.isclose(tone.max(), 1, atol=1e-3) and tone[surface.vertices[:, 2] < -0.3].max() == 0
 
 

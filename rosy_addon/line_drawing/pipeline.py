@@ -216,7 +216,7 @@ def _instance_strokes(
     report(0.0, "computing the spacing")
     # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
     by_fan = with_vertices_of_fans(instance)
-    tone = lit_tone(by_fan, view.camera, lights) if style.tone else None
+    tone = lit_tone(by_fan, view.camera, lights) if style.light != "none" else None
     # Without changes of the spacing, all of the tone is in the widths.
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
     factor = np.ones(len(by_fan.surface.vertices))

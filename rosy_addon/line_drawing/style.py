@@ -45,10 +45,16 @@ class StrokeStyle:
         unit="length",
         applies=lambda style: style.unit == "world",
     )
-    tone: bool = switch(
-        False,
-        "Place strokes closer together where the light is weak, and leave them out where it is "
+    light: str = choice(
+        "none",
+        "Light by which strokes are placed: closer together where it is weak, and left out where it is "
         "strong",
+        {
+            "none": "Even strokes, without a light",
+            "headlight": "A light at the camera",
+            "lamp": "A lamp above and to the left of the camera",
+            "scene": "The lights of the scene",
+        },
         panel="density",
     )
     layering: float = number(
@@ -57,28 +63,16 @@ class StrokeStyle:
         1.0,
         "Difference in darkness between the tones at which successive families begin",
         panel="density",
-        applies=lambda style: style.tone,
+        applies=lambda style: style.light != "none",
     )
     swell: float = number(
         0.0,
         0.0,
         1.0,
-        "Amount by which the tone changes the width of strokes instead of their distance. 1: evenly "
+        "Amount by which the light changes the width of strokes instead of their distance. 1: evenly "
         "spaced strokes, as in an engraving",
         panel="density",
-        applies=lambda style: style.tone,
-    )
-    light: str = choice(
-        "headlight",
-        "Light source of the tone",
-        {
-            "headlight": "A light at the camera",
-            "lamp": "A lamp above and to the left of the camera",
-            "scene": "The lights of the scene",
-        },
-        panel="density",
-        panel_before="layering",
-        applies=lambda style: style.tone,
+        applies=lambda style: style.light != "none",
     )
     curvature: float = number(
         0.0,

@@ -36,7 +36,7 @@ CASES = {
     "one direction": (1, {}),
     "three directions": (3, {}),
     "seven directions": (7, {}),
-    "tone and outline": (3, {"tone": True, "outline": True, "overshoot": 6.0}),
+    "tone and outline": (3, {"light": "headlight", "outline": True, "overshoot": 6.0}),
     "with hidden strokes": (1, {"hidden": True, "cross_creases": True}),
 }
 

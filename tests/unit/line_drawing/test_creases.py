@@ -31,11 +31,11 @@ def sharp_cube():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tone", [False, True])
-def test_spacing_and_width_are_even_up_to_creases(tone):
+@pytest.mark.parametrize("light", ["none", "scene"])
+def test_spacing_and_width_are_even_up_to_creases(light):
     """A flat face under a sun has one tone and, without perspective, one spacing."""
     instance = sharp_cube()
-    style = StrokeStyle(spacing=7.0, tone=tone, layering=0.0, taper=0.0)
+    style = StrokeStyle(spacing=7.0, light=light, layering=0.0, taper=0.0)
     strokes = draw_instances([instance], CAMERA, style, lights=[SIDE_LIGHT]).strokes
     assert len(np.unique(strokes.face)) == 3
     spacings = set()

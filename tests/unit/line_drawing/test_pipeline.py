@@ -107,7 +107,7 @@ def test_light_is_that_of_lambert():
 
 @pytest.mark.slow
 def test_spacing_is_wider_in_the_light():
-    style = StrokeStyle(unit="world", distance=0.05, tone=True)
+    style = StrokeStyle(unit="world", distance=0.05, light="lamp")
     strokes = draw_instances([SPHERE], CAMERA, style, lights=[KEY_LIGHT]).strokes
     light = normalize(strokes.points) @ (CAMERA.view[:3, :3].T @ KEY_LIGHT.vector)
     assert strokes.spacing[light > 0.8].mean() > 2.5 * strokes.spacing[light < 0.0].mean()
@@ -248,7 +248,9 @@ def test_errors(error_of):
     assert "no stroke is visible" in error_of(draw_instances, [away], CAMERA, StrokeStyle())
     assert "setting 'spacing' is 0, expected a number from 0.5" in error_of(StrokeStyle, spacing=0)
     assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
-    assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
+    assert "'sun', expected one of none, headlight, lamp, scene" in error_of(
+        StrokeStyle, light="sun"
+    )
     assert "pen" in error_of(Pen, width=0.0)
     pixel = float(pixel_size(SPHERE.world_points(), CAMERA).min())
     fine = StrokeStyle(unit="world", distance=0.4 * pixel)
@@ -260,8 +262,10 @@ def test_swelling_strokes_are_evenly_spaced():
     """They are where strokes without a tone are, and their width is the darkness."""
     style = StrokeStyle(spacing=9, taper=0.0, hidden=True)
     even = draw_instances([SPHERE], CAMERA, style).strokes
-    swelling = draw_instances([SPHERE], CAMERA, replace(style, tone=True, swell=1.0)).strokes
-    denser = draw_instances([SPHERE], CAMERA, replace(style, tone=True)).strokes
+    swelling = draw_instances(
+        [SPHERE], CAMERA, replace(style, light="headlight", swell=1.0)
+    ).strokes
+    denser = draw_instances([SPHERE], CAMERA, replace(style, light="headlight")).strokes
     places = set(map(tuple, np.round(even.points, 6).tolist()))
 
     def share_of_places(strokes):

@@ -844,18 +844,18 @@ def test_command_line(tmp_path, capsys, monkeypatch):
         "--size",
         "300x200",
     ]
-    assert main([*command, "-o", str(out), "--outline", "--tone"]) == 0
+    assert main([*command, "-o", str(out), "--outline", "--light", "lamp"]) == 0
     root = ElementTree.parse(out).getroot()
     assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4
     first_bytes = out.read_bytes()
-    assert main([*command, "-o", str(out), "--outline", "--tone"]) == 0
+    assert main([*command, "-o", str(out), "--outline", "--light", "lamp"]) == 0
     assert out.read_bytes() == first_bytes
     assert main([*command, "-o", str(tmp_path / "ball.png")]) == 2
     assert "ball.png" in capsys.readouterr().err
     for arguments, message in (
         (["--camera", "Close"], "ball.obj: --camera applies only to .blend files"),
         (["--frames", "1-3"], "ball.obj: --frames applies only to .blend files"),
-        (["--tone", "--light", "scene"], "ball.obj: has no lights"),
+        (["--light", "scene"], "ball.obj: has no lights"),
     ):
         assert main([*command, "-o", str(out), *arguments]) == 2
         assert message in capsys.readouterr().err

@@ -233,7 +233,7 @@ def test_strokes_have_the_directions_of_the_render(scene, tmp_path):
 @needs_inkscape
 def test_strokes_are_as_dark_as_the_render(scene, tmp_path):
     instance, camera = scene
-    style = StrokeStyle(spacing=4.0, tone=True, light="lamp")
+    style = StrokeStyle(spacing=4.0, light="lamp")
     strokes = draw_instances([instance], camera, style, lights=[KEY_LIGHT]).strokes
     write_svg(tmp_path / "a.svg", strokes, camera, Pen(width=2.0))
     inkscape(tmp_path / "a.svg", tmp_path / "a.png")

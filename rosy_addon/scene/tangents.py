@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import bpy
 import numpy as np
 
-from ..surface_texture.direction_maps import corner_tangents
+from ..surface_texture.line_order import corner_tangents
 from ..worker.job import Steps, call_steps, job
 from .field_attributes import VECTOR_TYPE, check_attribute_type, get_or_create_attribute
 from .meshes import mesh_surface

@@ -1,4 +1,4 @@
-"""`UvCharts`: the triangles of a tangent mesh in a UV map, and frames that turn little in it.
+"""The charts of a UV map: the triangles of a tangent mesh in it, and frames that turn little in it.
 
 A chart is a part of the surface whose triangles are connected in the UV map. Tangents of the surface
 are complex numbers in the frame of their triangle (see `line_drawing.tangent_mesh`). The map from
@@ -19,7 +19,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.frames import dot, transport
 from ..field.surface import Surface, connected_components
-from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
+from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges, unit
 
 #: Corners are at the same point of a UV map if their coordinates differ by at most this much.
 SAME_UV = 1e-6
@@ -209,6 +209,5 @@ def _averaged_at_corners(
 
 
 def _unit(values: np.ndarray) -> np.ndarray:
-    """Scale complex numbers to the modulus 1; 0 and tiny numbers become 0."""
-    norm = np.abs(values)
-    return np.divide(values, norm, out=np.zeros_like(values), where=norm > 1e-300)
+    """Return complex numbers scaled to the modulus 1; 0 stays 0."""
+    return unit(values, np.zeros_like(values))

@@ -40,12 +40,17 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
-from .direction_maps import direction_map
 from .hatching import lit_ink, thresholds
-from .margin import fill_margin
-from .texel_field import texel_field
-from .texel_noise import texel_noise
-from .texels import Texels, TexelSurface, TextureFrame, rasterize_charts, texture_frame
+from .line_order import direction_map
+from .texel_field import texel_field, texel_noise
+from .texels import (
+    Texels,
+    TexelSurface,
+    TextureFrame,
+    fill_margin,
+    rasterize_charts,
+    texture_frame,
+)
 
 #: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
 #: mesh fills has lines of about the same width.

@@ -13,8 +13,8 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.surface_texture.direction_maps import corner_tangents
 from rosy_addon.surface_texture.draw import draw_texture
+from rosy_addon.surface_texture.line_order import corner_tangents
 
 #: Largest mean error of a direction in radians, and the largest one of 95 %. With 8 bits a direction is right
 #: to 0.3 degrees; tangents that are averaged over the faces around a corner differ from those of the face.

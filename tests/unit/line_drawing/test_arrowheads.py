@@ -33,7 +33,6 @@ def drawn(surface, field, **settings):
 
 
 CASES = {
-    "one direction": (1, {}),
     "three directions": (3, {}),
     "seven directions": (7, {}),
     "tone and outline": (3, {"light": "headlight", "outline": True, "overshoot": 6.0}),

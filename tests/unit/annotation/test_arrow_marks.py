@@ -14,9 +14,10 @@ from rosy_addon.annotation.arrow_marks import (
     WIDTH,
     ArrowMarks,
     arrow_marks,
+    spaced_points,
+    surface_places,
 )
-from rosy_addon.annotation.draw_arrows import draw_arrows
-from rosy_addon.annotation.surface_places import spaced_points, surface_places
+from rosy_addon.annotation.draw_marks import draw_arrows
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.cache import Cache
 from rosy_addon.core.color import from_hex, to_linear

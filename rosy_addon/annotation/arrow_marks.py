@@ -78,11 +78,11 @@ class ArrowMarks:
     Attributes
     ----------
     anchor : (K, 3) float64 ndarray
-        Their places on surfaces, in world space.
+        Places on surfaces, in world space.
     place : (K, 2) float64 ndarray
-        The same in the picture, pixels from the lower left.
+        Places in the picture, pixels from the lower left.
     position : (K, 2) float64 ndarray
-        Their middles, pixels from the lower left.
+        Middles of the arrowheads, pixels from the lower left.
     direction : (K, 2) float64 ndarray
         Unit vectors in the picture.
     size : float
@@ -100,7 +100,7 @@ class ArrowMarks:
 
     @property
     def outline(self) -> float:
-        """Width of their outlines, pixels."""
+        """Width of the outlines, pixels."""
         return max(OUTLINE * self.size, MIN_OUTLINE)
 
 
@@ -125,9 +125,9 @@ def arrow_marks(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Those without a field, or whose lines have no direction, only hide arrowheads.
+        Instances without a field, or whose lines have no direction, only hide arrowheads.
     camera : Camera
-        Of the picture.
+        Camera of the picture.
     spacing : float
         Least distance between the places of arrowheads, pixels.
     size : float
@@ -299,14 +299,14 @@ def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) 
 
 @dataclass(frozen=True, eq=False)
 class SurfacePlaces:
-    """P places on a surface, those of coarser levels first.
+    """P places on a surface, from coarse levels to fine ones.
 
     Attributes
     ----------
     triangle : (P,) int32 ndarray
     barycentric : (P, 3) float64 ndarray
     distance : (P,) float64 ndarray
-        Least distance to those before, in Blender units of the rest shape.
+        Least distance to the places before, in Blender units of the rest shape.
     level : int
         The last level; -1 if there is none.
     extent : float
@@ -326,7 +326,7 @@ class SurfacePlaces:
 
 
 def level_distance(extent: float, level: int) -> float:
-    """Return the least distance between the places of a level, given that of level 0."""
+    """Return the least distance between the places of a level, given the distance `extent` of level 0."""
     return extent * 2 ** (-level / LEVELS_PER_OCTAVE)
 
 
@@ -379,7 +379,7 @@ def _wanted_level(extent: float, distance: float) -> int:
 def _with_level(
     surface: Surface, places: SurfacePlaces, triangle: np.ndarray, barycentric: np.ndarray
 ) -> SurfacePlaces:
-    """Return places with those of the next level, chosen among points of triangles."""
+    """Return places with one level more, chosen among points of triangles."""
     level = places.level + 1
     finest = level_distance(places.extent, level)
     distance = np.concatenate([places.distance, np.full(len(triangle), finest)])

@@ -60,7 +60,7 @@ def draw_key(
         Linear, not premultiplied, rows from the bottom.
     layout : KeyLayout
     color_scale : ColorScale or None
-        What the color bar shows, if there is one.
+        Contents of the color bar, if there is one.
     text_triangles : callable
         Returns the (n, 3, 2) triangles of a line of text, in text sizes from its left end and baseline.
     colors : KeyColors
@@ -136,7 +136,7 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
     triangles : (n, 3, 2) float ndarray
         Corners in pixels from the lower left, y up, in any order. They do not overlap.
     width, height : int
-        Of the window, pixels. What is outside is cut away.
+        Size of the window in pixels. Triangles are clipped to it.
 
     Returns
     -------

@@ -83,12 +83,12 @@ def drawing_file(
     pen: Pen,
     lights: Sequence[LightSource],
 ) -> tuple[StrokeDrawing, bytes]:
-    """Draw mesh instances in strokes, and return the drawing and the contents of its file.
+    """Return a drawing of mesh instances in strokes, and the contents of its file.
 
     Parameters
     ----------
     suffix : str
-        Of the file: .svg, or one of `polyline_file`.
+        Suffix of the file: .svg, or one of `polyline_file`.
     instances, camera, style, lights
         As for `draw_instances`.
     pen : Pen
@@ -110,7 +110,7 @@ def drawing_curves(
     lights: Sequence[LightSource],
     follows: MeshInstance | None,
 ) -> tuple[StrokeDrawing, StrokeGeometry]:
-    """Draw mesh instances in strokes, and return the drawing and its curves; see `stroke_geometry`."""
+    """Return a drawing of mesh instances in strokes, and its curves; see `stroke_geometry`."""
     drawing = _draw(instances, camera, style, lights, clip_to_frame=False)
     with progress(OUTPUT_START, 1.0, OUTPUT_LABEL):
         return drawing, stroke_geometry(drawing, camera, pen, follows)
@@ -124,7 +124,7 @@ def _draw(
     *,
     clip_to_frame: bool,
 ) -> StrokeDrawing:
-    """Draw with the cache of bakes in the process that calls it."""
+    """Draw with the cache of bakes of this process."""
     with progress(0.0, OUTPUT_START):
         drawing = draw_instances(
             instances, camera, style, lights=lights, clip_to_frame=clip_to_frame, cache=BAKE_CACHE
@@ -145,7 +145,7 @@ def stroke_geometry(
     pen : Pen
         Its width is in pixels of the camera.
     follows : MeshInstance, optional
-        The instance that all strokes are on, if they are to follow its surface.
+        The instance of all strokes, if they are to follow its surface.
     """
     strokes = simplify_strokes(drawing.strokes, camera)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
@@ -198,7 +198,7 @@ def attach(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> Surf
     height : (n,) float64 ndarray
         Heights of the points above the surface, in world space.
     instance : MeshInstance
-        The instance that all strokes are on.
+        The instance of all strokes.
     """
     surface = instance.surface
     corners = surface.triangle_vertex[strokes.triangle]

@@ -61,8 +61,8 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
 def reference_members(mesh: TangentMesh) -> np.ndarray:
     """Return (T,) complex128: one unit member at the center of each triangle, in its frame.
 
-    It is the member nearest to the x axis of the frame. If the field labels one line consistently
-    (`TangentMesh.family_z`), it is a member on that line.
+    The member is the nearest one to the x axis of the frame. If the field labels one line consistently
+    (`TangentMesh.family_z`), the member is on this line.
     """
     near = np.ones(len(mesh.z), dtype=np.complex128)
     if _has_family_z(mesh):
@@ -124,8 +124,8 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
 def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Number the components of the covering from 0 in each connected part of the surface.
 
-    The order is that of the lines in the first triangle of the part, counter-clockwise from the
-    line nearest to the guide direction.
+    The lines of the first triangle of the part are numbered counter-clockwise, beginning with the line
+    nearest to the guide direction.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Parts:
     weights: np.ndarray
 
     def corner_values(self, values: np.ndarray) -> np.ndarray:
-        """Return (T', 3, ...) values at the corners, given those of the (T, 3, ...) whole ones."""
+        """Return (T', 3, ...) values at the corners, given (T, 3, ...) values of the whole triangles."""
         return np.einsum("tkj,tj...->tk...", self.weights, values[self.triangle])
 
 
@@ -63,7 +63,7 @@ class MeshInView(Parts):
     Attributes
     ----------
     mesh : TangentMesh
-        The part. `triangle_vertex` is that of the whole triangles.
+        The part. `triangle_vertex` holds the vertices of the whole triangles.
     """
 
     mesh: TangentMesh
@@ -281,7 +281,7 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
     ----------
     instance : MeshInstance
     index : int
-        The number of the instance among those of the depth buffer.
+        Number of the instance in the depth buffer.
     depth_buffer : DepthBuffer
 
     Returns

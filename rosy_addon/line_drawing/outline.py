@@ -342,7 +342,7 @@ def clip_outline(
         The `outline_strokes` of an instance.
     instance : MeshInstance
     index : int
-        The number of the instance among those of the depth buffer.
+        Number of the instance in the depth buffer.
     camera : Camera
     depth_buffer : DepthBuffer or None
         If None, lines are only clipped to the frame.

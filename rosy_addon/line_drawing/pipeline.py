@@ -122,7 +122,7 @@ def draw_instances(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Strokes are drawn on those with a field. All of them occlude.
+        Strokes are drawn on instances with a field. All instances occlude.
     camera : Camera
         Its resolution also sets the length of a pixel.
     style : StrokeStyle
@@ -184,7 +184,7 @@ def draw_instances(
     )
     heads = []
     if style.arrows:
-        # Other lines have no direction: they follow no member, or one whose opposite is a member, too.
+        # Other strokes have no direction: they follow no member, or the opposite is a member as well.
         points_one_way = np.array([_points_one_way(instance) for instance in instances])
         has_direction = points_one_way[instance_of_family[strokes.family]]
         has_direction &= strokes.member[strokes.start[:-1]].any(axis=1)
@@ -265,8 +265,8 @@ def _part_to_trace(
 ) -> tuple[MeshInView, CornerSpacing] | None:
     """Return the part of a mesh on which strokes are traced, and the spacing on it.
 
-    It is what is in view, if strokes are clipped, and of this what is seen and near it, if hidden strokes
-    are not kept. None if there is no field on it.
+    If strokes are clipped, it is the part in view. If hidden strokes are removed, it is what is visible of
+    this part, and what is near. None if the field is zero on it.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def _part_to_trace(
 
 
 def _points_one_way(instance: MeshInstance) -> bool:
-    """Return whether an instance has a field, and the opposites of its directions are none of them."""
+    """Return whether an instance has a field in which the opposite of a direction is not a direction."""
     return instance.field is not None and not field_symmetry(instance.field).has_opposites
 
 

@@ -62,7 +62,7 @@ RESCAN_BATCH_SIZE = 1 << 13
 class Tips(SurfaceParticles):
     """The growing ends of strokes, n of them.
 
-    The sign is that of the half of the stroke.
+    The sign is 1 in the forward half of a stroke and -1 in the backward half.
 
     Attributes
     ----------
@@ -84,7 +84,7 @@ class Tips(SurfaceParticles):
 
     @property
     def particles(self) -> SurfaceParticles:
-        """Their positions: the same arrays."""
+        """The positions of the tips, without a copy of the arrays."""
         return SurfaceParticles(self.triangle, self.weights, self.member, self.sign)
 
     @property
@@ -98,7 +98,7 @@ NO_TIPS = Tips.at(SurfaceParticles.empty(), np.empty(0), np.empty(0))
 
 
 class GrowingStrokes(ColumnTable):
-    """Strokes while they grow: how far they reach, and what their ends are.
+    """A table of strokes while they grow: their extents and the states of their ends.
 
     Notes
     -----
@@ -427,9 +427,9 @@ class StreamlinePlacer:
 
         Each side of a stroke has at most one growing child at a time. Only strokes that have reached
         the minimum length have children. They are never dropped under the same rules, and every call
-        closes at least one of their open sides. Strokes of this length keep their separation, so a
-        surface has room for finitely many, and seeding ends. Strokes that are dropped later could
-        take turns with their own children for ever.
+        closes at least one of their open sides. A surface has room for finitely many such strokes, so
+        seeding ends. If shorter strokes had children, a stroke and its child could be dropped and seeded
+        again in turn, without end.
         """
         samples, strokes = self.samples, self.strokes
         sample, side = samples.open_sides()

@@ -48,8 +48,8 @@ def polyline_file(
     Parameters
     ----------
     suffix : {".csv", ".obj", ".ply"}
-        Of the file: a table with a row for each point, lines of Wavefront, or binary vertices and
-        edges of Stanford.
+        Suffix of the file: a table with a row for each point, a Wavefront file with lines, or a binary
+        Stanford file with vertices and edges.
     strokes : Strokes
     camera : Camera
         Camera that sets the length of a pixel.
@@ -132,8 +132,8 @@ def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return vertices, then a line for each stroke, in a group for each family.
 
-    Lines have no normals of their own in this format, so normal n is that of vertex n. Widths are the
-    texture coordinates, with one number each.
+    The format has no normals of lines, so normal n belongs to vertex n. Widths are texture coordinates with
+    one component.
     """
     first_of_closed, kept = _without_repeated_points(strokes)
     rows = np.flatnonzero(kept)

@@ -1,7 +1,7 @@
 """Choose seeds of strokes: around singularities, evenly distributed on a mesh, or beside strokes.
 
-Seeds beside strokes are those of Jobard and Lefer (1997), but along each side of a stroke only one
-is tried at a time, in the middle of the longest open run of samples.
+Seeds beside strokes follow Jobard and Lefer (1997). Along each side of a stroke only one seed is tried at a
+time, in the middle of the longest open run of samples.
 
 Around singularities, there is one seed in each sector, all at the same distance. Near a singularity of
 index i, the lines of the field are parallel lines on a cone, which z -> z^(1 - i) unrolls. A line is
@@ -53,8 +53,8 @@ DIVERGING_DISTANCE, CONVERGING_DISTANCE = 0.8, 1.0
 #: Singularities get seeds only if the next one is at least this far away, in spacings.
 MIN_ISOLATION = 6.0
 
-#: A triangle can have a singularity only if twice the area that its three values z span in the
-#: complex plane is more than this fraction of the sum of their squared magnitudes.
+#: A triangle can have a singularity only if its three values z span a triangle in the complex plane whose
+#: doubled area is more than this fraction of the sum of their squared magnitudes.
 MIN_TURN_RATIO = 1e-6
 
 

@@ -85,7 +85,7 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     too_close[refined.start[:-1][opened]] = too_close[refined.start[1:][opened] - 1] = True
     too_close = _dilate(refined, too_close)
     cut = np.unique(refined.stroke[too_close])
-    # Of the runs, those of strokes that were not cut are left out: these stay as they were.
+    # Strokes that were not cut stay as they were, so their runs are left out.
     is_cut = np.zeros(len(candidates), dtype=bool)
     is_cut[cut] = True
     numbered = replace(refined, family=np.arange(len(refined), dtype=np.int32))
@@ -149,7 +149,7 @@ def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
 def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
     """Return radians by which the field turns within a spacing, at a block of points.
 
-    They are those in the direction of most turn.
+    The direction in which it turns most counts.
     """
     triangle = strokes.triangle[block]
     z, gradient = mesh.z[triangle], mesh.gradient[triangle]

@@ -159,8 +159,8 @@ def _extension_in_picture(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the lines along which (k,) ends are extended, if they are straight in the picture.
 
-    The parameters and results are those of `_extension_in_space`. The lines lie in the plane
-    through the end that is parallel to the image plane. They leave the stroke `backtrack` pixels
+    Parameters and results are the same as in `_extension_in_space`. The lines lie in the plane through the
+    end that is parallel to the image plane. They leave the stroke `backtrack` pixels
     before its end, because strokes bend along the silhouette close to it.
     """
     start_point = _point_before_end(arc, strokes, end, backtrack)

@@ -114,7 +114,7 @@ class Strokes:
         )
 
     def take_points(self, point: np.ndarray) -> Strokes:
-        """Return a copy with some points, by number. The caller replaces what is no longer true."""
+        """Return a copy with some points, by number. The caller has to replace `start` and what depends on it."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
     def runs_where(
@@ -285,7 +285,7 @@ class Strokes:
 
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
-        """Return both sets. The families of the second are numbered after those of the first."""
+        """Return both sets. The families of the second follow the families of the first."""
         renumbered = replace(second, family=second.family + np.int32(len(first.names)))
         return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 

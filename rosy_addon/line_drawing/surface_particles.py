@@ -74,7 +74,7 @@ class SurfaceParticles:
         return tuple(vars(self).values())
 
     def assign(self, indices: np.ndarray, source: SurfaceParticles) -> None:
-        """Overwrite the particles at `indices` with those of `source`."""
+        """Overwrite the particles at `indices` with the particles of `source`."""
         for column, values in zip(self.columns, source.columns, strict=True):
             column[indices] = values
 
@@ -200,8 +200,8 @@ def trace_geodesics(
     Returns
     -------
     particles : SurfaceParticles
-        The particles after the move. Their members are those of the field that are nearest to the
-        transported ones; 0 where the field is zero.
+        The particles after the move. Each has the member of the field that is nearest to its transported
+        member, or 0 where the field is zero.
     direction : (n,) complex128 ndarray
         The directions after the move.
     walked : (n,) float64 ndarray
@@ -312,7 +312,7 @@ def _midpoint_segments(
     ----------
     mesh : TangentMesh
     start : SurfaceParticles
-        Their members are those of the field at their positions.
+        With the members of the field at their positions.
     midpoint : (n, 3) float64 ndarray
         Barycentric coordinates of estimated midpoints.
     rotation : (n,) complex128 ndarray

@@ -314,7 +314,7 @@ def _format_points(points: np.ndarray) -> str:
 def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
     """Choose the points of simplified polylines.
 
-    The method is that of Ramer, Douglas and Peucker, for all polylines at once.
+    This is the Ramer-Douglas-Peucker algorithm, for all polylines at once.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ class TangentMesh:
     neighbor_edge : (T, 3) int8 ndarray
         The number of that edge in the neighbor.
     edge_transport : (T, 3) complex128 ndarray
-        Unit factors that transport tangents from the frame of the triangle to that of the neighbor.
+        Unit factors that transport tangents from the frame of the triangle to the frame of the neighbor.
     area : (T,) float64 ndarray
         World space; 0 for degenerate triangles.
     triangle_vertex : (T, 3) int32 ndarray
@@ -128,7 +128,7 @@ class TangentMesh:
         return normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
 
     def limited_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the shading normals, but at most `MAX_TILT` off those of the triangles."""
+        """Return the shading normals, turned to at most `MAX_TILT` from the normals of the triangles."""
         shading = self.shading_normals_at(triangle, weights)
         flat = self.normal[triangle]
         cosine = dot(shading, flat)

@@ -112,7 +112,7 @@ def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer 
     A point is compared with the triangles that are visible at the four pixel centers around it. It
     is hidden if the planes of all four are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
     the steepness of the plane, in pixels. Planes are used because the depth at a pixel center
-    differs from that at the point, by the slope times up to half a pixel. A point is also hidden if
+    differs from the depth at the point, by the slope times up to half a pixel. A point is also hidden if
     it is behind only one of them, but one of the two faces the camera and the other faces away.
     """
     if depth_buffer is None:

@@ -58,7 +58,7 @@ class UvCharts:
 
     @property
     def density(self) -> np.ndarray:
-        """(T,) area in the UV map of a square Blender unit; negative for mirrored triangles."""
+        """The (T,) area in the UV map of a square Blender unit; negative for mirrored triangles."""
         return np.abs(self.linear) ** 2 - np.abs(self.conjugate) ** 2
 
     def to_uv(self, triangle: np.ndarray, tangent: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ class UvCharts:
         return linear.conj() * scale, -conjugate * scale
 
     def stretch(self) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) largest and smallest length in the UV map of a Blender unit."""
+        """Return the (T,) largest and smallest length in the UV map of a Blender unit."""
         linear, conjugate = np.abs(self.linear), np.abs(self.conjugate)
         return linear + conjugate, np.abs(linear - conjugate)
 
@@ -90,7 +90,7 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
     ----------
     surface : Surface
     mesh : TangentMesh
-        Of the surface. Charts end where its streamlines stop.
+        Tangent mesh of the surface. Charts end where its streamlines stop.
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
 
@@ -136,7 +136,7 @@ def _checked(surface: Surface, uv: np.ndarray) -> np.ndarray:
 
 
 def _gradients(corner_uv: np.ndarray) -> np.ndarray:
-    """(T, 3) complex gradients of the barycentric coordinates; 0 for triangles without area."""
+    """Return (T, 3) complex gradients of the barycentric coordinates; 0 for triangles without area."""
     # Edges opposite to the corners. A gradient is perpendicular to its edge.
     edge = corner_uv[:, [2, 0, 1]] - corner_uv[:, [1, 2, 0]]
     double_area = (edge[:, 0].conj() * edge[:, 1]).imag[:, None]
@@ -154,9 +154,9 @@ def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> SharedEdges:
 
 
 def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.ndarray:
-    """Compute unit tangents in the direction of u, averaged at the corners over each smooth fan.
+    """Return unit tangents in the direction of u, averaged at the corners over each smooth fan.
 
-    As renderers do for normal maps.
+    Renderers compute the same tangents for normal maps.
 
     Returns
     -------

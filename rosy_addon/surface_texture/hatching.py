@@ -1,4 +1,4 @@
-"""Hatching at texels: the thresholds of the lines of a field, whatever the light (`ink_thresholds`)."""
+"""Hatching at texels: thresholds of the lines of a field, from which any light makes ink (`ink_thresholds`)."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def thresholds(
     Returns
     -------
     (P, 4) float32 ndarray
-        As of `threshold_pixels`.
+        As `threshold_pixels` returns them.
     """
     look = sharp_look(look)
     with progress(0.0, 0.1):

@@ -71,7 +71,7 @@ class LineOrder:
     Attributes
     ----------
     degree : int
-        Of the representation of a line: 1 if opposite directions are on different lines, else 2.
+        Degree of the representation of a line: 1 if opposite directions are on different lines, else 2.
     tree : BisectionTree
         The triangles of the tangent mesh, and the L smaller ones in them.
     first : (L, 3) complex64 ndarray
@@ -106,8 +106,8 @@ class CombedDirections:
     ----------
     line : LineOrder
     sense : LineOrder
-        Of degree 1: which of the two opposite directions of a line is chosen. Where it turns over, the line
-        goes on.
+        Of degree 1: which of the two opposite directions of a line is chosen. Where the choice changes, the
+        line continues.
     """
 
     line: LineOrder
@@ -296,9 +296,9 @@ def _unit_root(values: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
-    """(T,) representations of the direction at an angle to the horizontal one.
+    """Return (T,) representations of the direction at an angle to the horizontal direction.
 
-    Its modulus decreases toward horizontal triangles, where the x axis takes its place.
+    The modulus decreases toward horizontal triangles, on which the x axis is the guide.
     """
     x, _, z = (mesh.x + 1j * mesh.y).T
     turn = np.exp(1j * guiding_angle)

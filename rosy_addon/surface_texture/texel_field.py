@@ -47,14 +47,14 @@ SEAM_BLOCK = 1 << 14
 #: Smallest side of a cell of the noise, in texels of the coarser direction.
 MIN_CELL_TEXELS = 1.0
 
-#: Most points on each side of the grid whose values are the means that a high pass subtracts.
+#: Most points on each side of the grid of local means, which a high pass subtracts.
 MAX_GRID_SIDE = 256
 
 #: Side of a cell of that grid, in standard deviations of the blur. Values are spread to the corners of
 #: their cell and interpolated from them, both linearly.
 GRID_CELL_SIGMAS = 3**0.5
 
-#: Of so many texels, one is spread over the grid.
+#: One in this number of texels is spread over the grid.
 SAMPLE_STRIDE = 3
 
 #: Texels that are spread over the grid at once.
@@ -211,7 +211,7 @@ def _seam_steps(
     bit: np.ndarray,
     offset: np.ndarray,
 ) -> SeamSteps:
-    """Return those of n steps that lead to a texel.
+    """Trace n steps, and return the steps that lead to a texel.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def _seam_steps(
     target, reached = _nearest_texels(on, entry, end.triangle, uv)
     arrived &= target >= 0
     arrived[arrived] &= defined[target[arrived]]
-    # Tangents are rotated by this from the frame of the one triangle to that of the other.
+    # The rotation of tangents from the frame of the first triangle to the frame of the last one.
     turn = direction * ahead.conj()
     back, back_conjugate = charts.inverse(triangle)
     ahead, ahead_conjugate = charts.linear[end.triangle], charts.conjugate[end.triangle]
@@ -269,7 +269,7 @@ def _nearest_texels(
     Returns
     -------
     texel : (n,) int32 ndarray
-        -1 if none of the nine around the point is one.
+        -1 if none of the nine texels around the point is in the chart.
     offset : (n,) complex128 ndarray
         The point, relative to the center of that texel.
     """
@@ -346,15 +346,15 @@ def _subtract_local_means(
 ) -> None:
     """Subtract a blur over the surface from (K, P) values at texels, in place.
 
-    The blur is one in space: values are spread over a grid, and interpolated from it. So it knows no
-    charts.
+    The blur is three-dimensional: values are spread over a grid in space and interpolated from it. So it
+    does not depend on the charts.
 
     Parameters
     ----------
     rest : (V, 3) float32 ndarray
         `rest_positions` of the surface.
     sigma : float
-        Of the blur, in Blender units of rest space.
+        Standard deviation of the blur, in Blender units of rest space.
     """
     texels = on.texels
     used = rest[on.instance.surface.used_vertices]

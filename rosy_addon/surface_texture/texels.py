@@ -151,7 +151,7 @@ def texture_frame(charts: UvCharts, size: int, name: str, is_udim: bool = False)
     size : int
         Texels on each side of a tile.
     name : str
-        Of the mesh, for messages.
+        Name of the mesh, for messages.
     is_udim : bool
 
     Raises
@@ -232,7 +232,7 @@ def rasterize_charts(charts: UvCharts, frame: TextureFrame, name: str) -> Texels
 
 
 def _reaches_tile(corners: np.ndarray) -> np.ndarray:
-    """Indices of the triangles, given their (T, 3, 2) corners, that may reach -1 to 1 in x and y."""
+    """Return the numbers of triangles that may reach the square from -1 to 1, given (T, 3, 2) corners."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     return np.flatnonzero(((low < 1) & (high > -1)).all(axis=1))
 
@@ -376,7 +376,7 @@ def _dilate(
 
 
 def neighbor_places(frame: TextureFrame, index: np.ndarray, dx: int, dy: int) -> np.ndarray:
-    """Return the (n,) intp flat indices of neighbors; -1 outside of the tile."""
+    """Return the (n,) intp places of neighbors in the frame; -1 outside of the tile."""
     row, column = np.divmod(index.astype(np.intp), frame.width)
     column += dx
     row %= frame.size

@@ -8,13 +8,13 @@ from functools import reduce
 
 import numpy as np
 
+from ..annotation.arrow_marks import has_arrows
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.memory import check_memory
 from ..core.progress import progress, report
-from ..field.directional_field import field_symmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads
@@ -156,14 +156,7 @@ def draw_instances(
         with progress(0.01, 0.05, "finding visible strokes"):
             depth_buffer = rasterize_depth(instances, camera)
     view = _View(camera, style, clips, depth_buffer)
-    # The instance and the lines of each part of the drawing.
-    parts: list[tuple[int, Strokes]] = []
-    for rank, index in enumerate(drawn):
-        start, stop = (0.05 + 0.87 * (rank + done) / len(drawn) for done in (0, 1))
-        with progress(start, stop):
-            strokes = _instance_strokes(instances[index], index, view, lights, cache)
-        if strokes is not None:
-            parts.append((index, strokes))
+    parts = _traced_parts(instances, drawn, view, lights, cache)
     if not parts:
         raise _no_visible_stroke(camera)
     # Families of different instances stay separate until the end. Each belongs to one instance.
@@ -184,10 +177,9 @@ def draw_instances(
     )
     heads = []
     if style.arrows:
-        # Other strokes have no direction: they follow no member, or the opposite is a member as well.
-        points_one_way = np.array([_points_one_way(instance) for instance in instances])
+        points_one_way = np.array([has_arrows(instance) for instance in instances])
         has_direction = points_one_way[instance_of_family[strokes.family]]
-        has_direction &= strokes.member[strokes.start[:-1]].any(axis=1)
+        has_direction &= strokes.member[strokes.start[:-1]].any(axis=1)  # not outlines
         heads = [arrowheads(strokes, style.arrows, has_direction)]
     if style.overshoot:
         with progress(0.95, 0.98):
@@ -203,6 +195,23 @@ def draw_instances(
     return StrokeDrawing(
         _merge_families_by_name(strokes), instance_of_family[strokes.family], style.hidden, marks
     )
+
+
+def _traced_parts(
+    instances: Sequence[MeshInstance],
+    drawn: Sequence[int],
+    view: _View,
+    lights: Sequence[LightSource],
+    cache: Cache,
+) -> list[tuple[int, Strokes]]:
+    """Return the number and the strokes of each drawn instance that can be in view."""
+    parts = []
+    for rank, index in enumerate(drawn):
+        with progress(0.05 + 0.87 * rank / len(drawn), 0.05 + 0.87 * (rank + 1) / len(drawn)):
+            strokes = _instance_strokes(instances[index], index, view, lights, cache)
+        if strokes is not None:
+            parts.append((index, strokes))
+    return parts
 
 
 def _instance_strokes(
@@ -289,11 +298,6 @@ def _part_to_trace(
         kept = triangles_near(part.mesh, seen[part.triangle], spacing.values)
         part, spacing = part.take(kept), spacing.take(kept)
     return (part, spacing) if part.mesh.z.any() else None
-
-
-def _points_one_way(instance: MeshInstance) -> bool:
-    """Return whether an instance has a field in which the opposite of a direction is not a direction."""
-    return instance.field is not None and not field_symmetry(instance.field).has_opposites
 
 
 def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:

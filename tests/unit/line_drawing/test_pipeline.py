@@ -88,16 +88,17 @@ def test_light_is_that_of_lambert():
     sun = Light("sun", np.array([0.6, 0.0, 0.8]), np.ones(3), 0.7)
     position = np.array([0.3, -1.7, 2.0])
     point = Light("point", rotation @ position + CAMERA.view[:3, 3], np.array([0, 1.0, 0]), 1.5)
-    sun_tone = 0.7 * np.maximum(normal @ (rotation.T @ sun.vector), 0)
-    np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun]), sun_tone, atol=0.01)
     to_light = position - SPHERE.surface.vertices
-    cosine = np.maximum(dot(normal, normalize(to_light)), 0)
-    point_tone = 1.5 * 0.7152 * cosine / dot(to_light, to_light)
-    np.testing.assert_allclose(
-        lit_tone(SPHERE, CAMERA, [point]), np.minimum(point_tone, 1), atol=0.01
-    )
-    both = np.minimum(sun_tone + point_tone, 1)
-    np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun, point]), both, atol=0.02)
+    sun_tone = 0.7 * np.maximum(normal @ (rotation.T @ sun.vector), 0)
+    point_tone = 1.5 * 0.7152 * np.maximum(dot(normal, normalize(to_light)), 0)
+    point_tone /= dot(to_light, to_light)
+    for lights, tone in (
+        ([sun], sun_tone),
+        ([point], point_tone),
+        ([sun, point], sun_tone + point_tone),
+        ([], np.maximum(dot(normal, CAMERA.view_directions(SPHERE.surface.vertices)), 0)),
+    ):
+        np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, lights), np.minimum(tone, 1), atol=0.02)
 
 
 @pytest.mark.slow
@@ -193,27 +194,26 @@ def test_seeding_ends_where_all_strokes_are_short():
 
 @pytest.mark.slow
 def test_errors(error_of):
-    assert "no object has a field" in error_of(
-        draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA, StrokeStyle()
-    )
-    behind = MeshInstance(SPHERE.surface, moved(y=-50.0), SPHERE.field)
-    assert "no stroke is visible" in error_of(draw_instances, [behind], CAMERA, StrokeStyle())
-    unseen = draw_instances(
-        [behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False
-    )
-    assert 20 < len(unseen.strokes) < 2000
-    assert "no stroke fits" in error_of(draw_instances, [SPHERE], CAMERA, StrokeStyle(spacing=500))
-    away = MeshInstance(SPHERE.surface, moved(x=9.0), SPHERE.field)
-    assert "no stroke is visible" in error_of(draw_instances, [away], CAMERA, StrokeStyle())
-    assert "setting 'spacing' is 0, expected a number from 0.5" in error_of(StrokeStyle, spacing=0)
-    assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
-    assert "'sun', expected one of none, headlight, lamp, scene" in error_of(
-        StrokeStyle, light="sun"
-    )
-    assert "pen" in error_of(Pen, width=0.0)
+    behind, away = replace(SPHERE, matrix=moved(y=-50.0)), replace(SPHERE, matrix=moved(x=9.0))
     pixel = float(pixel_size(SPHERE.world_points(), CAMERA).min())
-    fine = StrokeStyle(unit="world", distance=0.4 * pixel)
-    assert "strokes would be 0.4 pixels" in error_of(draw_instances, [SPHERE], CAMERA, fine)
+    for instance, settings, message in (
+        (replace(SPHERE, field=None), {}, "no object has a field"),
+        (behind, {}, "no stroke is visible"),
+        (away, {}, "no stroke is visible"),
+        (SPHERE, {"spacing": 500}, "no stroke fits"),
+        (SPHERE, {"unit": "world", "distance": 0.4 * pixel}, "strokes would be 0.4 pixels"),
+    ):
+        assert message in error_of(draw_instances, [instance], CAMERA, StrokeStyle(**settings))
+    for settings, message in (
+        ({"spacing": 0}, "setting 'spacing' is 0, expected a number from 0.5"),
+        ({"curvature": np.nan}, "setting 'curvature' is nan"),
+        ({"overshoot": -1}, "setting 'overshoot' is -1, expected a number from 0"),
+        ({"light": "sun"}, "'sun', expected one of none, headlight, lamp, scene"),
+    ):
+        assert message in error_of(StrokeStyle, **settings)
+    assert "pen" in error_of(Pen, width=0.0)
+    unseen = draw_instances([behind], CAMERA, StrokeStyle(hidden=True), clip_to_frame=False)
+    assert 5 < len(unseen.strokes) < 2000
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -680,11 +681,12 @@ def test_command_line(tmp_path, capsys, monkeypatch):
 
 
 def test_errors_are_one_line(error_of):
-    surface = plane()
-    instance = turned(surface, 4)
-    assert "above 0" in error_of(trace_strokes, instance, 0.0)
-    assert "too many" in error_of(trace_strokes, instance, 1e-6)
-    assert "no field" in error_of(trace_strokes, MeshInstance(surface, IDENTITY), 0.1)
-    assert "zero everywhere" in error_of(
-        trace_strokes, MeshInstance(surface, IDENTITY, RosyField(4, np.zeros((16, 3)))), 0.1
-    )
+    instance = turned(plane(), 4)
+    nothing = RosyField(4, np.zeros((16, 3)))
+    for field, spacing, message in (
+        (instance.field, 0.0, "above 0"),
+        (instance.field, 1e-6, "too many"),
+        (None, 0.1, "no field"),
+        (nothing, 0.1, "zero everywhere"),
+    ):
+        assert message in error_of(trace_strokes, replace(instance, field=field), spacing)

@@ -259,12 +259,9 @@ def _point_keys(ends: np.ndarray) -> np.ndarray:
     if not len(ends):
         return np.empty((0, 2), dtype=np.int64)
     points = ends.reshape(-1, 3)
-    low = points.min(axis=0)
-    cell = SAME_POINT_RATIO * max(float((points.max(axis=0) - low).max()), 1e-300)
-    # Columns of whole numbers up to 1e7 fit into one key of 64 bits in two steps.
-    x, y, z = np.rint((points - low) / cell).astype(np.int64).T
-    _, keys = np.unique(x * (1 << 25) + y, return_inverse=True)
-    _, keys = np.unique(keys.astype(np.int64) * (1 << 25) + z, return_inverse=True)
+    cell = SAME_POINT_RATIO * max(float(np.ptp(points, axis=0).max()), 1e-300)
+    cells = np.rint((points - points.min(axis=0)) / cell).astype(np.int64)
+    _, keys = np.unique(cells, axis=0, return_inverse=True)
     return keys.reshape(-1, 2).astype(np.int64)
 
 

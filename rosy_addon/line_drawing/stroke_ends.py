@@ -107,10 +107,13 @@ def extend_free_ends(
     is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
-    extend = _extension_in_space if depth_buffer is None else _extension_in_picture
-    start_point, origin, step = extend(
-        strokes, arc, end, np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total), camera
-    )
+    backtrack = np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total)
+    if depth_buffer is None:
+        start_point, origin = end, strokes.points[end]
+        before = strokes.points[_point_before_end(arc, strokes, end, backtrack)]
+        step = pixel_size(origin, camera)[:, None] * normalize(origin - before)
+    else:
+        start_point, origin, step = _extension_in_picture(strokes, arc, end, backtrack, camera)
     length = np.minimum(
         max_pixels * _extension_ratios(len(strokes))[stroke, side], MAX_EXTENSION_RATIO * total
     )
@@ -124,10 +127,13 @@ def extend_free_ends(
     return _drop_onto_surfaces(extended, distance, depth_buffer, camera)
 
 
-def _extension_in_space(
+def _extension_in_picture(
     strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the lines along which (k,) ends are extended in world space.
+    """Return the lines along which (k,) ends are extended, if they are straight in the picture.
+
+    The lines lie in the plane through the end that is parallel to the image plane. They leave the stroke
+    `backtrack` pixels before its end, because strokes bend along the silhouette close to it.
 
     Parameters
     ----------
@@ -148,20 +154,6 @@ def _extension_in_space(
         Origins of the extensions, in world space.
     step : (k, 3) float64 ndarray
         Steps of one pixel, in world space.
-    """
-    before, origin = _point_before_end(arc, strokes, end, backtrack), strokes.points[end]
-    step = pixel_size(origin, camera)[:, None] * normalize(origin - strokes.points[before])
-    return end, origin, step
-
-
-def _extension_in_picture(
-    strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the lines along which (k,) ends are extended, if they are straight in the picture.
-
-    Parameters and results are the same as in `_extension_in_space`. The lines lie in the plane through the
-    end that is parallel to the image plane. They leave the stroke `backtrack` pixels
-    before its end, because strokes bend along the silhouette close to it.
     """
     start_point = _point_before_end(arc, strokes, end, backtrack)
     before = _point_before_end(arc, strokes, end, backtrack + np.abs(arc[end] - arc[start_point]))

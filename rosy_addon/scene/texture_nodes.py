@@ -120,7 +120,7 @@ def brushed_metal_shader(
     ----------
     build : NodeBuilder
     image_node : bpy.types.Node
-        Of an image from `surface_texture.direction_maps`.
+        Of an image from `surface_texture.line_order`.
     uv_map : str
         Name of the UV map.
     """

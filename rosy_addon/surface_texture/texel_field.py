@@ -154,36 +154,35 @@ def _neighbor_masks(
     reach = np.divide(MAX_STRETCHED_STEP, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
     reach_squared = (reach * reach).astype(np.float32)
     corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
-
-    def interpolated(values: np.ndarray, texel: np.ndarray) -> np.ndarray:
-        weights, triangle = texels.barycentric[texel], texels.triangle[texel]
-        return np.einsum("nk,nki->ni", weights, values.take(triangle, axis=0))
-
-    def is_near(own: np.ndarray, other: np.ndarray, squared_step: int) -> np.ndarray:
-        a, b = texels.triangle[own], texels.triangle[other]
-        offset = interpolated(corners, own) - interpolated(corners, other)
-        reach = np.maximum(reach_squared.take(a), reach_squared.take(b))
-        near = dot(offset, offset) <= np.float32(squared_step) * reach
-        near &= charts.chart.take(a) == charts.chart.take(b)
-        if crease_angle is not None:
-            normal, other_normal = (interpolated(normals, texel) for texel in (own, other))
-            for vectors in (normal, other_normal):
-                vectors /= np.sqrt(np.maximum(dot(vectors, vectors), 1e-20))[:, None]
-            near &= dot(normal, other_normal) >= np.cos(crease_angle)
-        return near
-
+    min_cosine = -2.0 if crease_angle is None else np.cos(crease_angle)
     for block in pixel_blocks(len(texels)):
         report(block.start / len(texels), LABEL)
+        start = block.start
+        # The block, and the neighbors of its texels in the next row.
+        around = slice(start, block.stop + texels.frame.width + 1)
+        triangle, weights = texels.triangle[around], texels.barycentric[around]
+        point, normal = (
+            np.einsum("nk,nki->ni", weights, values.take(triangle, axis=0))
+            for values in (corners, normals)
+        )
+        normal /= np.sqrt(np.maximum(dot(normal, normal), 1e-20))[:, None]
         for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
             other = entry[neighbor_places(texels.frame, texels.index[block], dx, dy)]
-            own = block.start + np.flatnonzero((other >= 0) & defined[block] & defined[other])
-            other = other[own - block.start]
-            linked = texels.triangle[own] == texels.triangle[other]
+            own = np.flatnonzero((other >= 0) & defined[block] & defined[other])
+            other = other[own] - start
+            linked = triangle[own] == triangle[other]
             apart = np.flatnonzero(~linked)
-            linked[apart] = is_near(own[apart], other[apart], dx * dx + dy * dy)
+            first, second = own[apart], other[apart]
+            a, b = triangle[first], triangle[second]
+            offset = point.take(first, axis=0) - point.take(second, axis=0)
+            reach = np.maximum(reach_squared.take(a), reach_squared.take(b))
+            near = dot(offset, offset) <= np.float32(dx * dx + dy * dy) * reach
+            near &= charts.chart.take(a) == charts.chart.take(b)
+            near &= dot(normal.take(first, axis=0), normal.take(second, axis=0)) >= min_cosine
+            linked[apart] = near
             bit = NEIGHBOR_OFFSETS.index((dx, dy))
-            masks[own[linked]] |= np.uint16(1 << bit)
-            masks[other[linked]] |= np.uint16(1 << (8 - bit))
+            masks[start + own[linked]] |= np.uint16(1 << bit)
+            masks[start + other[linked]] |= np.uint16(1 << (8 - bit))
     return masks
 
 

@@ -212,8 +212,9 @@ def test_errors(error_of):
     ):
         assert message in error_of(StrokeStyle, **settings)
     assert "pen" in error_of(Pen, width=0.0)
-    unseen = draw_instances([behind], CAMERA, StrokeStyle(hidden=True), clip_to_frame=False)
-    assert 5 < len(unseen.strokes) < 2000
+    style = StrokeStyle(hidden=True, spacing=1)
+    unseen = draw_instances([behind], CAMERA, style, clip_to_frame=False)
+    assert 20 < len(unseen.strokes) < 2000
 
 
 @pytest.mark.slow

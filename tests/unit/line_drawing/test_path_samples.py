@@ -57,6 +57,16 @@ def test_samples_of_a_straight_path():
         atol=1e-9,
     )
 
+    # Paths that are much shorter than a step, and begin with a segment without length.
+    first = np.unique(path.path.particle, return_index=True)[1]
+    short = path.path.take(np.repeat(first, 2))
+    short.length[::2], short.length[1::2] = 0, 1e-12
+    short.end_weights[:] = short.begin_weights
+    samples = SampledPath(short, seeds.sign).samples(np.full(len(seeds), 0.1), next_step, ended)
+    np.testing.assert_array_equal(samples.particle, np.arange(len(seeds)))
+    points = mesh.points_at(samples.position.triangle, samples.position.weights)
+    np.testing.assert_allclose(points[:, 0], x, atol=1e-9)
+
 
 def test_samples_are_accepted_one_after_the_other(monkeypatch):
     """Tips that grow by six samples at once reach as far as those that grow six times by one.

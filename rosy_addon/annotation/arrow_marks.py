@@ -1,14 +1,18 @@
-"""Arrowheads over the lines of fields in a picture, where lines have a direction.
+"""Arrowheads over the lines of a field in a picture, if lines have a direction.
 
-Their places belong to the surface; see `surface_places`. Where a view is so near that these are far apart, points of
-`projection.progressive_samples` are between them. All are taken in an order that does not depend on the view, as far
-as they are visible and far enough from those before. Around each place, a field of N directions has N arrowheads.
+Arrowheads are at places of the surface that do not depend on the view, so a moving camera sees the same
+places. The places are ordered in levels: the distance between places decreases from level to level, and
+the first places of the order are spread evenly over the surface. A picture takes the places in this order,
+if they are visible and not too near to a place that was taken before. In a close view, the places of the
+finest level are too far apart. Then points of `projection.progressive_samples` follow after them. Around
+each place, a field of N directions has N arrowheads.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -16,14 +20,19 @@ from ..core.cache import Cache
 from ..core.progress import progress, report
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot
+from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_neighbors import screen_jacobians
-from ..projection.progressive_samples import matrix_scale, progressive_samples
+from ..projection.progressive_samples import (
+    matrix_scale,
+    progressive_samples,
+    rest_areas,
+    surface_samples,
+)
 from ..projection.project import surface_points
 from ..projection.surface_points import SurfacePoints
 from ..projection.visible_vertices import ProjectedPoints, project_points
-from .surface_places import spaced_points, surface_places
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"
@@ -40,19 +49,26 @@ MAX_COUNT = 1 << 16
 #: Directions that are shortened to less than this fraction have no arrowhead.
 MIN_FORESHORTENING = 0.3
 
-#: Least cosine of the angle between the normal of the surface and the direction to the eye at places of one
-#: arrowhead and of several: none reach far beyond silhouettes.
+#: Least cosine of the angle between the normal of the surface and the direction to the eye at places with one
+#: arrowhead and with several, so that none reaches far beyond a silhouette.
 MIN_FACING, MIN_FACING_OF_SEVERAL = 0.15, 0.35
 
-#: Least distance on the surface of places that are taken, in spacings: on screen most are nearer.
+#: Least distance between places on the surface, in spacings. On screen, most are nearer to each other.
 NEAREST_PLACES = 0.75
 
 #: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least distance
 #: between neighbors, in widths.
 REACH, MIN_GAP = 1.15, 1.2
 
-#: A place is taken for hidden if another one, next to it in the picture, is nearer by more spacings than this.
+#: A place counts as hidden if another one, next to it in the picture, is nearer by more spacings than this.
 HIDDEN_SPACINGS = 4.0
+
+#: Number of levels over which the distance between places halves, and number of the finest level, which has
+#: about 7000 places.
+LEVELS_PER_OCTAVE, MAX_LEVEL = 3, 20
+
+#: Random points among which the places of a level are chosen, for each square of the distance of the level.
+CANDIDATES_PER_PLACE = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +78,11 @@ class ArrowMarks:
     Attributes
     ----------
     anchor : (K, 3) float64 ndarray
-        Their places on surfaces, in world space.
+        Places on surfaces, in world space.
     place : (K, 2) float64 ndarray
-        The same in the picture, pixels from the lower left.
+        Places in the picture, pixels from the lower left.
     position : (K, 2) float64 ndarray
-        Their middles, pixels from the lower left.
+        Middles of the arrowheads, pixels from the lower left.
     direction : (K, 2) float64 ndarray
         Unit vectors in the picture.
     size : float
@@ -84,7 +100,7 @@ class ArrowMarks:
 
     @property
     def outline(self) -> float:
-        """Width of their outlines, pixels."""
+        """Width of the outlines, pixels."""
         return max(OUTLINE * self.size, MIN_OUTLINE)
 
 
@@ -109,9 +125,9 @@ def arrow_marks(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Those without a field, or whose lines have no direction, only hide arrowheads.
+        Instances without a field, or whose lines have no direction, only hide arrowheads.
     camera : Camera
-        Of the picture.
+        Camera of the picture.
     spacing : float
         Least distance between the places of arrowheads, pixels.
     size : float
@@ -123,7 +139,7 @@ def arrow_marks(
     cache : Cache, optional
         Stores the places, and corner fields.
     is_exact : bool
-        Whether no place is hidden. If not, most hidden ones are left out, which is faster.
+        Remove all hidden places. If false, most of them are removed, which is faster.
 
     Returns
     -------
@@ -162,13 +178,13 @@ def arrow_marks(
 def _places_in_order(
     instances: Sequence[MeshInstance], camera: Camera, spacing: float, cache: Cache
 ) -> SurfacePoints:
-    """Return places on all surfaces with arrowheads, and points between them, in the order of preference.
+    """Return the candidates for places of arrowheads on all surfaces, in the order of preference.
 
-    The places do not depend on the view. The points are where the view is so near that it needs more.
+    They are places that do not depend on the view, the largest distances first, and then points between
+    them where the view is so near that it needs more.
     """
     parts = [SurfacePoints.of(0, np.empty(0, np.int32), np.empty((0, 3)))]
-    # Places come first, those with the largest distances before others; then points by their ranks.
-    is_between, keys = [np.empty(0, dtype=bool)], [np.empty(0)]
+    keys = [np.empty((2, 0))]
     for number, instance in enumerate(instances):
         scale = matrix_scale(instance)
         if not has_arrows(instance) or not scale:
@@ -179,25 +195,23 @@ def _places_in_order(
         needed = _needed_distances(instance, camera, points, spacing)
         kept = np.flatnonzero(places.distance * scale >= needed)
         parts.append(points.part(kept))
-        is_between.append(np.zeros(len(kept), dtype=bool))
-        keys.append(-places.distance[kept] * scale)
-        if places.finest <= smallest:
-            continue
-        *samples, rank = progressive_samples(instance, camera, spacing)
-        points = SurfacePoints.of(number, *samples)
-        needed = _needed_distances(instance, camera, points, spacing)
-        kept = np.flatnonzero(needed < places.finest * scale)
-        parts.append(points.part(kept))
-        is_between.append(np.ones(len(kept), dtype=bool))
-        keys.append(rank[kept])
-    order = np.lexsort([np.concatenate(keys), np.concatenate(is_between)])
+        keys.append(np.stack([-places.distance[kept] * scale, np.zeros(len(kept))]))
+        if places.finest > smallest:
+            *samples, rank = progressive_samples(instance, camera, spacing)
+            points = SurfacePoints.of(number, *samples)
+            needed = _needed_distances(instance, camera, points, spacing)
+            kept = np.flatnonzero(needed < places.finest * scale)
+            parts.append(points.part(kept))
+            keys.append(np.stack([rank[kept], np.ones(len(kept))]))
+    # By the distance of places, then by the rank of the points between them.
+    order = np.lexsort(np.concatenate(keys, axis=1))
     return SurfacePoints.concatenate(parts).part(order)
 
 
 def _needed_distances(
     instance: MeshInstance, camera: Camera, points: SurfacePoints, spacing: float
 ) -> np.ndarray:
-    """(P,) float64: how far points have to be from each other, in Blender units; infinite behind the eye."""
+    """Return (P,) float64: least distances between points, in Blender units; infinite behind the eye."""
     world = instance.points_in_triangles(points.triangle, points.barycentric)
     result = np.full(len(world), NEAREST_PLACES * spacing / camera.pixels_per_unit)
     if camera.is_perspective:
@@ -225,9 +239,9 @@ def _reach(degree: int, size: float) -> float:
 
 
 def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
-    """(P, M) complex128: the directions of the field on screen, as long as they are seen.
+    """Return (P, M) complex128: the foreshortened directions of the field on screen.
 
-    M is the largest degree. A point with fewer directions, or without any, has zeros.
+    M is the largest degree. A point with fewer directions has zeros.
     """
     jacobian = screen_jacobians(gbuffer).astype(np.complex128)
     degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
@@ -252,16 +266,16 @@ def _screen_directions(gbuffer: GBuffer) -> np.ndarray:
 
 
 def _faces_camera(gbuffer: GBuffer) -> np.ndarray:
-    """(P,) bool: whether the surface is not too slanted for arrowheads."""
+    """Return (P,) bool: whether the surface is not too slanted for arrowheads."""
     degree = np.asarray(gbuffer.instance_degrees)[gbuffer.instance_id]
     limit = np.where(degree == 1, MIN_FACING, MIN_FACING_OF_SEVERAL)
     return dot(gbuffer.geometric_normal, gbuffer.view_direction) >= limit
 
 
 def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) -> np.ndarray:
-    """(P,) bool: whether nearer points are next to points in the picture.
+    """Return (P,) bool: whether a nearer point is next to a point in the picture.
 
-    Behind a point on a front side, any on a back side seems hidden.
+    A point on a back side also counts as hidden if it is behind a point on a front side.
     """
     column, row = (projected.position / spacing).astype(np.intp).T + 1
     shape = int(row.max(initial=0)) + 2, int(column.max(initial=0)) + 2
@@ -278,3 +292,172 @@ def _seems_hidden(projected: ProjectedPoints, gbuffer: GBuffer, spacing: float) 
         pixel = pixel * projected.depth
     is_far = projected.depth - nearest > HIDDEN_SPACINGS * spacing * pixel
     return is_far | (~gbuffer.front_facing & (projected.depth > nearest_front))
+
+
+# --- places ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePlaces:
+    """P places on a surface, from coarse levels to fine ones.
+
+    Attributes
+    ----------
+    triangle : (P,) int32 ndarray
+    barycentric : (P, 3) float64 ndarray
+    distance : (P,) float64 ndarray
+        Least distance to the places before, in Blender units of the rest shape.
+    level : int
+        The last level; -1 if there is none.
+    extent : float
+        The distance of level 0: the side of a square of the area of the surface.
+    """
+
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    distance: np.ndarray
+    level: int
+    extent: float
+
+    @property
+    def finest(self) -> float:
+        """The distance of the last level. No point of the surface is much farther from the nearest place."""
+        return level_distance(self.extent, self.level)
+
+
+def level_distance(extent: float, level: int) -> float:
+    """Return the least distance between the places of a level, given the distance `extent` of level 0."""
+    return extent * 2 ** (-level / LEVELS_PER_OCTAVE)
+
+
+def surface_places(surface: Surface, distance: float, cache: Cache) -> SurfacePlaces:
+    """Find places on a surface, up to the first level whose distance is at most `distance`.
+
+    Parameters
+    ----------
+    surface : Surface
+    distance : float
+        In Blender units of the rest shape.
+    cache : Cache
+        Stores the places. All deformations of a mesh have the same places.
+
+    Returns
+    -------
+    SurfacePlaces
+        May have further levels, but none after `MAX_LEVEL`.
+    """
+    key = "places", surface.rest_shape_key
+    places = cache.get(key)
+    if places is None:
+        extent = float(np.sqrt(rest_areas(surface).sum()))
+        places = SurfacePlaces(np.empty(0, np.int32), np.empty((0, 3)), np.empty(0), -1, extent)
+    last = _wanted_level(places.extent, distance)
+    if places.level >= last:
+        return places
+    report(0.0, "finding places of arrowheads")
+    density = CANDIDATES_PER_PLACE / level_distance(places.extent, last) ** 2
+    triangle, barycentric, rank = surface_samples(surface, density)
+    order = np.argsort(rank, kind="stable")
+    # The candidates of a level are the first ones in the order of their ranks.
+    triangle, barycentric, rank = triangle[order], barycentric[order], rank[order]
+    for level in range(places.level + 1, last + 1):
+        report(level / (last + 1), "finding places of arrowheads")
+        density = CANDIDATES_PER_PLACE / level_distance(places.extent, level) ** 2
+        count = int(np.searchsorted(rank, density))
+        places = _with_level(surface, places, triangle[:count], barycentric[:count])
+    return cache.put(key, places)
+
+
+def _wanted_level(extent: float, distance: float) -> int:
+    """Return the first level with a distance, or the finest; -1 if the surface has no area."""
+    if not extent:
+        return -1
+    levels = level_distance(extent, np.arange(MAX_LEVEL + 1))
+    return min(int(np.count_nonzero(levels > distance)), MAX_LEVEL)
+
+
+def _with_level(
+    surface: Surface, places: SurfacePlaces, triangle: np.ndarray, barycentric: np.ndarray
+) -> SurfacePlaces:
+    """Return places with one level more, chosen among points of triangles."""
+    level = places.level + 1
+    finest = level_distance(places.extent, level)
+    distance = np.concatenate([places.distance, np.full(len(triangle), finest)])
+    triangle = np.concatenate([places.triangle, triangle])
+    barycentric = np.concatenate([places.barycentric, barycentric])
+    corners = surface.in_rest_shape().vertices[surface.triangle_vertex[triangle]]
+    chosen = spaced_points(np.einsum("nk,nki->ni", barycentric, corners), finest)
+    return SurfacePlaces(
+        triangle[chosen], barycentric[chosen], distance[chosen], level, places.extent
+    )
+
+
+def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:
+    """Choose points greedily, with at least a distance between any two.
+
+    Parameters
+    ----------
+    position : (n, d) float64 ndarray
+        In order of preference.
+    spacing : float
+
+    Returns
+    -------
+    (K,) intp ndarray
+        The chosen points, in ascending order.
+
+    Notes
+    -----
+    The diagonal of a cell of the grid is the spacing, so a cell has at most one chosen point. In each round, all
+    points that come first in the 5^d cells around them are chosen, and the points near them are removed. The
+    result is the same as if one point after the other were chosen.
+    """
+    count, dimension = position.shape
+    if not count:
+        return np.empty(0, dtype=np.intp)
+    cell, around = _cells(position, spacing / np.sqrt(dimension))
+    cell_count = around.shape[1]
+    chosen = []
+    left = np.arange(count)
+    while len(left):
+        first = np.full(cell_count + 1, count)
+        first[cell[left[::-1]]] = left[::-1]
+        candidate = left[first[cell[left]] == left]
+        earliest = np.full(len(candidate), count)
+        for neighbor in around:
+            np.minimum(earliest, first[neighbor[cell[candidate]]], out=earliest)
+        new = candidate[earliest == candidate]
+        chosen.append(new)
+        taken = np.full(cell_count + 1, -1)
+        taken[cell[new]] = new
+        for neighbor in around:
+            other = taken[neighbor[cell[left]]]
+            near = np.flatnonzero(other >= 0)
+            if not len(near):
+                continue
+            step = position[left[near]] - position[other[near]]
+            is_near = (step * step).sum(axis=1) < spacing**2
+            left = np.delete(left, near[is_near])
+    return np.sort(np.concatenate(chosen))
+
+
+def _cells(position: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sort points into cells of a grid.
+
+    Returns
+    -------
+    cell : (n,) intp ndarray
+        The cell of each point, among the C cells that have points.
+    around : (5^d, C) intp ndarray
+        The cells around each of them, itself first; C where there is none.
+    """
+    index = ((position - position.min(axis=0)) / side).astype(np.int64) + 2
+    stride = np.cumprod([1, *(index.max(axis=0) + 3)])[:-1]
+    key, cell = np.unique(index @ stride, return_inverse=True)
+    steps = np.array(list(product(range(-2, 3), repeat=position.shape[1])))
+    steps = steps[np.argsort(np.abs(steps).sum(axis=1), kind="stable")]
+    around = np.empty((len(steps), len(key)), dtype=np.intp)
+    for step, out in zip(steps @ stride, around, strict=True):
+        place = np.minimum(np.searchsorted(key, key + step), len(key) - 1)
+        out[:] = np.where(key[place] == key + step, place, len(key))
+    return cell.reshape(-1), around

@@ -9,13 +9,12 @@ import numpy as np
 
 from ..core.color import from_hex, to_linear
 from ..field.blocks import concatenated_ranges
-from .draw_marks import draw_dot
+from .draw_marks import draw_dot, draw_over, window
 from .key_contents import ColorScale
 from .key_layout import Box, KeyLayout
-from .painting import draw_over, window
 
-#: Exponent of the transparency of dark text at the edges of letters. Light is mixed, and thin dark letters
-#: would look too light.
+#: Exponent of the transparency of dark text at the edges of letters. Colors are mixed in linear light, in which
+#: thin dark letters would look too light.
 DARK_TEXT_EXPONENT = 2.0
 
 #: Scan lines of a row of pixels in a text. Along a scan line the coverage is exact.
@@ -41,7 +40,7 @@ class KeyColors:
     plate_opacity: float
 
 
-#: Keys that can be read on any background; each looks best on backgrounds like its plate.
+#: Colors that are legible on any background. Each looks best on a background like its plate.
 LIGHT_PLATES = KeyColors("#141414", "#ffffff", 0.85)
 DARK_PLATES = KeyColors("#f5f5f5", "#141414", 0.88)
 
@@ -61,7 +60,7 @@ def draw_key(
         Linear, not premultiplied, rows from the bottom.
     layout : KeyLayout
     color_scale : ColorScale or None
-        What the color bar shows, if there is one.
+        Contents of the color bar, if there is one.
     text_triangles : callable
         Returns the (n, 3, 2) triangles of a line of text, in text sizes from its left end and baseline.
     colors : KeyColors
@@ -88,11 +87,11 @@ def _draw_plate(
     low, high = np.array(box[:2]), np.array(box[2:])
     part, x, y = window(rgba, low, high)
     center, half = (low + high) / 2, (high - low) / 2 - radius
-    beyond = (
-        np.maximum(np.abs(x - center[0]) - half[0], 0),
-        np.maximum(np.abs(y - center[1]) - half[1], 0),
+    beyond_x, beyond_y = (
+        np.maximum(np.abs(values - center[axis]) - half[axis], 0)
+        for axis, values in enumerate((x, y))
     )
-    draw_over(part, color, opacity * np.clip(radius + 0.5 - np.hypot(*beyond), 0, 1))
+    draw_over(part, color, opacity * np.clip(radius + 0.5 - np.hypot(beyond_x, beyond_y), 0, 1))
 
 
 def _draw_color_bar(rgba: np.ndarray, box: Box, color_scale: ColorScale) -> None:
@@ -137,7 +136,7 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
     triangles : (n, 3, 2) float ndarray
         Corners in pixels from the lower left, y up, in any order. They do not overlap.
     width, height : int
-        Of the window, pixels. What is outside is cut away.
+        Size of the window in pixels. Triangles are clipped to it.
 
     Returns
     -------
@@ -156,12 +155,8 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
     x, y, level = x[owner], y[owner], line + 0.5
     is_lower = level < y[:, 1]
     start = np.where(is_lower, 0, 1)
-    rows = np.arange(len(owner))
-    short_side = _crossing(
-        x[rows, start], y[rows, start], x[rows, start + 1], y[rows, start + 1], level
-    )
-    long_side = _crossing(x[:, 0], y[:, 0], x[:, 2], y[:, 2], level)
-    left, right = np.minimum(short_side, long_side), np.maximum(short_side, long_side)
+    sides = _crossing(x, y, start, start + 1, level), _crossing(x, y, 0 * start, 2, level)
+    left, right = np.minimum(*sides), np.maximum(*sides)
     total = np.zeros(height * (width + 1))
     for end, sign in ((left, 1.0), (right, -1.0)):
         end = np.clip(end, 0, width)
@@ -175,9 +170,11 @@ def triangle_coverage(triangles: np.ndarray, width: int, height: int) -> np.ndar
 
 
 def _crossing(
-    x0: np.ndarray, y0: np.ndarray, x1: np.ndarray, y1: np.ndarray, level: np.ndarray
+    x: np.ndarray, y: np.ndarray, first: np.ndarray, last: np.ndarray | int, level: np.ndarray
 ) -> np.ndarray:
-    """Return the x of the points of edges at a level of y, which is between the ends."""
-    rise = y1 - y0
+    """Return the x of points between the corners `first` and `last` of triangles, at a level of y."""
+    rows = np.arange(len(x))
+    x0, y0 = x[rows, first], y[rows, first]
+    rise = y[rows, last] - y0
     along = np.divide(level - y0, rise, out=np.zeros_like(level), where=rise > 0)
-    return x0 + np.clip(along, 0, 1) * (x1 - x0)
+    return x0 + np.clip(along, 0, 1) * (x[rows, last] - x0)

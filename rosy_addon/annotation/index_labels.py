@@ -24,7 +24,7 @@ MIN_STROKE_WIDTH = 1.0
 MAX_LABELS = 250
 
 
-#: Where a label goes beside its dot, the best place first: right or left, above or below.
+#: Places of a label beside its dot, in the order of preference: right or left, above or below.
 SIDES = ((1, 1), (-1, 1), (1, -1), (-1, -1))
 
 
@@ -36,7 +36,7 @@ class Label:
     ----------
     text : str
     left, bottom, height : float
-        Of the letters, pixels.
+        Position and height of the letters, pixels.
     """
 
     text: str
@@ -59,7 +59,7 @@ def placed_labels(marks: SingularityMarks) -> list[Label]:
     Returns
     -------
     list of Label
-        Empty if there are to be none, or more than `MAX_LABELS`.
+        Empty if the marks have no labels, or if there would be more than `MAX_LABELS`.
     """
     visible = np.flatnonzero(marks.is_visible)
     if not marks.has_labels or len(visible) > MAX_LABELS:
@@ -137,7 +137,7 @@ def place_labels(
     sizes : (K, 2) float ndarray
         Widths and heights of the labels in pixels.
     radius : (K,) ndarray or float
-        Of the dots, in pixels.
+        Radii of the dots, in pixels.
     frame : (int, int)
         Width and height of the picture in pixels. No label reaches beyond it.
 

@@ -1,4 +1,4 @@
-"""What the key of a picture says about it."""
+"""The contents of the key of a picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .singularity_marks import SingularityMarks
 
 @dataclass(frozen=True)
 class ColorScale:
-    """What the color map of a picture shows.
+    """The quantity that the color map of a picture shows, and its range.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class IndexCount:
 
 @dataclass(frozen=True)
 class PictureKey:
-    """What the key of a picture says about it.
+    """The contents of the key of a picture.
 
     Attributes
     ----------
@@ -76,12 +76,12 @@ class PictureKey:
     dot_size: float = 0.0
 
     def to_json(self) -> str:
-        """Return it as text, for `from_json`."""
+        """Return the key as text, for `from_json`."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> PictureKey:
-        """Return what `to_json` has written. An empty key if the text is from another version."""
+        """Return the key that `to_json` has written. It is empty if the text is from another version."""
         try:
             values = json.loads(text)
             scale = values["color_scale"]
@@ -101,7 +101,7 @@ def count_indices(marks: SingularityMarks) -> tuple[IndexCount, ...]:
 
 
 def sorted_indices(kinds: np.ndarray, *, has_counts: bool) -> tuple[IndexCount, ...]:
-    """Return the distinct ones of (K, 2) indices and degrees, the largest index first."""
+    """Return the distinct rows of (K, 2) indices and degrees, the largest index first."""
     distinct, counts = np.unique(kinds.reshape(-1, 2), axis=0, return_counts=True)
     entries = [
         IndexCount(index, degree, count if has_counts else None)

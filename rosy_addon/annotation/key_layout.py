@@ -17,10 +17,10 @@ from .key_contents import ColorScale, IndexCount
 from .round_numbers import MINUS, tick_labels
 from .singularity_marks import OUTLINE, dot_diameters
 
-#: Text size if none is given, as a fraction of the smaller side of the frame, and the least one in pixels.
+#: Text size if none is given, as a fraction of the smaller side of the frame, and its least value in pixels.
 TEXT_SIZE, MIN_TEXT_SIZE = 0.022, 9.0
 
-#: Factor by which everything is made smaller until it fits, and the text size in pixels that is the end.
+#: Factor by which everything is made smaller until it fits, and text size in pixels at which this ends.
 SHRINK, END_TEXT_SIZE = 0.94, 2.0
 
 #: Distance of plates from the edges of the frame, as a fraction of its smaller side.
@@ -40,7 +40,7 @@ BAR_WIDTH, TICK_LENGTH, LABEL_GAP, TITLE_GAP = 0.9, 0.35, 0.35, 1.0
 #: Largest and smallest length of the color bar, and the largest as a fraction of the height of the frame.
 MAX_BAR, MIN_BAR, MAX_BAR_FRACTION = 20.0, 5.0, 0.5
 
-#: Least distance of labels of the bar, and of the title's width to that of a line of it.
+#: Least distance of the labels of the color bar, and width at which its title is wrapped.
 TICK_DISTANCE, TITLE_WIDTH = 2.0, 9.0
 
 #: Distance of the rows of the legend, and of the labels from the dots.
@@ -214,7 +214,7 @@ class _Arrangement:
         return self.result if self._fits() else None
 
     def _fits(self) -> bool:
-        """Whether all plates are inside the frame, and apart."""
+        """Return whether all plates are inside the frame and none overlap."""
         low, high = np.array(self.result.plates).reshape(-1, 2, 2).transpose(1, 0, 2)
         meets = ((low[:, None] < high[None]) & (high[:, None] > low[None])).all(axis=2)
         return bool((low >= 0).all() and (high <= self.frame).all()) and meets.sum() == len(low)
@@ -224,7 +224,7 @@ class _Arrangement:
         return self.size * max((self.text_width(text) for text in texts), default=0.0)
 
     def _bottom(self, left: float, width: float) -> float:
-        """Return the lowest bottom of a plate between left and right: above the caption, or beside it."""
+        """Return the lowest bottom of a plate with this left side and width: above the caption, or beside it."""
         gap = PLATE_GAP * self.size
         if self.parts.caption.strip():
             caption_left, _, caption_right, caption_top = self.result.plates[0]
@@ -243,6 +243,9 @@ class _Arrangement:
         )
         return left + padding, bottom + padding
 
+    def _add_text(self, text: str, left: float, baseline: float) -> None:
+        self.result.texts.append(PlacedText(text, left, baseline))
+
     def _plate_size(self, length: float) -> float:
         """Return a side of the plate of contents of a size."""
         return round(length) + 2 * round(PADDING * self.size)
@@ -259,7 +262,7 @@ class _Arrangement:
         for number, line in enumerate(lines):
             indent = (text_width - self._width([line])) / 2
             baseline = bottom + (DESCENT + LINE * (len(lines) - 1 - number)) * size
-            self.result.texts.append(PlacedText(line, left + indent, baseline))
+            self._add_text(line, left + indent, baseline)
 
     def _scale_bar(self, length: float, label: str) -> None:
         """Place the scale bar."""
@@ -278,9 +281,7 @@ class _Arrangement:
             (start, bottom, start + stroke, bottom + end),
             (start + length - stroke, bottom, start + length, bottom + end),
         ]
-        self.result.texts.append(
-            PlacedText(label, left + (width - label_width) / 2, bottom + end + SCALE_GAP * size)
-        )
+        self._add_text(label, left + (width - label_width) / 2, bottom + end + SCALE_GAP * size)
 
     def _legend(self) -> float:
         """Place the legend of the singularities, and return its top."""
@@ -301,12 +302,9 @@ class _Arrangement:
             parts.indices, labels, diameters.tolist(), heights.tolist(), strict=True
         ):
             y = top - row / 2
-            self.result.dots.append(
-                PlacedDot(left + column / 2, y, diameter / 2 - outline, outline, entry.index)
-            )
-            self.result.texts.append(
-                PlacedText(label, left + column + DOT_GAP * size, y - CAP_HEIGHT / 2 * size)
-            )
+            radius = diameter / 2 - outline
+            self.result.dots.append(PlacedDot(left + column / 2, y, radius, outline, entry.index))
+            self._add_text(label, left + column + DOT_GAP * size, y - CAP_HEIGHT / 2 * size)
             top -= row + ROW_GAP * size
         return self.result.plates[-1][3]
 
@@ -315,20 +313,19 @@ class _Arrangement:
         size, stroke = self.size, self.result.stroke
         width, height = self.frame
         title = wrapped(scale.title, TITLE_WIDTH, self.text_width)
-        title_height = 0.0
+        # Half a label is below the bar, and half a label or the title above it.
+        above = CAP_HEIGHT / 2 * size
         if title:
-            title_height = (TITLE_GAP + CAP_HEIGHT + LINE * (len(title) - 1)) * size
-        # Half a label is below the bar, and above it, if there is no title.
-        around = CAP_HEIGHT / 2 * size + max(title_height, CAP_HEIGHT / 2 * size)
+            above = (TITLE_GAP + CAP_HEIGHT + LINE * (len(title) - 1)) * size
+        around = CAP_HEIGHT / 2 * size + above
         widest = max(self._width(title), 8 * size)
         lowest = max(lowest, self._bottom(width - self.margin - self._plate_size(widest), width))
         room = height - self.margin - lowest - self._plate_size(around)
         length = int(min(MAX_BAR_FRACTION * height, MAX_BAR * size, room))
         if length < MIN_BAR * size:
             return False
-        ticks = _ticks(
-            scale, int(length / (TICK_DISTANCE * size)), CAP_HEIGHT * 1.7 * size / length
-        )
+        max_steps = int(length / (TICK_DISTANCE * size))
+        ticks = _ticks(scale, max_steps, CAP_HEIGHT * 1.7 * size / length)
         beside = (TICK_LENGTH + LABEL_GAP) * size + self._width([label for _, label in ticks])
         content = max(BAR_WIDTH * size + beside, self._width(title))
         plate_height = self._plate_size(around + length)
@@ -344,19 +341,13 @@ class _Arrangement:
         self.result.strokes += _frame_strokes(bar, stroke)
         for fraction, label in ticks:
             y = bar_bottom + fraction * (length - stroke)
-            self.result.strokes.append(
-                (right, round(y), right + round(TICK_LENGTH * size), round(y) + stroke)
-            )
-            self.result.texts.append(
-                PlacedText(
-                    label,
-                    right + (TICK_LENGTH + LABEL_GAP) * size,
-                    y + stroke / 2 - CAP_HEIGHT / 2 * size,
-                )
-            )
+            end = right + round(TICK_LENGTH * size)
+            self.result.strokes.append((right, round(y), end, round(y) + stroke))
+            baseline = y + stroke / 2 - CAP_HEIGHT / 2 * size
+            self._add_text(label, right + (TICK_LENGTH + LABEL_GAP) * size, baseline)
         for number, line in enumerate(title):
             above = TITLE_GAP + LINE * (len(title) - 1 - number)
-            self.result.texts.append(PlacedText(line, left, bar_bottom + length + above * size))
+            self._add_text(line, left, bar_bottom + length + above * size)
         return True
 
 

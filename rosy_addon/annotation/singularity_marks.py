@@ -45,9 +45,9 @@ class SingularityMarks:
     degree : (K,) int ndarray
         N.
     depth : (K,) float64 ndarray
-        Nearer ones are drawn over those farther away.
+        Nearer dots are drawn over farther ones.
     is_visible : (K,) bool ndarray
-        Hidden ones are drawn faded, below all others and without labels.
+        Hidden dots are drawn faded, below all others and without labels.
     frame : (int, int)
         Width and height of the picture, pixels.
     size : float
@@ -69,11 +69,11 @@ class SingularityMarks:
         return len(self.index)
 
     def part(self, chosen: np.ndarray) -> SingularityMarks:
-        """Return those that a mask or indices choose."""
+        """Return the marks that a mask or indices choose."""
         return part_of(self, chosen)
 
     def in_drawing_order(self) -> SingularityMarks:
-        """Return them in the order in which they are drawn."""
+        """Return the marks in the order in which they are drawn."""
         return self.part(np.lexsort((-self.depth, self.is_visible)))
 
     @property
@@ -107,10 +107,10 @@ def singularity_marks(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Those without a field only hide others.
+        Instances without a field only hide singularities.
     camera : Camera
     settings : Look or StrokeStyle
-        Says which singularities are drawn, and how. No setting but those of `singularity_settings` is read.
+        Which singularities are drawn, and how. Only the settings of `singularity_settings` are read.
     clip_planes : (6, 4) float64 ndarray, optional
         World space. The negative side of each plane is cut away.
     cache : Cache, optional
@@ -148,9 +148,9 @@ def singularity_marks(
 
 
 def cached_singularities(instance: MeshInstance, cache: Cache) -> tuple[np.ndarray, np.ndarray]:
-    """Find the singularities of an instance with a field, or return those in the cache.
+    """Find the singularities of an instance with a field, or return them from the cache.
 
-    They are the same for all deformations of a mesh. See `field.singularities.find_singularities`.
+    All deformations of a mesh have the same singularities. See `field.singularities.find_singularities`.
     """
     surface, field = instance.surface, instance.field
     return cache.get_or_create(

@@ -130,7 +130,7 @@ def strokes(
     plotter : bool
         Lines of constant width, in an order that keeps the travel of the pen short.
     **style
-        Settings of `line_drawing.style.StrokeStyle`: ``spacing=6, tone=True, outline=True``.
+        Settings of `line_drawing.style.StrokeStyle`: ``spacing=6, light="lamp", outline=True``.
         `spacing` is in pixels; `distance` is the spacing in units of the mesh.
 
     Returns

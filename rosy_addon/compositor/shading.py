@@ -77,7 +77,7 @@ def lights_of(look: HasLight, lights: Sequence[Light]) -> Sequence[Light]:
 
     There are none for the headlight.
     """
-    return {"headlight": (), "lamp": (KEY_LIGHT,), "scene": lights}[look.light]
+    return {"lamp": (KEY_LIGHT,), "scene": lights}.get(look.light, ())
 
 
 def diffuse(

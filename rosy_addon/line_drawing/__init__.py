@@ -1,1 +1,1 @@
-"""Hatching: evenly spaced streamlines on surfaces, drawn as strokes. Numpy only."""
+"""Strokes: evenly spaced streamlines on surfaces, as curves and files. Numpy only."""

@@ -1,4 +1,4 @@
-"""Drawings in strokes as files and as curves in world space, in one function each."""
+"""Drawings in strokes as files and as curves in world space."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.cache import BAKE_CACHE
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.frames import dot
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -21,19 +21,16 @@ from .style import StrokeStyle
 from .svg import Pen, svg_text
 from .visibility import pixel_size
 
-#: Share of the time after which all strokes are drawn.
-OUTPUT_START = 0.95
-
-#: Label of what comes then.
-OUTPUT_LABEL = "storing the strokes"
+#: Share of the time after which all strokes are drawn, and label of the progress from then on.
+OUTPUT_START, OUTPUT_LABEL = 0.95, "storing the strokes"
 
 #: Largest tangent of the angle between the normal and the direction to the camera for which the
 #: offset toward the camera grows.
 MAX_OFFSET_STEEPNESS = 12.0
 
 
-class SurfacePoints(NamedTuple):
-    """Points at a height above the triangles of a mesh.
+class SurfaceAttachment(NamedTuple):
+    """Where n points of curves are on a mesh, so that they can follow it when it deforms.
 
     Attributes
     ----------
@@ -42,7 +39,7 @@ class SurfacePoints(NamedTuple):
     weights : (n, 3) float64 ndarray
         Barycentric coordinates.
     height : (n,) float64 ndarray
-        Along the normals of the vertices, in world space.
+        Height above the triangle along the normals of its vertices, in world space.
     """
 
     vertices: np.ndarray
@@ -66,7 +63,7 @@ class StrokeGeometry:
         Radii in world space.
     colors : list of str
         The color of each family.
-    places : SurfacePoints or None
+    attachment : SurfaceAttachment or None
         Where the points are on their surface, if they are to follow it.
     """
 
@@ -75,7 +72,7 @@ class StrokeGeometry:
     points: np.ndarray
     radius: np.ndarray
     colors: list[str]
-    places: SurfacePoints | None = None
+    attachment: SurfaceAttachment | None = None
 
 
 def drawing_file(
@@ -86,12 +83,12 @@ def drawing_file(
     pen: Pen,
     lights: Sequence[LightSource],
 ) -> tuple[StrokeDrawing, bytes]:
-    """Draw mesh instances in strokes, and return the drawing and the contents of its file.
+    """Return a drawing of mesh instances in strokes, and the contents of its file.
 
     Parameters
     ----------
     suffix : str
-        Of the file: .svg, or one of `polyline_file`.
+        Suffix of the file: .svg, or one of `polyline_file`.
     instances, camera, style, lights
         As for `draw_instances`.
     pen : Pen
@@ -113,7 +110,7 @@ def drawing_curves(
     lights: Sequence[LightSource],
     follows: MeshInstance | None,
 ) -> tuple[StrokeDrawing, StrokeGeometry]:
-    """Draw mesh instances in strokes, and return the drawing and its curves; see `stroke_geometry`."""
+    """Return a drawing of mesh instances in strokes, and its curves; see `stroke_geometry`."""
     drawing = _draw(instances, camera, style, lights, clip_to_frame=False)
     with progress(OUTPUT_START, 1.0, OUTPUT_LABEL):
         return drawing, stroke_geometry(drawing, camera, pen, follows)
@@ -127,7 +124,7 @@ def _draw(
     *,
     clip_to_frame: bool,
 ) -> StrokeDrawing:
-    """Draw with the cache of bakes in the process that calls it."""
+    """Draw with the cache of bakes of this process."""
     with progress(0.0, OUTPUT_START):
         drawing = draw_instances(
             instances, camera, style, lights=lights, clip_to_frame=clip_to_frame, cache=BAKE_CACHE
@@ -148,25 +145,22 @@ def stroke_geometry(
     pen : Pen
         Its width is in pixels of the camera.
     follows : MeshInstance, optional
-        The instance that all strokes are on, if they are to follow its surface.
+        The instance of all strokes, if they are to follow its surface.
     """
-    label = "simplifying strokes"
-    with progress(0.0, 0.8, label):
-        strokes = simplify_strokes(drawing.strokes, camera)
-    report(0.8, label)
+    strokes = simplify_strokes(drawing.strokes, camera)
     # Hidden strokes may face away from the camera. An offset toward it would move them into the
     # surface.
-    places = None
+    attachment = None
     if drawing.hidden or follows is not None:
         height = pen.width * pixel_size(strokes.points, camera)
         points = strokes.points + height[:, None] * strokes.normal
         if follows is not None:
-            places = surface_points(strokes, height, follows)
+            attachment = attach(strokes, height, follows)
     else:
         points = offset_toward_camera(strokes, camera, pen.width)
     radius = pen.width / 2 * pixel_size(points, camera) * strokes.width
     colors = pen.family_colors(strokes.names)
-    return StrokeGeometry(strokes, drawing.instance_index, points, radius, colors, places)
+    return StrokeGeometry(strokes, drawing.instance_index, points, radius, colors, attachment)
 
 
 def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.ndarray:
@@ -195,8 +189,8 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
     return strokes.points + offset[:, None] * to_camera
 
 
-def surface_points(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> SurfacePoints:
-    """Return the places of the points of strokes.
+def attach(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> SurfaceAttachment:
+    """Return where the points of strokes are on the surface of an instance.
 
     Parameters
     ----------
@@ -204,7 +198,7 @@ def surface_points(strokes: Strokes, height: np.ndarray, instance: MeshInstance)
     height : (n,) float64 ndarray
         Heights of the points above the surface, in world space.
     instance : MeshInstance
-        The instance that all strokes are on.
+        The instance of all strokes.
     """
     surface = instance.surface
     corners = surface.triangle_vertex[strokes.triangle]
@@ -218,4 +212,4 @@ def surface_points(strokes: Strokes, height: np.ndarray, instance: MeshInstance)
     along_u, along_v = (vv * pu - uv * pv) / determinant, (uu * pv - uv * pu) / determinant
     weights = np.stack([1 - along_u - along_v, along_u, along_v], axis=1)
     weights[is_flat] = 1 / 3
-    return SurfacePoints(corners.astype(np.int32), weights, height)
+    return SurfaceAttachment(corners.astype(np.int32), weights, height)

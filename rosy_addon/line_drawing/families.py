@@ -50,7 +50,6 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
     if labels is None:
         reference = _members_near_guide(mesh, reference, right)
         labels = np.broadcast_to(np.arange(family_count), (len(reference), family_count))
-    report(0.9, "matching families")
     middle = (strokes.start[:-1] + strokes.start[1:]) // 2
     triangle = strokes.triangle[middle]
     member = mesh.to_frame(triangle, strokes.member[middle])
@@ -62,20 +61,25 @@ def label_families(strokes: Strokes, mesh: TangentMesh, right: np.ndarray | None
 def reference_members(mesh: TangentMesh) -> np.ndarray:
     """Return (T,) complex128: one unit member at the center of each triangle, in its frame.
 
-    It is the member nearest to the x axis of the frame. If the field labels one line consistently
-    (`TangentMesh.family_z`), it is a member on that line.
+    The member is the nearest one to the x axis of the frame. If the field labels one line consistently
+    (`TangentMesh.family_z`), the member is on this line.
     """
     near = np.ones(len(mesh.z), dtype=np.complex128)
-    if mesh.family_z is not None and (mesh.family_z != 0).any():
+    if _has_family_z(mesh):
         # The stored member is on the same line everywhere. Count from that line.
         near = np.exp(1j * np.angle(mesh.family_z) * mesh.family_count / mesh.degree)
     return _members_at_centers(mesh, near)
 
 
-def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
-    """Return (T,) complex128: the members at the centers of triangles that are nearest to others.
+def _has_family_z(mesh: TangentMesh) -> bool:
+    """Return whether the field labels one of its lines consistently."""
+    return mesh.family_z is not None and bool(mesh.family_z.any())
 
-    The member where the field is zero is any.
+
+def _members_at_centers(mesh: TangentMesh, near: np.ndarray) -> np.ndarray:
+    """Return (T,) complex128: the members at the centers of triangles that are nearest to unit tangents.
+
+    Where the field is zero, the result is an arbitrary unit tangent.
     """
     z = mesh.z.sum(axis=1)
     return nearest_member(near, np.where(z != 0, z, 1), mesh.degree)
@@ -93,14 +97,11 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
     Lines are counted counter-clockwise from `reference_members`. Returns None if different lines of
     a triangle are connected by a path over the surface.
     """
-    label = "matching families"
-    report(0.0, label)
     family_count, count = mesh.family_count, len(mesh.z)
-    if mesh.family_z is not None and (mesh.family_z != 0).any():
+    if _has_family_z(mesh):
         return np.broadcast_to(np.arange(family_count), (count, family_count))
     reference = reference_members(mesh)
     triangle, other, edge, _ = shared_edges(mesh)
-    report(0.2, label)
     transported = reference[triangle] * mesh.edge_transport[triangle, edge]
     shift = member_offset(
         nearest_member(transported, mesh.z[other].sum(axis=1), mesh.degree),
@@ -111,21 +112,20 @@ def global_labels(mesh: TangentMesh) -> np.ndarray | None:
     node = triangle[:, None] * family_count + slots
     other_node = other[:, None] * family_count + (slots + shift[:, None]) % family_count
     pairs = np.stack([node.ravel(), other_node.ravel()], axis=1)
-    with progress(0.4, 0.8, label):
+    with progress(0.4, 0.8, "matching families"):
         component = connected_components(count * family_count, pairs)
     component = component.reshape(count, family_count)
-    for a in range(family_count):
-        for b in range(a):
-            if (component[:, a] == component[:, b]).any():
-                return None
+    in_order = np.sort(component, axis=1)
+    if (in_order[:, 1:] == in_order[:, :-1]).any():
+        return None
     return _order_labels(mesh, component, reference)
 
 
 def _order_labels(mesh: TangentMesh, component: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Number the components of the covering from 0 in each connected part of the surface.
 
-    The order is that of the lines in the first triangle of the part, counter-clockwise from the
-    line nearest to the guide direction.
+    The lines of the first triangle of the part are numbered counter-clockwise, beginning with the line
+    nearest to the guide direction.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ class LateralNeighbors(NamedTuple):
     rejected : (n,) bool ndarray
         Whether the sample is too near to an older one, or has yielded.
     yielded : (n,) bool ndarray
-        Whether a gap beside it is too wide for one stroke and too narrow for two.
+        Whether a gap beside the sample is too wide for one stroke and too narrow for two.
     covering : CoveringPairs
         The accepted samples and the neighbors beside them, at most `MAX_COVERED_GAP` away.
     """
@@ -120,9 +120,9 @@ def find_lateral_neighbors(
     min_separation, max_gap : float
         In spacings, as in `SeparationRules`.
     previous : (n,) ndarray of int, optional
-        For the samples that were added last, sorted by step: index into `sample` of the sample before
-        this one at the same end of a stroke, or -1. Then a sample is compared only with samples of
-        its step and before, and it is rejected if the previous one is.
+        Only if `sample` are the samples that were added last, sorted by step. Index into `sample` of the
+        sample before it at the same end of a stroke, or -1. A sample is then compared only with samples
+        of the same or an earlier step, and it is rejected if its previous sample is rejected.
     """
     pairs = _comparable_pairs(samples, sample)
     spacing = (samples.spacing[pairs.sample] + samples.spacing[pairs.neighbor]) / 2
@@ -220,10 +220,9 @@ def _rows_of(columns: tuple[np.ndarray, ...], first: int, end: int) -> tuple[np.
 
 def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
     """Return the pairs of a given sample and another of its family that is near on the surface."""
+    radius = SEARCH_RADIUS * samples.spacing[sample]
     query, neighbor = samples.grid.pairs_within(
-        samples.position[sample],
-        SEARCH_RADIUS * samples.spacing[sample],
-        samples.direction[sample],
+        samples.position[sample], radius, samples.direction[sample]
     )
     blocks = [
         _comparable_block(samples, sample, query[part], neighbor[part])
@@ -237,16 +236,13 @@ def _comparable_pairs(samples: StrokeSamples, sample: np.ndarray) -> _Pairs:
 def _comparable_block(
     samples: StrokeSamples, sample: np.ndarray, query: np.ndarray, neighbor: np.ndarray
 ) -> _Pairs:
-    """Return those of some pairs near in space that `_comparable_pairs` returns."""
+    """Return `_comparable_pairs`, given pairs of samples that are near each other in space."""
     current = sample[query]
     arc_gap = np.abs(samples.arc.take(current) - samples.arc.take(neighbor))
     keep = samples.stroke.take(current) != samples.stroke.take(neighbor)
     keep = np.flatnonzero(keep | (arc_gap > MIN_SELF_ARC * samples.spacing.take(current)))
     query, current, neighbor = query.take(keep), current.take(keep), neighbor.take(keep)
-    frame, neighbor_frame = (
-        samples.frame.take(current, axis=0),
-        samples.frame.take(neighbor, axis=0),
-    )
+    frame, neighbor_frame = (samples.frame.take(one, axis=0) for one in (current, neighbor))
     normal_cosine = dot(frame[:, 1], neighbor_frame[:, 1])
     keep = normal_cosine > MIN_NORMAL_COSINE
     keep &= samples.mesh.is_same_family(
@@ -262,7 +258,7 @@ def _comparable_block(
     # Project the difference of the positions along the mean normal.
     offset = delta.take(keep, axis=0)
     offset -= (height / normal_sum_squared).take(keep)[:, None] * normal_sum.take(keep, axis=0)
-    # Correct the length of the chord to that of the arc on the bent surface.
+    # Correct the length of the chord to the length of the arc on the bent surface.
     offset *= (1 + (1 - normal_cosine.take(keep)) / 12)[:, None]
     return _Pairs(
         query.take(keep),
@@ -280,11 +276,8 @@ def _is_older(samples: StrokeSamples, pairs: _Pairs) -> np.ndarray:
     If both were added in the same step, the sample of the stroke with the lower number is older.
     """
     step, neighbor_step = samples.step[pairs.sample], samples.step[pairs.neighbor]
-    older = neighbor_step < step
-    older |= (neighbor_step == step) & (
-        samples.stroke[pairs.neighbor] < samples.stroke[pairs.sample]
-    )
-    return older
+    has_lower_stroke = samples.stroke[pairs.neighbor] < samples.stroke[pairs.sample]
+    return (neighbor_step < step) | ((neighbor_step == step) & has_lower_stroke)
 
 
 def _left_component(vectors: np.ndarray, frame: np.ndarray) -> np.ndarray:

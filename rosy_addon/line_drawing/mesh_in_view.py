@@ -1,11 +1,11 @@
-"""The part of a tangent mesh that can be in the picture, and in it the triangles that matter.
+"""The part of a tangent mesh on which strokes are traced: what is in the frame, and what is visible.
 
-Strokes are traced only there. Beyond the frame and behind the camera, the size of a pixel has no lower
-limit, so strokes there could be without number.
+Beyond the frame and behind the camera, the size of a pixel has no lower limit, so the number of strokes
+there would have no upper limit.
 
-Strokes that nobody sees need not be traced either: on most models, that is half of them. Strokes keep their
-distances only from those beside them, so those in view are as if the hidden part had strokes, too, if
-tracing goes on a little beyond what is seen.
+Hidden strokes are not traced either: on most models, that is half of them. A stroke keeps its distance only
+from the strokes beside it. So visible strokes are the same as on the whole mesh if tracing continues a
+little beyond the visible triangles.
 """
 
 from __future__ import annotations
@@ -24,14 +24,15 @@ from .tangent_mesh import TangentMesh, take_triangles, with_corners
 from .visibility import BLOCK_POINTS, DepthBuffer, in_frame, planes_around, project_to_pixels
 
 #: Distance from the frame up to which strokes are traced, in pixels and as a fraction of the frame; the
-#: lesser of both counts. Strokes then reach the frame as if the mesh went on.
+#: smaller one counts. Strokes then reach the frame as if the mesh continued.
 MARGIN_PIXELS, MARGIN_RATIO = 64.0, 0.125
 
-#: Triangles are cut at planes of constant depth, each this many times as far away as the one before, if
-#: one of them has a larger ratio of depths than `MAX_DEPTH_RATIO`: spacings are interpolated in triangles.
+#: If the depths in a triangle differ by more than the factor `MAX_DEPTH_RATIO`, triangles are cut at planes of
+#: constant depth, each `DEPTH_STEP` times as far away as the one before. Spacings are interpolated linearly
+#: in triangles, and proportional to the depth.
 DEPTH_STEP, MAX_DEPTH_RATIO = 2.0, 4.0
 
-#: Distance from triangles that are seen up to which strokes are traced, in spacings.
+#: Distance from visible triangles up to which strokes are traced, in spacings.
 HIDDEN_MARGIN = 6.0
 
 
@@ -51,7 +52,7 @@ class Parts:
     weights: np.ndarray
 
     def corner_values(self, values: np.ndarray) -> np.ndarray:
-        """Return (T', 3, ...) values at the corners, given those of the (T, 3, ...) whole ones."""
+        """Return (T', 3, ...) values at the corners, given (T, 3, ...) values of the whole triangles."""
         return np.einsum("tkj,tj...->tk...", self.weights, values[self.triangle])
 
 
@@ -62,7 +63,7 @@ class MeshInView(Parts):
     Attributes
     ----------
     mesh : TangentMesh
-        The part. `triangle_vertex` is that of the whole triangles.
+        The part. `triangle_vertex` holds the vertices of the whole triangles.
     """
 
     mesh: TangentMesh
@@ -81,7 +82,7 @@ class MeshInView(Parts):
 
 
 def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
-    """Cut off what is beyond the frame, by more than a margin, or in front of the near plane.
+    """Return a mesh without what is outside the frame and its margin, or in front of the near plane.
 
     Parameters
     ----------
@@ -93,8 +94,7 @@ def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
     MeshInView
         Has no neighbors across the cut. It may have no triangles.
     """
-    label = "finding the part in view"
-    report(0.0, label)
+    report(0.0, "finding the part in view")
     x, y, z, w = _clip_coordinates(mesh.points, camera)
     right, top = (
         w * (1 + 2 * min(MARGIN_PIXELS / side, MARGIN_RATIO))
@@ -104,16 +104,14 @@ def mesh_in_view(mesh: TangentMesh, camera: Camera) -> MeshInView:
     pieces = _Pieces(
         whole.triangle, whole.weights, mesh.neighbor, mesh.neighbor_edge, mesh.edge_transport
     )
-    for index, distance in enumerate((z + w, right - x, right + x, top - y, top + y)):
-        report(0.1 * index, label)
+    for distance in (z + w, right - x, right + x, top - y, top + y):
         pieces = pieces.cut(distance, keeps_both=False)
     if camera.is_perspective:
         for depth in _depths_of_cuts(pieces.corner_values(w)):
-            report(0.5, label)
+            report(0.5, "finding the part in view")
             pieces = pieces.cut(w - depth, keeps_both=True)
     if pieces.neighbor is mesh.neighbor:
         return whole
-    report(0.9, label)
     return pieces.apply(mesh)
 
 
@@ -143,10 +141,7 @@ def _depths_of_cuts(depth: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Pieces(Parts):
-    """Parts of triangles, and the parts that are beside them.
-
-    The attributes are those of `TangentMesh` with the same names.
-    """
+    """Parts of triangles and their adjacency; see `TangentMesh` for the attributes."""
 
     neighbor: np.ndarray
     neighbor_edge: np.ndarray
@@ -177,8 +172,8 @@ class _Pieces(Parts):
         on_ab = self._crossing(value, crossed, a, b)
         on_ac = self._crossing(value, crossed, a, c)
         at_a, at_b, at_c = (self.weights[crossed, corner] for corner in (a, b, c))
-        # Edges are those of before, by triangle and number; or, if negative, the inner edges of a
-        # triangle that is cut: the cut, seen from the tip, from the rest, and the diagonal of the rest.
+        # Edges have the numbers 3 t + k from before the cut. Negative numbers are new edges in a triangle
+        # that is cut: the cut, as an edge of the tip and of the rest, and the diagonal of the rest.
         edge_a, edge_b, edge_c = (3 * crossed + corner for corner in (a, b, c))
         cut_of_tip, cut_of_rest, diagonal, diagonal_back = (
             -(4 * np.arange(len(crossed)) + number) - 1 for number in range(4)
@@ -202,7 +197,7 @@ class _Pieces(Parts):
     def _crossing(
         self, value: np.ndarray, piece: np.ndarray, first: np.ndarray, second: np.ndarray
     ) -> np.ndarray:
-        """Return (n, 3) weights of the points on the edges from one corner to another at value 0."""
+        """Return the (n, 3) weights of the points with the value 0 on edges between two corners."""
         start, end = value[piece, first], value[piece, second]
         fraction = (start / (start - end))[:, None]
         return (1 - fraction) * self.weights[piece, first] + fraction * self.weights[piece, second]
@@ -286,7 +281,7 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
     ----------
     instance : MeshInstance
     index : int
-        The number of the instance among those of the depth buffer.
+        Number of the instance in the depth buffer.
     depth_buffer : DepthBuffer
 
     Returns
@@ -295,7 +290,6 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
         Triangles that are nearest at a pixel, or have a corner that is not hidden. A corner out of
         the frame counts as not hidden.
     """
-    label = "finding the part in view"
     triangle_vertex = instance.surface.triangle_vertex
     owner = depth_buffer.triangle[depth_buffer.triangle >= 0]
     pixel_counts = np.bincount(owner, minlength=len(depth_buffer.normal))
@@ -304,7 +298,7 @@ def seen_triangles(instance: MeshInstance, index: int, depth_buffer: DepthBuffer
     hidden = np.zeros(len(points), dtype=bool)
     pending = np.unique(triangle_vertex[~seen])
     for part in row_blocks(len(pending), BLOCK_POINTS):
-        report(part.start / max(len(pending), 1), label)
+        report(part.start / max(len(pending), 1), "finding the part in view")
         hidden[pending[part]] = _is_hidden(points[pending[part]], depth_buffer)
     return seen | ~hidden[triangle_vertex].all(axis=1)
 
@@ -320,10 +314,10 @@ def _is_hidden(points: np.ndarray, depth_buffer: DepthBuffer) -> np.ndarray:
 
 
 def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> np.ndarray:
-    """Return the triangles that are within `HIDDEN_MARGIN` spacings of those that are seen.
+    """Return the triangles that are within `HIDDEN_MARGIN` spacings of visible triangles.
 
-    The distance of a triangle is that of the edge at which it is entered from the nearest edge of one
-    that is seen, in a straight line.
+    Triangles are reached across edges. The distance of a triangle is the straight distance between the
+    edge at which it is entered and the edge at which its path leaves a visible triangle.
 
     Parameters
     ----------
@@ -335,11 +329,11 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
     Returns
     -------
     (T,) bool ndarray
-        Includes those that are seen.
+        Includes the visible ones.
     """
     spacing = spacing.mean(axis=1)
     distance = np.where(seen, 0.0, np.inf)
-    # The edge of a triangle that is seen from which each triangle was reached.
+    # The edge at which the path to each triangle leaves a visible one.
     origin = np.zeros((len(seen), 2, 3))
     front = np.flatnonzero(seen)
     while len(front):
@@ -363,17 +357,10 @@ def triangles_near(mesh: TangentMesh, seen: np.ndarray, spacing: np.ndarray) -> 
 
 def _edge_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Return the (n,) distances between (n, 2, 3) edges in one plane that do not cross."""
-    distances = [
-        _distance_to_edge(point, edge)
-        for one, edge in ((first, second), (second, first))
-        for point in (one[:, 0], one[:, 1])
-    ]
-    return np.min(distances, axis=0)
-
-
-def _distance_to_edge(point: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """Return the (n,) distances of (n, 3) points from (n, 2, 3) edges."""
-    along, offset = edge[:, 1] - edge[:, 0], point - edge[:, 0]
-    length_squared = np.maximum(dot(along, along), 1e-300)
-    fraction = np.clip(dot(offset, along) / length_squared, 0, 1)
-    return np.linalg.norm(offset - fraction[:, None] * along, axis=1)
+    # One end of an edge is nearest to the other edge.
+    point = np.stack([first, second]).transpose(2, 0, 1, 3)
+    edge = np.stack([second, first])
+    along, offset = edge[:, :, 1] - edge[:, :, 0], point - edge[:, :, 0]
+    fraction = np.clip(dot(offset, along) / np.maximum(dot(along, along), 1e-300), 0, 1)
+    distance = np.linalg.norm(offset - fraction[..., None] * along, axis=-1)
+    return distance.min(axis=(0, 1))

@@ -1,4 +1,8 @@
-"""Outlines of meshes as strokes: silhouettes, creases and borders."""
+"""Outlines of meshes as strokes: silhouettes, creases and borders, and which parts of them are visible.
+
+Outlines lie where surfaces turn away from the camera, so their own surface nearly hides them. They have a
+depth test of their own.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.creases import find_creases
 from ..field.frames import angle_between, dot, normalize
 from ..field.surface import Surface, build_edges
@@ -15,13 +19,19 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix
 from .stroke_set import Strokes
 from .tangent_mesh import CREASE_ANGLE, is_sharp_edge
-from .visibility import pixel_size
+from .visibility import (
+    DepthBuffer,
+    pixel_size,
+    planes_around,
+    project_to_pixels,
+    visible_runs,
+)
 
 #: `Strokes.names` of an outline: the kind of line of each family.
 OUTLINE_KINDS = ("silhouettes", "creases", "borders")
 
-#: Shortest crease in pixels if it is as sharp as the angle, in radians. Sharper ones may be shorter, but
-#: count as at most a right angle; blunter ones have to be longer.
+#: Shortest crease in pixels, and its angle in radians. The shortest length is inversely proportional to the
+#: angle, of which at most a right angle counts.
 MIN_CREASE_PX, REFERENCE_ANGLE = 12.0, np.radians(60)
 
 #: End points are the same if they differ by less than about this fraction of the extent of all.
@@ -29,6 +39,17 @@ SAME_POINT_RATIO = 1e-7
 
 #: Where more than two segments meet, two are joined if they turn by less than this, in radians.
 MAX_JUNCTION_TURN = np.radians(50)
+
+#: A silhouette is also visible if it is visible after a move outward by one of these distances, in pixels:
+#: edges of triangles that lie outside of the smooth surface hide it.
+OUTWARD_STEPS_PX = (1.0, 2.0)
+
+#: A silhouette is not hidden by triangles that share a vertex with its triangle and are in front of it by less
+#: than this fraction of the longest edge of its triangle.
+MAX_RING_DEPTH = 1.0
+
+#: Shorter gaps in outlines are closed, and shorter outlines are left out, in pixels.
+MAX_GAP_PX, MIN_MARK_PX = 4.0, 6.0
 
 
 class Segments(NamedTuple):
@@ -48,14 +69,14 @@ class Segments(NamedTuple):
 
 
 class _Corners(NamedTuple):
-    """The (T, 3, 3) corners of triangles, the shading normals there and the normals of triangles."""
+    """The (T, 3, 3) corners and shading normals of triangles, and the (T, 3) normals of triangles."""
 
     points: np.ndarray
     normals: np.ndarray
     flat: np.ndarray
 
 
-def outline(instance: MeshInstance, camera: Camera) -> Strokes:
+def outline_strokes(instance: MeshInstance, camera: Camera) -> Strokes:
     """Extract the silhouettes, creases and borders of a mesh instance.
 
     Silhouettes are the curves on which the interpolated normal is perpendicular to the direction to
@@ -66,14 +87,13 @@ def outline(instance: MeshInstance, camera: Camera) -> Strokes:
     ----------
     instance : MeshInstance
     camera : Camera
-        Camera of the silhouettes. Creases are left out that are too short and blunt in its pixels.
+        Camera of the silhouettes. Creases that are too short and blunt in its pixels are left out.
 
     Returns
     -------
     Strokes
         World space; families as in `OUTLINE_KINDS`. Members and spacings are 0, weights are NaN.
     """
-    label = "finding outlines"
     surface = instance.surface
     matrix = np.asarray(instance.matrix, dtype=np.float64)
     points = instance.world_points()[surface.triangle_vertex]
@@ -81,15 +101,14 @@ def outline(instance: MeshInstance, camera: Camera) -> Strokes:
     flat = normalize(np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]))
     corners = _Corners(points, normals[surface.triangles], flat)
     vertex = surface.triangle_vertex.ravel()
-    with progress(0.0, 0.3, label):
+    with progress(0.0, 0.3, "finding outlines"):
         edges = build_edges(vertex, np.arange(0, len(vertex) + 1, 3, dtype=np.int32))
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    with progress(0.3, 0.7, label):
+    with progress(0.3, 0.7, "finding outlines"):
         is_crease = _are_pairs(vertex, a, find_creases(surface, CREASE_ANGLE).ends)
     is_border = np.ones(len(edges.face_count), dtype=bool)
     is_border[edges.interior] = False
     borders = np.flatnonzero(is_border[edges.corner_edge])
-    report(0.8, label)
     starts = a[is_crease]
     creases = _edge_segments(corners, starts)
     is_blunt = is_sharp_edge(surface, a, b) & ~is_crease
@@ -98,12 +117,13 @@ def outline(instance: MeshInstance, camera: Camera) -> Strokes:
     silhouettes = Segments(*(np.concatenate(pair) for pair in zip(smooth, sharp, strict=True)))
     angle = angle_between(flat[starts // 3], flat[b[is_crease] // 3])
     salience = _pixel_salience(creases, angle, camera)
-    families = [
-        _strokes(silhouettes, 0, surface),
-        _strokes(creases, 1, surface, salience),
-    ]
-    report(0.9, label)
-    return Strokes.join([*families, _strokes(_edge_segments(corners, borders), 2, surface)])
+    return Strokes.join(
+        [
+            _strokes(silhouettes, 0, surface),
+            _strokes(creases, 1, surface, salience),
+            _strokes(_edge_segments(corners, borders), 2, surface),
+        ]
+    )
 
 
 def _smooth_silhouettes(corners: _Corners, camera: Camera) -> Segments:
@@ -140,13 +160,8 @@ def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: 
     segments = _edge_segments(corners, a)
     to_eye = camera.view_directions(segments.ends)
     # The other triangle runs along the edge in the opposite direction.
-    facing = np.stack(
-        [
-            dot(segments.normals, to_eye),
-            dot(_edge_segments(corners, b).normals[:, ::-1], to_eye),
-        ],
-        axis=1,
-    )
+    other_normals = _edge_segments(corners, b).normals[:, ::-1]
+    facing = np.stack([dot(segments.normals, to_eye), dot(other_normals, to_eye)], axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = np.clip(np.nan_to_num(facing[..., 0] / (facing[..., 0] - facing[..., 1])), 0, 1)
     cuts = np.sort(np.concatenate([zero, np.zeros((len(a), 1)), np.ones((len(a), 1))], axis=1))
@@ -166,11 +181,9 @@ def _sharp_silhouettes(corners: _Corners, a: np.ndarray, b: np.ndarray, camera: 
 def _edge_segments(corners: _Corners, starts: np.ndarray) -> Segments:
     """Return the edges of triangles that start at the given corners (3 t + k)."""
     triangle, k = starts // 3, starts % 3
-    following = (k + 1) % 3
+    row, ends = triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)
     return Segments(
-        np.stack([corners.points[triangle, k], corners.points[triangle, following]], axis=1),
-        np.stack([corners.normals[triangle, k], corners.normals[triangle, following]], axis=1),
-        triangle.astype(np.int64),
+        corners.points[row, ends], corners.normals[row, ends], triangle.astype(np.int64)
     )
 
 
@@ -219,11 +232,7 @@ def _strokes(
     chains = _chain_segments(keys[has_length], segments.ends)
     if salience is not None:
         salience = salience[has_length]
-        chains = [
-            (chain, closed)
-            for chain, closed in chains
-            if salience[chain[::2] >> 1].sum() >= MIN_CREASE_PX
-        ]
+        chains = [pair for pair in chains if salience[pair[0][::2] >> 1].sum() >= MIN_CREASE_PX]
     # Each end of a segment, but the second of two that meet; and the segment that ends there.
     none = np.empty(0, dtype=np.int64)
     point = np.concatenate([none, *(np.append(chain[::2], chain[-1]) for chain, _ in chains)])
@@ -250,12 +259,9 @@ def _point_keys(ends: np.ndarray) -> np.ndarray:
     if not len(ends):
         return np.empty((0, 2), dtype=np.int64)
     points = ends.reshape(-1, 3)
-    low = points.min(axis=0)
-    cell = SAME_POINT_RATIO * max(float((points.max(axis=0) - low).max()), 1e-300)
-    # Columns of whole numbers up to 1e7 fit into one key of 64 bits in two steps.
-    x, y, z = np.rint((points - low) / cell).astype(np.int64).T
-    _, keys = np.unique(x * (1 << 25) + y, return_inverse=True)
-    _, keys = np.unique(keys.astype(np.int64) * (1 << 25) + z, return_inverse=True)
+    cell = SAME_POINT_RATIO * max(float(np.ptp(points, axis=0).max()), 1e-300)
+    cells = np.rint((points - points.min(axis=0)) / cell).astype(np.int64)
+    _, keys = np.unique(cells, axis=0, return_inverse=True)
     return keys.reshape(-1, 2).astype(np.int64)
 
 
@@ -310,3 +316,126 @@ def _join_at_junction(junction: np.ndarray, outward: np.ndarray, mate: np.ndarra
         a, b = junction[row[pair]], junction[column[pair]]
         if turn[row[pair], column[pair]] < MAX_JUNCTION_TURN and mate[a] < 0 and mate[b] < 0:
             mate[a], mate[b] = b, a
+
+
+# --- visibility --------------------------------------------------------------------------------------
+
+
+def clip_outline(
+    lines: Strokes,
+    instance: MeshInstance,
+    index: int,
+    camera: Camera,
+    depth_buffer: DepthBuffer | None,
+) -> Strokes:
+    """Return the parts of outlines that are in the frame and not hidden.
+
+    The depth test of strokes fails for silhouettes, which lie on triangles that may face away from the
+    camera although the smooth surface does not.
+
+    Parameters
+    ----------
+    lines : Strokes
+        The `outline_strokes` of an instance.
+    instance : MeshInstance
+    index : int
+        Number of the instance in the depth buffer.
+    camera : Camera
+    depth_buffer : DepthBuffer or None
+        If None, lines are only clipped to the frame.
+
+    Returns
+    -------
+    Strokes
+        Without marks shorter than `MIN_MARK_PX`.
+    """
+    test = None if depth_buffer is None else _OutlineTest(instance, index, depth_buffer).is_visible
+    return visible_runs(lines, camera, test, MAX_GAP_PX, MIN_MARK_PX)
+
+
+class _OutlineTest:
+    """The depth test of the outline of an instance.
+
+    Attributes
+    ----------
+    depth_buffer : DepthBuffer
+    first_triangle : int
+        Number of the first triangle of the instance in the depth buffer.
+    triangle_vertex, triangles : (T, 3) int32 ndarray
+        Vertices and corners of the triangles.
+    points, normals : (n, 3) float64 ndarray
+        Vertices, and shading normals at the corners.
+    """
+
+    def __init__(self, instance: MeshInstance, index: int, depth_buffer: DepthBuffer) -> None:
+        surface = instance.surface
+        self.depth_buffer = depth_buffer
+        self.first_triangle = depth_buffer.start[index]
+        self.triangle_vertex, self.triangles = surface.triangle_vertex, surface.triangles
+        self.points = instance.world_points()
+        matrix = np.asarray(instance.matrix, dtype=np.float64)
+        self.normals = surface.corner_normal @ cofactor_matrix(matrix[:3, :3]).T
+
+    def is_visible(self, block: Strokes, point: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+        """Return (m,) bool: which points are visible; see `visible_runs`."""
+        camera, triangle = self.depth_buffer.camera, block.triangle[point]
+        ring_depth = np.full(len(point), -1.0)
+        contour = np.flatnonzero(
+            block.family[block.stroke[point]] == OUTLINE_KINDS.index("silhouettes")
+        )
+        crossed, inverse = np.unique(triangle[contour], return_inverse=True)
+        ring_depth[contour] = self._ring_depth(crossed)[inverse]
+        visible = ~self._is_hidden(block.points[point], pixels, triangle, ring_depth)
+        for step in OUTWARD_STEPS_PX:
+            pending = np.flatnonzero(~visible & (ring_depth > 0))
+            points, normal = block.points[point[pending]], block.normal[point[pending]]
+            to_eye = camera.view_directions(points)
+            outward = normalize(normal - dot(normal, to_eye)[:, None] * to_eye)
+            moved = points + step * pixel_size(points, camera)[:, None] * outward
+            pixels = np.nan_to_num(project_to_pixels(moved, camera)[0])
+            visible[pending] = ~self._is_hidden(
+                moved, pixels, triangle[pending], ring_depth[pending]
+            )
+        return visible
+
+    def _ring_depth(self, triangle: np.ndarray) -> np.ndarray:
+        """Return (n,) float64: `MAX_RING_DEPTH` as a length, for silhouettes that bend outward.
+
+        The radial curvature of the surface is positive there: n . w grows toward the camera. Where
+        it is negative, the surface hides its silhouette. The result is negative there, and for lines
+        on triangles that no silhouette crosses.
+        """
+        a, b, c = (self.points[self.triangle_vertex[triangle, k]] for k in range(3))
+        to_eye = self.depth_buffer.camera.view_directions((a + b + c) / 3)
+        normal = normalize(self.normals[self.triangles[triangle]])
+        fa, fb, fc = facing = np.stack([dot(normal[:, k], to_eye) for k in range(3)])
+        u, v = b - a, c - a
+        uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
+        along_u, along_v = dot(u, to_eye), dot(v, to_eye)
+        # The derivative along the projection of the direction to the eye, times a positive factor.
+        slope = (vv * along_u - uv * along_v) * (fb - fa) + (uu * along_v - uv * along_u) * (
+            fc - fa
+        )
+        longest = np.sqrt(np.maximum(np.maximum(uu, vv), dot(c - b, c - b)))
+        crossed = (facing.min(axis=0) < 0) & (facing.max(axis=0) > 0)
+        return np.where((slope > 0) & crossed, MAX_RING_DEPTH * longest, -1.0)
+
+    def _is_hidden(
+        self, points: np.ndarray, pixels: np.ndarray, triangle: np.ndarray, ring_depth: np.ndarray
+    ) -> np.ndarray:
+        """Return (n,) bool: which points are behind the planes of all four pixels around them."""
+        hidden = np.ones(len(points), dtype=bool)
+        for plane in planes_around(points, pixels, self.depth_buffer):
+            behind = plane.hides.copy()
+            near = np.flatnonzero(behind & (plane.distance < ring_depth))
+            behind[near] = ~self._shares_vertex(triangle[near], plane.triangle[near])
+            hidden &= behind
+        return hidden
+
+    def _shares_vertex(self, triangle: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Return (n,) bool: whether triangles of the depth buffer touch (n,) triangles of its own."""
+        local = other - self.first_triangle
+        is_own = (local >= 0) & (local < len(self.triangle_vertex))
+        vertex = self.triangle_vertex[np.where(is_own, local, 0)]
+        own_vertex = self.triangle_vertex[triangle]
+        return is_own & (vertex[:, :, None] == own_vertex[:, None, :]).any(axis=(1, 2))

@@ -56,7 +56,7 @@ class SampledPath:
     ----------
     path : TracedPath
     sign : (n,) ndarray
-        Of the particles; see `SurfaceParticles`.
+        Signs of the particles; see `SurfaceParticles`.
     """
 
     def __init__(self, path: TracedPath, sign: np.ndarray) -> None:
@@ -89,7 +89,7 @@ class SampledPath:
             Called as ``next_step(position, particle)`` with samples and the numbers of their paths.
             Returns the lengths of the steps from there, in world space.
         ended : (n,) bool ndarray
-            Whether the particle could not continue at the end of its path.
+            Whether the particle cannot continue at the end of its path.
         """
         path = self.path
         particle = np.flatnonzero(self.length > 0)

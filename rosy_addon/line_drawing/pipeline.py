@@ -8,24 +8,19 @@ from functools import reduce
 
 import numpy as np
 
+from ..annotation.arrow_marks import has_arrows
 from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.memory import check_memory
 from ..core.progress import progress, report
-from ..field.directional_field import field_symmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads
-from .crossings import with_crossing_gaps
 from .families import label_families
-from .head_on_ends import head_on_ends
-from .mesh_in_view import mesh_in_view, seen_triangles, triangles_near, whole_mesh
-from .outline import OUTLINE_KINDS, outline
-from .outline_visibility import clip_outline
-from .overshoot import extend_free_ends, mark_free_boundary_ends
-from .smoothing import smooth
+from .mesh_in_view import MeshInView, mesh_in_view, seen_triangles, triangles_near, whole_mesh
+from .outline import OUTLINE_KINDS, clip_outline, outline_strokes
 from .spacing import (
     MAX_SPACING_RATIO,
     CornerSpacing,
@@ -39,6 +34,7 @@ from .spacing import (
     weight_by_tone,
     with_vertices_of_fans,
 )
+from .stroke_ends import extend_free_ends, head_on_ends, mark_free_boundary_ends
 from .stroke_set import Strokes
 from .style import StrokeStyle
 from .tangent_mesh import TangentMesh, build_tangent_mesh
@@ -50,6 +46,7 @@ from .visibility import (
     pixel_size,
     project_to_pixels,
     rasterize_depth,
+    smooth,
     to_clip,
 )
 
@@ -64,8 +61,8 @@ OFFSCREEN_DISTANCE_RATIO = 0.1
 #: are artifacts, and finer strokes are hardly longer.
 MIN_SPACING_PIXELS = 0.5
 
-#: Bytes that tracing takes at least, and of a square of the surface as wide as the spacing, for each family:
-#: the piece of a stroke that crosses it has about 12 points of 16 float64 numbers.
+#: Bytes that tracing takes at least, and bytes for each family and each square of the surface as wide as the
+#: spacing: the piece of a stroke that crosses it has about 12 points of 16 float64 numbers.
 TRACING_BYTES, SQUARE_BYTES = 40_000_000, 1500
 
 
@@ -91,6 +88,26 @@ class StrokeDrawing:
     marks: SingularityMarks | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _View:
+    """How all instances of a drawing are seen.
+
+    Attributes
+    ----------
+    camera : Camera
+    style : StrokeStyle
+    clips : bool
+        Whether strokes are clipped to the frame.
+    depth_buffer : DepthBuffer or None
+        Of all instances; None if hidden strokes are kept.
+    """
+
+    camera: Camera
+    style: StrokeStyle
+    clips: bool
+    depth_buffer: DepthBuffer | None
+
+
 def draw_instances(
     instances: Sequence[MeshInstance],
     camera: Camera,
@@ -105,7 +122,7 @@ def draw_instances(
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Strokes are drawn on those with a field. All of them occlude.
+        Strokes are drawn on instances with a field. All instances occlude.
     camera : Camera
         Its resolution also sets the length of a pixel.
     style : StrokeStyle
@@ -136,46 +153,41 @@ def draw_instances(
         drawn = [index for index in drawn if _is_in_view(instances[index].face_points(), camera)]
     depth_buffer = None
     if drawn and not style.hidden:
-        label = "finding visible strokes"
-        with progress(0.01, 0.05, label):
+        with progress(0.01, 0.05, "finding visible strokes"):
             depth_buffer = rasterize_depth(instances, camera)
-    traced = {}
-    for rank, index in enumerate(drawn):
-        start, stop = (0.05 + 0.83 * (rank + done) / len(drawn) for done in (0, 1))
-        with progress(start, stop):
-            strokes = _trace_instance(
-                instances[index], index, camera, style, lights, clips, depth_buffer, cache
-            )
-        if strokes is not None:
-            traced[index] = strokes
-    if not traced:
+    view = _View(camera, style, clips, depth_buffer)
+    parts = _traced_parts(instances, drawn, view, lights, cache)
+    if not parts:
         raise _no_visible_stroke(camera)
-    drawn = list(traced)
-    strokes = reduce(Strokes.concatenate, traced.values())
-    family_counts = [len(strokes.names) for strokes in traced.values()]
+    # Families of different instances stay separate until the end. Each belongs to one instance.
+    strokes = reduce(Strokes.concatenate, [lines for _, lines in parts])
     if not len(strokes) and not style.outline:
         raise RosyError("no stroke fits on the surface: reduce the spacing")
     if clips:
-        with progress(0.88, 0.92):
-            strokes = clip_to_visible(strokes, camera, depth_buffer)
         with progress(0.92, 0.93):
-            strokes = smooth(strokes, camera)
+            strokes = smooth(clip_to_visible(strokes, camera, depth_buffer), camera)
     if style.outline:
         with progress(0.93, 0.95):
-            outlines = _outlines(instances, drawn, camera, depth_buffer, clips)
-        strokes = reduce(Strokes.concatenate, outlines, strokes)
-        family_counts += [len(lines.names) for lines in outlines]
-        drawn = drawn + drawn
-    # Families of different instances are still separate. Each belongs to one instance.
-    instance_of_family = np.repeat(np.array(drawn, dtype=np.int32), family_counts)
-    heads = _arrowheads(strokes, instances, instance_of_family, style) if style.arrows else None
+            outlines = [(index, _outline(instances[index], index, view)) for index, _ in parts]
+        strokes = reduce(Strokes.concatenate, [lines for _, lines in outlines], strokes)
+        parts += outlines
+    instance_of_family = np.repeat(
+        np.array([index for index, _ in parts], dtype=np.int32),
+        [len(lines.names) for _, lines in parts],
+    )
+    heads = []
+    if style.arrows:
+        points_one_way = np.array([has_arrows(instance) for instance in instances])
+        has_direction = points_one_way[instance_of_family[strokes.family]]
+        has_direction &= strokes.member[strokes.start[:-1]].any(axis=1)  # not outlines
+        heads = [arrowheads(strokes, style.arrows, has_direction)]
     if style.overshoot:
         with progress(0.95, 0.98):
-            strokes = _overshoot(strokes, camera, style, depth_buffer, clips)
+            strokes = _overshoot(strokes, view)
     if not len(strokes):
         raise _no_visible_stroke(camera)
-    if heads is not None:
-        strokes = Strokes.join([strokes, heads])
+    if heads:
+        strokes = Strokes.join([strokes, *heads])
     marks = None
     if shows_singularities(style):
         with progress(0.98, 1.0):
@@ -185,157 +197,138 @@ def draw_instances(
     )
 
 
-def _trace_instance(
-    instance: MeshInstance,
-    index: int,
-    camera: Camera,
-    style: StrokeStyle,
+def _traced_parts(
+    instances: Sequence[MeshInstance],
+    drawn: Sequence[int],
+    view: _View,
     lights: Sequence[LightSource],
-    clipped: bool,
-    depth_buffer: DepthBuffer | None,
     cache: Cache,
+) -> list[tuple[int, Strokes]]:
+    """Return the number and the strokes of each drawn instance that can be in view."""
+    parts = []
+    for rank, index in enumerate(drawn):
+        with progress(0.05 + 0.87 * rank / len(drawn), 0.05 + 0.87 * (rank + 1) / len(drawn)):
+            strokes = _instance_strokes(instances[index], index, view, lights, cache)
+        if strokes is not None:
+            parts.append((index, strokes))
+    return parts
+
+
+def _instance_strokes(
+    instance: MeshInstance, index: int, view: _View, lights: Sequence[LightSource], cache: Cache
 ) -> Strokes | None:
     """Return the strokes of a mesh instance, before they are clipped; None if none can be in view.
 
-    With a depth buffer, in which the instance has the number `index`, strokes are traced only on triangles
-    that are seen and near them.
+    `index` is the number of the instance in the depth buffer.
     """
-    label = "computing the spacing"
-    report(0.0, label)
+    style = view.style
+    report(0.0, "computing the spacing")
     # Spacing and tone change at sharp edges, so they are values of fans, not of vertices.
     by_fan = with_vertices_of_fans(instance)
-    factor = np.ones(len(by_fan.surface.vertices))
-    tone = lit_tone(by_fan, camera, lights) if style.tone else None
+    tone = lit_tone(by_fan, view.camera, lights) if style.light != "none" else None
     # Without changes of the spacing, all of the tone is in the widths.
     max_ratio = MAX_SPACING_RATIO ** (1 - style.swell)
+    factor = np.ones(len(by_fan.surface.vertices))
     if tone is not None:
         factor = spacing_by_tone(factor, tone, max_ratio)
     if style.curvature:
         with progress(0.01, 0.02):
-            vertex_factor = spacing_by_curvature(instance.surface, 1.0, style.curvature)
-        factor = factor * vertex_factor[fan_vertices(instance.surface)]
+            at_vertices = spacing_by_curvature(instance.surface, 1.0, style.curvature)
+        factor = factor * at_vertices[fan_vertices(instance.surface)]
     with progress(0.02, 0.08):
         mesh = build_tangent_mesh(instance, cross_creases=style.cross_creases, cache=cache)
-    part = whole_mesh(mesh)
-    if clipped:
-        with progress(0.08, 0.09):
-            part = mesh_in_view(mesh, camera)
-    report(0.09, label)
-    if not part.mesh.z.any():
+    with progress(0.08, 0.1):
+        seen = _part_to_trace(instance, index, mesh, factor[by_fan.surface.triangle_vertex], view)
+    if seen is None:
         return None
-    if clipped and style.unit == "world":
-        _check_distance(part.mesh, camera, style.distance, instance.surface.name)
-    spacing = _corner_spacing(part.mesh, camera, style, clipped)
-    values = spacing.values * part.corner_values(factor[by_fan.surface.triangle_vertex])
-    spacing = replace(spacing, values=values)
-    if depth_buffer is not None:
-        with progress(0.09, 0.1):
-            seen = seen_triangles(instance, index, depth_buffer)
-        kept = triangles_near(part.mesh, seen[part.triangle], values)
-        if not part.mesh.z[kept].any():
-            return None
-        part, spacing = part.take(kept), spacing.take(kept)
+    part, spacing = seen
+    name = instance.surface.name
     check_memory(
         stroke_memory(part.mesh, spacing.values),
-        f"{instance.surface.name}: a drawing of strokes with this spacing",
+        f"{name}: a drawing of strokes with this spacing",
         "increase the spacing, or choose a smaller size",
     )
     with progress(0.1, 0.9):
-        strokes = part.on_whole_mesh(
-            trace_on_mesh(part.mesh, spacing, surface_name=instance.surface.name)
-        )
+        strokes = part.on_whole_mesh(trace_on_mesh(part.mesh, spacing, surface_name=name))
     strokes = mark_free_boundary_ends(strokes, mesh)
     if style.cross_creases:
         # Strokes may cross creases, families do not.
         with progress(0.9, 0.92):
             mesh = build_tangent_mesh(instance, cache=cache)
     with progress(0.92, 0.95):
-        strokes = label_families(strokes, mesh, camera.view[0, :3])
+        strokes = label_families(strokes, mesh, view.camera.view[0, :3])
     if tone is not None:
         point_tone = values_at_points(strokes, by_fan.surface, tone)
         strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
-    if style.gaps:
-        with progress(0.95, 0.98):
-            strokes = with_crossing_gaps(strokes, style.gaps)
     if style.taper:
-        with progress(0.98, 0.99):
-            ends = ~head_on_ends(strokes)
-        report(0.99, "shaping ends")
         # Strokes reach creases and borders at full width, as they reach silhouettes. Those that will be
         # extended are tapered after the extension.
-        ends &= ~strokes.free_end_mask
+        with progress(0.98, 1.0):
+            ends = ~head_on_ends(strokes) & ~strokes.free_end_mask
         strokes = strokes.tapered(style.taper, TIP_WIDTH, ends)
-    if not style.overshoot:
-        strokes = replace(strokes, free_ends=None)
-    return strokes
+    return strokes if style.overshoot else replace(strokes, free_ends=None)
 
 
-def _arrowheads(
-    strokes: Strokes,
-    instances: Sequence[MeshInstance],
-    instance_of_family: np.ndarray,
-    style: StrokeStyle,
-) -> Strokes:
-    """Return the arrowheads of strokes along fields whose opposite directions are none of theirs."""
-    points_one_way = np.array(
-        [
-            instance.field is not None and not field_symmetry(instance.field).has_opposites
-            for instance in instances
-        ]
-    )
-    follows_field = strokes.member[strokes.start[:-1]].any(axis=1)
-    has_direction = follows_field & points_one_way[instance_of_family[strokes.family]]
-    return arrowheads(strokes, style.arrows, has_direction)
+def _part_to_trace(
+    instance: MeshInstance, index: int, mesh: TangentMesh, factor: np.ndarray, view: _View
+) -> tuple[MeshInView, CornerSpacing] | None:
+    """Return the part of a mesh on which strokes are traced, and the spacing on it.
+
+    If strokes are clipped, it is the part in view. If hidden strokes are removed, it is what is visible of
+    this part, and what is near. None if the field is zero on it.
+
+    Parameters
+    ----------
+    instance, index
+        As for `_instance_strokes`.
+    mesh : TangentMesh
+    factor : (T, 3) float64 ndarray
+        Factors of the spacing at corners, by tone and curvature.
+    view : _View
+    """
+    part = mesh_in_view(mesh, view.camera) if view.clips else whole_mesh(mesh)
+    if not part.mesh.z.any():
+        return None
+    if view.clips and view.style.unit == "world":
+        _check_distance(part.mesh, view, instance.surface.name)
+    spacing = _corner_spacing(part.mesh, view)
+    spacing = replace(spacing, values=spacing.values * part.corner_values(factor))
+    if view.depth_buffer is not None:
+        seen = seen_triangles(instance, index, view.depth_buffer)
+        kept = triangles_near(part.mesh, seen[part.triangle], spacing.values)
+        part, spacing = part.take(kept), spacing.take(kept)
+    return (part, spacing) if part.mesh.z.any() else None
 
 
-def _outlines(
-    instances: Sequence[MeshInstance],
-    drawn: Sequence[int],
-    camera: Camera,
-    depth_buffer: DepthBuffer | None,
-    clips: bool,
-) -> list[Strokes]:
-    """Return the outline of each drawn instance, clipped like strokes."""
-    outlines = []
-    for rank, index in enumerate(drawn):
-        start, middle, clipped, stop = ((rank + done) / len(drawn) for done in (0.0, 0.5, 0.9, 1.0))
-        with progress(start, middle):
-            lines = outline(instances[index], camera)
-        if clips:
-            with progress(middle, clipped):
-                lines = clip_outline(lines, instances[index], index, camera, depth_buffer)
-            with progress(clipped, stop):
-                lines = smooth(lines, camera)
-        outlines.append(lines)
-    return outlines
+def _outline(instance: MeshInstance, index: int, view: _View) -> Strokes:
+    """Return the outline of an instance, clipped like strokes."""
+    lines = outline_strokes(instance, view.camera)
+    if not view.clips:
+        return lines
+    lines = clip_outline(lines, instance, index, view.camera, view.depth_buffer)
+    return smooth(lines, view.camera)
 
 
-def _overshoot(
-    strokes: Strokes,
-    camera: Camera,
-    style: StrokeStyle,
-    depth_buffer: DepthBuffer | None,
-    clips: bool,
-) -> Strokes:
+def _overshoot(strokes: Strokes, view: _View) -> Strokes:
     """Extend free ends, clip the extensions to the frame, and taper these ends."""
-    with progress(0.0, 0.8):
-        strokes = extend_free_ends(strokes, camera, style.overshoot, depth_buffer)
-    report(0.8, "extending strokes")
-    if clips:
+    style, camera = view.style, view.camera
+    strokes = extend_free_ends(strokes, camera, style.overshoot, view.depth_buffer)
+    if view.clips:
         inside = in_frame(project_to_pixels(strokes.points, camera)[0], camera)
         strokes = strokes.runs_where(inside, free_at_removed=False)
     return strokes.tapered(style.taper, TIP_WIDTH, strokes.free_end_mask)
 
 
-def _check_distance(mesh: TangentMesh, camera: Camera, distance: float, surface_name: str) -> None:
-    """Check that strokes at this distance are not too fine for a picture.
+def _check_distance(mesh: TangentMesh, view: _View, surface_name: str) -> None:
+    """Check that strokes at a distance in Blender units are not too fine for a picture.
 
     Raises
     ------
     RosyError
         If they are less than `MIN_SPACING_PIXELS` apart where the surface is nearest.
     """
-    pixels = distance / float(pixel_size(mesh.points.reshape(-1, 3), camera).min())
+    nearest = float(pixel_size(mesh.points.reshape(-1, 3), view.camera).min())
+    pixels = view.style.distance / nearest
     if pixels < MIN_SPACING_PIXELS:
         raise RosyError(
             f"{surface_name}: strokes would be {pixels:.1g} pixels apart: increase their distance or "
@@ -344,7 +337,7 @@ def _check_distance(mesh: TangentMesh, camera: Camera, distance: float, surface_
 
 
 def stroke_memory(mesh: TangentMesh, spacing: np.ndarray) -> float:
-    """Return about how many bytes the strokes of a mesh take at the peak.
+    """Return an estimate of the peak memory of the strokes of a mesh, in bytes.
 
     Parameters
     ----------
@@ -356,18 +349,17 @@ def stroke_memory(mesh: TangentMesh, spacing: np.ndarray) -> float:
     return TRACING_BYTES + SQUARE_BYTES * squares * mesh.family_count
 
 
-def _corner_spacing(
-    mesh: TangentMesh, camera: Camera, style: StrokeStyle, clipped: bool
-) -> CornerSpacing:
+def _corner_spacing(mesh: TangentMesh, view: _View) -> CornerSpacing:
     """Return the spacing at corners, in world space, without tone and curvature.
 
     If strokes are not clipped, the spacing outside the frame of a perspective camera is not smaller than
     the smallest spacing inside. Otherwise the number of strokes near the camera plane would be unlimited.
     """
+    camera, style = view.camera, view.style
     if style.unit == "world":
         return CornerSpacing(np.full(mesh.triangle_vertex.shape, style.distance))
     spacing = spacing_in_picture(mesh, camera, style.spacing)
-    if clipped or not camera.is_perspective:
+    if view.clips or not camera.is_perspective:
         return spacing
     points, values = mesh.points.reshape(-1, 3), spacing.values
     inside = in_frame(project_to_pixels(points, camera)[0], camera)

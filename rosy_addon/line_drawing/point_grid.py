@@ -1,7 +1,7 @@
 """Hashed uniform grids for radius queries, to which points can be added and removed.
 
-Points of very different spacing are in grids of different levels, so that no cell holds many points
-and no query visits many cells.
+Points with very different radii are in grids with cells of different sizes (levels). So no cell holds many
+points, and no query visits many cells.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ MAX_RINGS = 4
 #: Points in a block. The points of a cell are a linked list of blocks.
 BLOCK_SIZE = 16
 
-#: Queries with a direction find all points in a ball of this fraction of their radius, and others if their
-#: distance along the direction is at most the second fraction.
+#: Queries with a direction find all points within the first fraction of their radius. Other points are found
+#: if their distance along the direction is at most the second fraction of the radius.
 INNER_RATIO, BAND_RATIO = 0.6, 0.25
 
-#: Queries that are answered at once, so that their data fit into the CPU caches.
+#: Number of queries in a block. Its data fit into the caches of a CPU.
 QUERY_BATCH_SIZE = 1 << 11
 
 
@@ -87,7 +87,7 @@ class PointGrid:
         Returns
         -------
         (n,) int32 ndarray
-            Their numbers, which continue those before.
+            Numbers of the points, which continue the numbers of earlier calls.
         """
         level = grid_levels(radius, self.cell)
         self.levels.update(np.unique(level).tolist())

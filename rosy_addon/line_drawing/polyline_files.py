@@ -48,8 +48,8 @@ def polyline_file(
     Parameters
     ----------
     suffix : {".csv", ".obj", ".ply"}
-        Of the file: a table with a row for each point, lines of Wavefront, or binary vertices and
-        edges of Stanford.
+        Suffix of the file: a table with a row for each point, a Wavefront file with lines, or a binary
+        Stanford file with vertices and edges.
     strokes : Strokes
     camera : Camera
         Camera that sets the length of a pixel.
@@ -132,8 +132,8 @@ def _csv(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return vertices, then a line for each stroke, in a group for each family.
 
-    Lines have no normals of their own in this format, so normal n is that of vertex n. Widths are the
-    texture coordinates, with one number each.
+    The format has no normals of lines, so normal n belongs to vertex n. Widths are texture coordinates with
+    one component.
     """
     first_of_closed, kept = _without_repeated_points(strokes)
     rows = np.flatnonzero(kept)
@@ -147,7 +147,6 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
             report((index + block.start / max(len(rows), 1)) / 4, "writing strokes")
             lines = (form % tuple(row) for row in values[rows[block]].tolist())
             blocks.append("".join(lines).encode())
-    report(0.75, "writing strokes")
     number = np.cumsum(kept)
     number[~kept] = number[first_of_closed]
     text, family = [], -1
@@ -164,7 +163,6 @@ def _obj(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.nd
 
 def _ply(strokes: Strokes, points: np.ndarray, normals: np.ndarray, width: np.ndarray) -> bytes:
     """Return a binary file with the points as vertices and the segments as edges."""
-    report(0.0, "writing strokes")
     first_of_closed, kept = _without_repeated_points(strokes)
     stroke = strokes.stroke
     vertex = np.zeros(int(kept.sum()), dtype=_PLY_VERTEX)

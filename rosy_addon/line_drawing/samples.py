@@ -1,4 +1,4 @@
-"""`StrokeSamples`: the samples of growing strokes, their spatial grid, and which sides are covered.
+"""The samples of growing strokes, with a spatial grid, and which of their sides are covered.
 
 Strokes are sampled every half spacing. A side of a sample is covered if there is a stroke beside it
 on this side, and open if not. New strokes are seeded at open sides.
@@ -14,7 +14,6 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..field.frames import transport
-from .column_table import ColumnTable
 from .point_grid import PointGrid
 from .spacing import CornerSpacing
 from .surface_particles import SurfaceParticles
@@ -28,6 +27,45 @@ SEARCH_RADIUS = 1.6
 
 #: Largest expected number of samples. It bounds memory and time.
 MAX_EXPECTED_SAMPLES = 5e7
+
+#: Rows for which a new table has memory. It is doubled when the rows do not fit.
+INITIAL_CAPACITY = 1024
+
+
+class ColumnTable:
+    """A table of growing columns with equal row counts; each column is an attribute.
+
+    A subclass declares each column as a class attribute: an array without rows, of its shape and dtype.
+
+    Columns are longer than `count`; their remaining rows are reserve. When a column grows, it is
+    replaced by a new array, so do not keep references to columns across `append`.
+
+    Attributes
+    ----------
+    count : int
+        Number of rows.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        columns = vars(type(self)).items()
+        self._column_names = [name for name, column in columns if isinstance(column, np.ndarray)]
+        for name in self._column_names:
+            column = getattr(self, name)
+            setattr(self, name, np.zeros((INITIAL_CAPACITY, *column.shape[1:]), column.dtype))
+
+    def append(self, **values: np.ndarray) -> np.ndarray:
+        """Append rows and return their numbers. Columns that are not given are 0 in new rows."""
+        row_count = len(next(iter(values.values())))
+        first, self.count = self.count, self.count + row_count
+        for name in self._column_names:
+            column = getattr(self, name)
+            while self.count > len(column):
+                column = np.concatenate([column, np.zeros_like(column)])
+                setattr(self, name, column)
+            if name in values:
+                column[first : self.count] = values[name]
+        return np.arange(first, self.count)
 
 
 class CoveringPairs(NamedTuple):

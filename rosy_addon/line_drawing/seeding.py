@@ -1,7 +1,7 @@
 """Choose seeds of strokes: around singularities, evenly distributed on a mesh, or beside strokes.
 
-Seeds beside strokes are those of Jobard and Lefer (1997), but along each side of a stroke only one
-is tried at a time, in the middle of the longest open run of samples.
+Seeds beside strokes follow Jobard and Lefer (1997). Along each side of a stroke only one seed is tried at a
+time, in the middle of the longest open run of samples.
 
 Around singularities, there is one seed in each sector, all at the same distance. Near a singularity of
 index i, the lines of the field are parallel lines on a cone, which z -> z^(1 - i) unrolls. A line is
@@ -21,7 +21,7 @@ from .lateral_neighbors import MAX_COVERED_GAP, find_lateral_neighbors
 from .point_grid import LEVEL_RATIO, PointGrid, grid_levels
 from .samples import SAMPLE_STEP, StrokeSamples
 from .surface_particles import SurfaceParticles, trace_geodesics
-from .tangent_mesh import TangentMesh, nearest_member
+from .tangent_mesh import TangentMesh
 
 #: Candidate seeds per area of one squared spacing.
 CANDIDATE_DENSITY = 0.35
@@ -53,8 +53,8 @@ DIVERGING_DISTANCE, CONVERGING_DISTANCE = 0.8, 1.0
 #: Singularities get seeds only if the next one is at least this far away, in spacings.
 MIN_ISOLATION = 6.0
 
-#: A triangle can have a singularity only if twice the area that its three values z span in the
-#: complex plane is more than this fraction of the sum of their squared magnitudes.
+#: A triangle can have a singularity only if its three values z span a triangle in the complex plane whose
+#: doubled area is more than this fraction of the sum of their squared magnitudes.
 MIN_TURN_RATIO = 1e-6
 
 
@@ -103,8 +103,7 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     distance = (seed_distance(index[isolated]) * local_spacing[isolated]).repeat(RAY_COUNT)
     ray = np.tile(np.exp(2j * np.pi * np.arange(RAY_COUNT) / RAY_COUNT), len(isolated))
     triangle, weights = (
-        triangle[isolated].repeat(RAY_COUNT),
-        weights[isolated].repeat(RAY_COUNT, axis=0),
+        column[isolated].repeat(RAY_COUNT, axis=0) for column in (triangle, weights)
     )
     particles = SurfaceParticles(triangle, weights, 1j * ray, np.ones(len(ray)))
     arrived, _, walked = trace_geodesics(mesh, particles, ray, distance)
@@ -118,9 +117,8 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     # Around the singularity, the angle from the tangent of the circle to the member decreases.
     # Seeds are where it is zero.
     next_deviation = np.roll(deviation, -1, axis=1)
-    is_seed = (
-        (deviation > 0) & (next_deviation <= 0) & (deviation - next_deviation < np.pi / mesh.degree)
-    )
+    is_seed = (deviation > 0) & (next_deviation <= 0)
+    is_seed &= deviation - next_deviation < np.pi / mesh.degree
     return arrived.take(np.flatnonzero(is_seed))
 
 
@@ -170,8 +168,7 @@ def candidate_seeds(mesh: TangentMesh, corner_spacing: np.ndarray) -> SurfacePar
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
     weights = np.stack([1 - u - v, u, v], axis=1)
-    z = np.einsum("nk,nk->n", weights, mesh.z[triangle])
-    member = nearest_member(np.ones(count, dtype=complex), z, mesh.degree)
+    member = mesh.members_at(triangle, weights, np.ones(count, dtype=complex))
     rotations = np.exp(2j * np.pi * np.arange(mesh.family_count) / mesh.degree)
     seeds = SurfaceParticles(
         np.repeat(triangle, mesh.family_count),
@@ -190,7 +187,6 @@ def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceP
         with samples.probes(seeds.take(batch)) as probes:
             neighbors = find_lateral_neighbors(samples, probes, MAX_COVERED_GAP, np.inf)
         is_uncovered[batch] = ~neighbors.rejected
-    report(samples.coverage, "looking for gaps")
     return seeds.take(np.flatnonzero(is_uncovered))
 
 
@@ -222,7 +218,7 @@ def thinned_seeds(
 
 
 def _is_nearest_to_cell_center(position: np.ndarray, cell_size: float) -> np.ndarray:
-    """(n,) bool: whether a point is the one that is nearest to the center of its cell, or equal."""
+    """Return (n,) bool: whether a point is at the position nearest to the center of its cell."""
     low, extent = position.min(axis=0), np.ptp(position, axis=0)
     # Divide the bounding box into cells, and choose the point nearest to the center of each cell.
     cell_counts = np.maximum(np.ceil(extent / cell_size), 1)

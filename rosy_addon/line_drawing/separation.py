@@ -2,9 +2,8 @@
 
 Placement compares samples that are half a spacing apart. This misses some pairs that are too near:
 
-- Where strokes bend strongly, above all at singularities, they may be nearer between samples.
-- There, two neighbors may also be of different families at one sample and of the same family at the
-  next.
+- Where strokes bend strongly, above all at singularities, they may be nearer between samples. Two
+  neighbors may also be of different families at one sample and of the same family at the next.
 - At folds, the distance in space is smaller than along the surface.
 
 After placement, strokes are compared more finely at such points and near their ends. Of two strokes
@@ -18,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import progress, report
-from ..field.blocks import row_blocks
+from ..field.blocks import concatenated_ranges, row_blocks
 from ..field.frames import dot, normalize, transport
 from .lateral_neighbors import MAX_SLOPE, MIN_NORMAL_COSINE, MIN_SELF_ARC
 from .point_grid import PointGrid
@@ -35,16 +34,17 @@ FAMILY_TOLERANCE = np.radians(10)
 #: Distance between the points that are compared, in spacings.
 REFINED_STEP = 0.1
 
-#: Strokes are checked where they or the field turn by more than this within a spacing, in radians.
+#: Strokes are compared finely where they or the field turn by more than this within a spacing, in radians.
 MAX_TURN = np.radians(18)
 
-#: The same for the normals of the surface: along strokes, and at their ends.
+#: Strokes are also compared finely where the normals of the surface turn by more than the first angle within
+#: a spacing, and at ends of strokes where they turn by more than the second.
 FOLD_ANGLE, END_FOLD_ANGLE = np.radians(40), np.radians(12)
 
 #: Points that are examined at once, to bound memory.
 BLOCK_POINTS = 1 << 14
 
-#: Radius around such points in which strokes are sampled finely, in spacings.
+#: Radius around such points in which strokes are subdivided, in spacings.
 CHECK_RADIUS = 1.0
 
 
@@ -68,19 +68,15 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     Strokes
         Strokes that were not cut, then the remaining parts.
     """
-    label = "separating strokes"
-    with progress(0.0, 0.3, label):
+    with progress(0.0, 0.3):
         suspect = _suspect_points(mesh, strokes)
     if not suspect.any():
         return strokes
     near_suspect = _points_near(strokes, suspect)
     candidates = np.unique(strokes.stroke[near_suspect])
-    point = np.concatenate(
-        [np.arange(strokes.start[stroke], strokes.start[stroke + 1]) for stroke in candidates]
-    )
-    report(0.3, label)
+    point = concatenated_ranges(strokes.start[candidates], np.diff(strokes.start)[candidates])
     refined, source = _refine(strokes.select(candidates), np.isin(point, near_suspect))
-    with progress(0.4, 0.8, label):
+    with progress(0.4, 0.8):
         too_close = _too_close(mesh, refined, suspect[point][source], strokes.length[candidates])
     if not too_close.any():
         return strokes
@@ -88,9 +84,8 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     opened = np.flatnonzero(refined.closed & (np.bincount(refined.stroke, too_close) > 0))
     too_close[refined.start[:-1][opened]] = too_close[refined.start[1:][opened] - 1] = True
     too_close = _dilate(refined, too_close)
-    report(0.8, label)
     cut = np.unique(refined.stroke[too_close])
-    # Of the runs, those of strokes that were not cut are left out: these stay as they were.
+    # Strokes that were not cut stay as they were, so their runs are left out.
     is_cut = np.zeros(len(candidates), dtype=bool)
     is_cut[cut] = True
     numbered = replace(refined, family=np.arange(len(refined), dtype=np.int32))
@@ -101,7 +96,6 @@ def enforce_separation(mesh: TangentMesh, strokes: Strokes, min_length: float) -
     remaining = remaining.select(
         remaining.length >= min_length * remaining.spacing[remaining.start[:-1]]
     )
-    report(0.9, label)
     untouched = np.ones(len(strokes), dtype=bool)
     untouched[candidates[cut]] = False
     return Strokes.join([strokes.select(untouched), remaining])
@@ -119,9 +113,8 @@ def _suspect_points(mesh: TangentMesh, strokes: Strokes) -> np.ndarray:
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     gap = strokes.points[ends[:, 1]] - strokes.points[ends[:, 0]]
     self_distance = MIN_SELF_ARC * strokes.spacing[ends[:, 1]]
-    nearly_closed = (
-        (dot(gap, gap) < self_distance**2) & (strokes.length > 2 * self_distance) & ~strokes.closed
-    )
+    nearly_closed = (dot(gap, gap) < self_distance**2) & (strokes.length > 2 * self_distance)
+    nearly_closed &= ~strokes.closed
     suspect[ends] |= (surface_turn[ends] > END_FOLD_ANGLE) | nearly_closed[:, None]
     return suspect
 
@@ -156,11 +149,11 @@ def _stroke_turn_per_spacing(strokes: Strokes) -> np.ndarray:
 def _field_turn_per_spacing(mesh: TangentMesh, strokes: Strokes, block: slice) -> np.ndarray:
     """Return radians by which the field turns within a spacing, at a block of points.
 
-    They are those in the direction of most turn.
+    The direction in which it turns most counts.
     """
     triangle = strokes.triangle[block]
     z, gradient = mesh.z[triangle], mesh.gradient[triangle]
-    value = np.einsum("nk,nk->n", strokes.weights[block], z)
+    value = mesh.z_at(triangle, strokes.weights[block])
     derivative_x = np.einsum("nk,nk->n", gradient.real, z) * value.conj()
     derivative_y = np.einsum("nk,nk->n", gradient.imag, z) * value.conj()
     scale = np.maximum(mesh.degree * np.abs(value) ** 2, 1e-300)

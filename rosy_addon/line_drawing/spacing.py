@@ -1,8 +1,8 @@
-"""Spacing of strokes in the picture and by direction, and its changes by tone and curvature.
+"""The spacing of strokes: even in the picture or on the surface, and changed by tone and curvature.
 
-It depends on the direction of strokes, so that they do not crowd at silhouettes. Where a surface turns away
-from the camera, it is foreshortened in one direction. Strokes along this direction keep their distance in the
-picture. Strokes across it, along the silhouette, come nearer.
+Where a surface turns away from the camera, it is foreshortened in one direction. In the picture, strokes
+along this direction keep their distance, but strokes across it, along the silhouette, come nearer. So the
+spacing depends on the direction of strokes: they do not crowd at silhouettes.
 """
 
 from __future__ import annotations
@@ -46,13 +46,14 @@ def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
     return (1 + cosine) / (2 * cosine)
 
 
-#: Smallest distance in the picture, relative to the requested spacing. It is that of strokes across the
+#: Smallest distance in the picture, relative to the requested spacing: the distance of strokes across the
 #: foreshortened direction at `MIN_FACING_COSINE`.
 MIN_PICTURE_RATIO = foreshortening_factor(MIN_FACING_COSINE) * MIN_FACING_COSINE
 
-#: Limits of the smallest cosine between the normal and the direction to the camera for which the spacing
-#: grows. Between them, the part of the surface with smaller cosines is this many spacings wide in the
-#: picture. Lines that approach a silhouette at an angle would otherwise end before they reach it.
+#: The spacing does not grow further where the cosine between the normal and the direction to the camera is below
+#: a limit. The limit is between `MIN_COSINES`. Between these, it is chosen such that the band with smaller
+#: cosines is `SILHOUETTE_SPACINGS` wide in the picture. Otherwise, lines that approach a silhouette at an angle
+#: would end before they reach it.
 MIN_COSINES, SILHOUETTE_SPACINGS = (0.03, 0.2), 2.0
 
 
@@ -128,14 +129,10 @@ def spacing_in_picture(mesh: TangentMesh, camera: Camera, pixels: float) -> Corn
         1 / np.maximum(cosine, np.clip(np.sqrt(band), *MIN_COSINES)) ** 2 - 1
     )
     tangent = dot(to_eye, mesh.x[:, None]) + 1j * dot(to_eye, mesh.y[:, None])
-    tangent = unit(tangent, np.zeros_like(tangent))
+    double = steepness / 2 * unit(tangent, np.zeros_like(tangent)) ** 2
+    is_directional = (relative**2 + steepness > 1).any(axis=1)
     mean = relative**2 + steepness / 2
-    return CornerSpacing(
-        facing_values * factor,
-        mean,
-        steepness / 2 * tangent**2,
-        (relative**2 + steepness > 1).any(axis=1),
-    )
+    return CornerSpacing(facing_values * factor, mean, double, is_directional)
 
 
 def _curvature(mesh: TangentMesh) -> np.ndarray:
@@ -179,8 +176,8 @@ class LightSource(Protocol):
 def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
     """Return a mesh instance with a vertex for each smooth fan, so that vertices have one normal.
 
-    Spacing and tone at its vertices are those of either side of a sharp edge. At the vertices of the
-    original they would be mixed: a dark face would be lighter beside its edges, and a light one darker.
+    At a sharp edge, either side has its own spacing and tone. With the vertices of the original they would be
+    averaged: a dark face would be lighter beside its edges, and a light face darker.
 
     Returns
     -------
@@ -256,11 +253,6 @@ def spacing_by_curvature(
     return np.asarray(spacing) * np.clip(relative**-exponent, MIN_SPACING_RATIO, MAX_SPACING_RATIO)
 
 
-def headlight_tone(instance: MeshInstance, camera: Camera) -> np.ndarray:
-    """Return the (V,) tones of a matte surface that is lit from the camera, 1 where it faces it."""
-    return lambert_tone(instance, camera.view_directions(instance.world_points()))
-
-
 def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSource]) -> np.ndarray:
     """Return the tones of a matte surface under several lights, without shadows.
 
@@ -270,7 +262,7 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
     camera : Camera
         Camera whose space the lights are in.
     lights : sequence of LightSource
-        If there are none, the result is that of `headlight_tone`.
+        Without lights, the light is at the camera.
 
     Returns
     -------
@@ -278,7 +270,7 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
         From 0 to 1.
     """
     if not lights:
-        return headlight_tone(instance, camera)
+        return lambert_tone(instance, camera.view_directions(instance.world_points()))
     rotation = camera.view[:3, :3]
     tone = np.zeros(len(instance.surface.vertices))
     for light in lights:
@@ -287,9 +279,8 @@ def lit_tone(instance: MeshInstance, camera: Camera, lights: Sequence[LightSourc
             tone += strength * lambert_tone(instance, rotation.T @ light.vector)
             continue
         to_light = rotation.T @ (light.vector - camera.view[:3, 3]) - instance.world_points()
-        tone += (
-            strength / np.maximum(dot(to_light, to_light), 1e-12) * lambert_tone(instance, to_light)
-        )
+        received = strength / np.maximum(dot(to_light, to_light), 1e-12)
+        tone += received * lambert_tone(instance, to_light)
     return np.minimum(tone, 1)
 
 
@@ -307,9 +298,8 @@ def lambert_tone(instance: MeshInstance, to_light: np.ndarray) -> np.ndarray:
     fan_normal = sum_per_fan(surface.corner_normal, surface.corner_vertex)
     normal = np.zeros_like(surface.vertices)
     normal[: len(fan_normal)] = fan_normal @ cofactor_matrix(matrix).T
-    return np.clip(
-        dot(normalize(normal), normalize(np.broadcast_to(to_light, normal.shape) + 0.0)), 0, 1
-    )
+    direction = normalize(np.broadcast_to(to_light, normal.shape) + 0.0)
+    return np.clip(dot(normalize(normal), direction), 0, 1)
 
 
 def weight_by_tone(

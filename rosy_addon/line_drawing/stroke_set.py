@@ -38,7 +38,7 @@ class Strokes:
         Number of the first point of each stroke, then n.
     family : (S,) int32 ndarray
         Family of each stroke, from 0. Families are the lines that a field has at a point; for
-        `outline` they are the kinds of line.
+        `outline_strokes` they are the kinds of line.
     names : tuple of str
         Names of the families.
     face : (n,) int32 ndarray
@@ -114,13 +114,12 @@ class Strokes:
         )
 
     def take_points(self, point: np.ndarray) -> Strokes:
-        """Return a copy with some points, by number. The caller replaces what is no longer true."""
+        """Return a copy with some points, by number. The caller has to replace `start` and what depends on it."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
     def runs_where(
         self,
         kept: np.ndarray,
-        split_labels: np.ndarray | None = None,
         free_at_removed: np.ndarray | bool = True,
     ) -> Strokes:
         """Cut strokes into runs of two or more consecutive points that are kept.
@@ -128,8 +127,6 @@ class Strokes:
         Parameters
         ----------
         kept : (n,) bool ndarray
-        split_labels : (n,) ndarray, optional
-            Strokes are also split between points with different labels.
         free_at_removed : bool or (n,) bool ndarray
             Whether the ends of runs next to a removed point are free: one value for all, or one for
             each removed point.
@@ -141,10 +138,7 @@ class Strokes:
         """
         stroke = self.stroke
         starts_run = kept.copy()
-        boundary = stroke[1:] != stroke[:-1]
-        if split_labels is not None:
-            boundary |= split_labels[1:] != split_labels[:-1]
-        starts_run[1:] &= ~kept[:-1] | boundary
+        starts_run[1:] &= ~kept[:-1] | (stroke[1:] != stroke[:-1])
         run = np.cumsum(starts_run) - 1
         count = np.bincount(run[kept], minlength=int(starts_run.sum()))
         is_long = count >= 2
@@ -217,16 +211,13 @@ class Strokes:
         row = np.repeat(np.arange(len(counts)), counts)
         fraction = (np.arange(len(row)) - (last - counts)[row]) / counts[row]
         point = row + start[0]
-        before = np.maximum(point - 1, 0)
-
-        divided = self.take_points(point)
+        divided, before = self.take_points(point), np.maximum(point - 1, 0)
         for name in ("points", "normal", "spacing", "width"):
             values, previous = getattr(divided, name), getattr(self, name)[before]
             values -= previous
             values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
             values += previous
-        # The weights of the previous point may be in another triangle, so they are not
-        # interpolated.
+        # The weights of the previous point may be in another triangle, so they are not interpolated.
         divided.weights[fraction < 1] = np.nan
         return replace(
             divided,
@@ -294,7 +285,7 @@ class Strokes:
 
     @staticmethod
     def concatenate(first: Strokes, second: Strokes) -> Strokes:
-        """Return both sets. The families of the second are numbered after those of the first."""
+        """Return both sets. The families of the second follow the families of the first."""
         renumbered = replace(second, family=second.family + np.int32(len(first.names)))
         return replace(Strokes.join([first, renumbered]), names=first.names + second.names)
 

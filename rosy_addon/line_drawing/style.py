@@ -44,10 +44,16 @@ class StrokeStyle:
         unit="length",
         applies=lambda style: style.unit == "world",
     )
-    tone: bool = switch(
-        False,
-        "Place strokes closer together where the light is weak, and leave them out where it is "
+    light: str = choice(
+        "none",
+        "Light by which strokes are placed: closer together where it is weak, and left out where it is "
         "strong",
+        {
+            "none": "Even strokes, without a light",
+            "headlight": "A light at the camera",
+            "lamp": "A lamp above and to the left of the camera",
+            "scene": "The lights of the scene",
+        },
         panel="density",
     )
     layering: float = number(
@@ -56,28 +62,16 @@ class StrokeStyle:
         1.0,
         "Difference in darkness between the tones at which successive families begin",
         panel="density",
-        applies=lambda style: style.tone,
+        applies=lambda style: style.light != "none",
     )
     swell: float = number(
         0.0,
         0.0,
         1.0,
-        "Amount by which the tone changes the width of strokes instead of their distance. 1: evenly "
+        "Amount by which the light changes the width of strokes instead of their distance. 1: evenly "
         "spaced strokes, as in an engraving",
         panel="density",
-        applies=lambda style: style.tone,
-    )
-    light: str = choice(
-        "headlight",
-        "Light source of the tone",
-        {
-            "headlight": "A light at the camera",
-            "lamp": "A lamp above and to the left of the camera",
-            "scene": "The lights of the scene",
-        },
-        panel="density",
-        panel_before="layering",
-        applies=lambda style: style.tone,
+        applies=lambda style: style.light != "none",
     )
     curvature: float = number(
         0.0,
@@ -85,14 +79,6 @@ class StrokeStyle:
         1.0,
         "Amount by which strokes are closer together where the surface is more curved",
         panel="density",
-    )
-    gaps: float = number(
-        0.0,
-        0.0,
-        1.0,
-        "Gap in the lower of two crossing strokes, as a multiple of the spacing",
-        unit="spacings",
-        panel="ends",
     )
     taper: float = number(
         0.8,
@@ -102,7 +88,6 @@ class StrokeStyle:
         "Ends that meet head on are not tapered",
         unit="spacings",
         panel="ends",
-        panel_before="gaps",
     )
     overshoot: float = number(
         0.0,
@@ -112,7 +97,6 @@ class StrokeStyle:
         "the shade, or an occluding edge",
         unit="pixels",
         panel="ends",
-        panel_before="gaps",
     )
     arrows: float = number(
         0.0,
@@ -123,7 +107,6 @@ class StrokeStyle:
         unit="spacings",
         label="Arrowheads",
         panel="ends",
-        panel_before="gaps",
     )
     outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
     hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")

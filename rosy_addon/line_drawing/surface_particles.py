@@ -7,7 +7,8 @@ at its midpoint (the midpoint rule) and is short enough that the field turns lit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -73,7 +74,7 @@ class SurfaceParticles:
         return tuple(vars(self).values())
 
     def assign(self, indices: np.ndarray, source: SurfaceParticles) -> None:
-        """Overwrite the particles at `indices` with those of `source`."""
+        """Overwrite the particles at `indices` with the particles of `source`."""
         for column, values in zip(self.columns, source.columns, strict=True):
             column[indices] = values
 
@@ -112,6 +113,11 @@ class TracedPath(NamedTuple):
         """Return some of the segments."""
         return TracedPath(*(column[indices] for column in self))
 
+    @staticmethod
+    def concatenate(paths: Sequence[TracedPath]) -> TracedPath:
+        """Return the segments of all paths, one after another."""
+        return TracedPath(*(np.concatenate(column) for column in zip(*paths, strict=True)))
+
 
 def advance(
     mesh: TangentMesh,
@@ -147,7 +153,7 @@ def advance(
     path : TracedPath
     """
     result = particles.take(np.arange(len(particles)))
-    remaining = length.astype(np.float64).copy()
+    remaining = length.astype(np.float64)
     ended = np.zeros(len(particles), dtype=bool)
     active = np.arange(len(particles))
     rotation = particles.sign.astype(np.complex128)
@@ -155,25 +161,26 @@ def advance(
         rotation *= np.exp(1j * steering)
     if max_segment_length is None:
         max_segment_length = length
-    segments: list[tuple[np.ndarray, ...]] = []
+    paths: list[TracedPath] = []
     for _ in range(max_segments):
         if not len(active):
             break
         current = result.take(active)
         max_length = np.minimum(remaining[active], max_segment_length[active])
-        new_weights, direction, member, edge, step, stuck = _next_segment(
+        weights, direction, member, edge, step, stuck = _next_segment(
             mesh, current, max_length, max_segment_length[active], rotation[active]
         )
-        columns = (active, current.triangle, current.weights, new_weights, direction, member, step)
-        segments.append(tuple(column[~stuck] for column in columns))
-        current.weights, current.member = new_weights, member
+        path = TracedPath(
+            active, current.triangle, current.weights, weights, direction, member, step
+        )
+        paths.append(path.take(~stuck))
+        current.weights, current.member = weights, member
         remaining[active] -= step
         stopped = stuck | _cross_edges(mesh, current, edge)
         result.assign(active[~stuck], current.take(~stuck))
         ended[active[stopped]] = True
         active = active[~stopped & (remaining[active] > 1e-9 * length[active])]
-    columns = [np.concatenate(column) for column in zip(*segments, strict=True)]
-    return result, length - remaining, ended, TracedPath(*columns)
+    return result, length - remaining, ended, TracedPath.concatenate(paths)
 
 
 def trace_geodesics(
@@ -193,23 +200,22 @@ def trace_geodesics(
     Returns
     -------
     particles : SurfaceParticles
-        The particles after the move. Their members are those of the field that are nearest to the
-        transported ones; 0 where the field is zero.
+        The particles after the move. Each has the member of the field that is nearest to its transported
+        member, or 0 where the field is zero.
     direction : (n,) complex128 ndarray
         The directions after the move.
     walked : (n,) float64 ndarray
         Length that was moved. It is less than requested at borders and creases.
     """
     result = particles.take(np.arange(len(particles)))
-    direction = direction.copy()
-    remaining = length.astype(np.float64).copy()
+    direction, remaining = direction.copy(), length.astype(np.float64)
     active = np.arange(len(particles))
     for _ in range(8 * MAX_SEGMENTS):
         if not len(active):
             break
         current, current_direction = result.take(active), direction[active]
         slope = _barycentric_slopes(mesh, current.triangle, current_direction)
-        edge_distance, edge = _distance_to_edge(mesh, current, slope)
+        edge_distance, edge = _distance_to_edge(current.weights, slope)
         step = np.minimum(edge_distance, remaining[active])
         edge = np.where(edge_distance <= remaining[active], edge, -1)
         current.weights = _moved_weights(current.weights, slope, step)
@@ -230,7 +236,7 @@ def _next_segment(
     usual_length: np.ndarray,
     rotation: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
-    """Compute one segment for each particle.
+    """Compute one segment for each particle, with the direction of the field at its midpoint.
 
     A segment is at most `length` long. Particles are stuck if the field turns so fast that a segment
     would be much shorter than `usual_length`. `rotation`, (n,) complex128, turns the member into the
@@ -251,61 +257,86 @@ def _next_segment(
     """
     corner_z = mesh.z[particles.triangle]
     z = np.einsum("nk,nk->n", particles.weights, corner_z)
-    scale = np.abs(corner_z).max(axis=1)
-    stuck = np.abs(z) <= ZERO_FIELD_RATIO * scale
+    stuck = np.abs(z) <= ZERO_FIELD_RATIO * np.abs(corner_z).max(axis=1)
     member = nearest_member(particles.member, np.where(stuck, 1, z), mesh.degree)
+    particles = replace(particles, member=member)
     direction = rotation * mesh.directions_at(particles.triangle, particles.weights, member)
     slope = _barycentric_slopes(mesh, particles.triangle, direction)
-    edge_distance, _ = _distance_to_edge(mesh, particles, slope)
+    edge_distance, _ = _distance_to_edge(particles.weights, slope)
     turn_rate = np.abs((np.einsum("nk,nk->n", slope, corner_z) * z.conj()).imag)
-    norm_squared = z.real**2 + z.imag**2
-    max_step = np.where(
-        turn_rate > 0,
-        MAX_TURN_PER_SEGMENT * mesh.degree * norm_squared / np.where(turn_rate > 0, turn_rate, 1),
-        np.inf,
-    )
+    max_step = np.full(len(z), np.inf)
+    squared_norm = z.real**2 + z.imag**2
+    largest = MAX_TURN_PER_SEGMENT * mesh.degree * squared_norm
+    np.divide(largest, turn_rate, out=max_step, where=turn_rate > 0)
     stuck |= max_step < MIN_SEGMENT_RATIO * usual_length
-    step, new_weights, edge = (
-        np.zeros(len(length)),
+    count = len(length)
+    segments = (
         particles.weights.copy(),
-        np.full(len(length), -1),
+        direction,
+        member.copy(),
+        np.full(count, -1),
+        np.zeros(count),
     )
     pending = np.flatnonzero(~stuck)
     for _ in range(MAX_HALVINGS):
-        trial = particles.take(pending)
-        z = corner_z[pending]
         allowed = np.minimum(length, max_step)[pending]
         midpoint = _moved_weights(
-            trial.weights, slope[pending], 0.5 * np.minimum(edge_distance[pending], allowed)
+            particles.weights[pending],
+            slope[pending],
+            0.5 * np.minimum(edge_distance[pending], allowed),
         )
-        mid_member = nearest_member(
-            member[pending], np.einsum("nk,nk->n", midpoint, z), mesh.degree
+        trial, is_straight = _midpoint_segments(
+            mesh, particles.take(pending), midpoint, rotation[pending], allowed
         )
-        mid_direction = rotation[pending] * mesh.directions_at(trial.triangle, midpoint, mid_member)
-        mid_slope = _barycentric_slopes(mesh, trial.triangle, mid_direction)
-        mid_edge_distance, mid_edge = _distance_to_edge(mesh, trial, mid_slope)
-        walked = np.minimum(mid_edge_distance, allowed)
-        end_weights = _moved_weights(trial.weights, mid_slope, walked)
-        end_member = nearest_member(mid_member, np.einsum("nk,nk->n", end_weights, z), mesh.degree)
-        cosine = np.minimum(
-            (end_member * mid_member.conj()).real, (member[pending] * mid_member.conj()).real
-        )
-        accepted = cosine >= np.cos(MAX_DIRECTION_ERROR)
-        done = pending[accepted]
-        step[done], new_weights[done], direction[done] = (
-            walked[accepted],
-            end_weights[accepted],
-            mid_direction[accepted],
-        )
-        edge[done] = np.where(mid_edge_distance <= allowed, mid_edge, -1)[accepted]
-        member[done] = mid_member[accepted]
-        pending = pending[~accepted]
+        for column, values in zip(segments, trial, strict=True):
+            column[pending[is_straight]] = values[is_straight]
+        pending = pending[~is_straight]
         if not len(pending):
             break
         # The field turns more than estimated. Try a shorter segment.
-        max_step[pending] = 0.5 * walked[~accepted]
+        max_step[pending] = 0.5 * trial[-1][~is_straight]
     stuck[pending] = True
-    return new_weights, direction, member, edge, step, stuck
+    return *segments, stuck
+
+
+def _midpoint_segments(
+    mesh: TangentMesh,
+    start: SurfaceParticles,
+    midpoint: np.ndarray,
+    rotation: np.ndarray,
+    allowed: np.ndarray,
+) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """Return segments by the midpoint rule, and whether the field turns little along them.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+    start : SurfaceParticles
+        With the members of the field at their positions.
+    midpoint : (n, 3) float64 ndarray
+        Barycentric coordinates of estimated midpoints.
+    rotation : (n,) complex128 ndarray
+        As in `_next_segment`.
+    allowed : (n,) float64 ndarray
+        Largest lengths, in world space.
+
+    Returns
+    -------
+    segments : tuple of ndarray
+        `new_weights`, `direction`, `member`, `edge` and `step` of `_next_segment`.
+    is_straight : (n,) bool ndarray
+    """
+    z = mesh.z[start.triangle]
+    member = nearest_member(start.member, np.einsum("nk,nk->n", midpoint, z), mesh.degree)
+    direction = rotation * mesh.directions_at(start.triangle, midpoint, member)
+    slope = _barycentric_slopes(mesh, start.triangle, direction)
+    edge_distance, edge = _distance_to_edge(start.weights, slope)
+    step = np.minimum(edge_distance, allowed)
+    weights = _moved_weights(start.weights, slope, step)
+    end_member = nearest_member(member, np.einsum("nk,nk->n", weights, z), mesh.degree)
+    cosine = np.minimum((end_member * member.conj()).real, (start.member * member.conj()).real)
+    edge = np.where(edge_distance <= allowed, edge, -1)
+    return (weights, direction, member, edge, step), cosine >= np.cos(MAX_DIRECTION_ERROR)
 
 
 def _barycentric_slopes(
@@ -316,12 +347,10 @@ def _barycentric_slopes(
     return gradient.real * direction.real[:, None] + gradient.imag * direction.imag[:, None]
 
 
-def _distance_to_edge(
-    mesh: TangentMesh, particles: SurfaceParticles, slope: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _distance_to_edge(weights: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the (n,) distances to the boundary of the triangle, and the (n,) edges there."""
     decreasing = slope < -PARALLEL_EPS * np.abs(slope).max(axis=1, keepdims=True)
-    distances = np.where(decreasing, particles.weights / np.where(decreasing, -slope, 1), np.inf)
+    distances = np.where(decreasing, weights / np.where(decreasing, -slope, 1), np.inf)
     return np.minimum.reduce(distances, axis=1), np.argmin(distances, axis=1)
 
 
@@ -360,10 +389,7 @@ def _cross_edges(
     stopped[reached[neighbor < 0]] = True
     crosses = neighbor >= 0
     reached, triangle, k, neighbor = (
-        reached[crosses],
-        triangle[crosses],
-        k[crosses],
-        neighbor[crosses],
+        values[crosses] for values in (reached, triangle, k, neighbor)
     )
     j = mesh.neighbor_edge[triangle, k].astype(np.intp)
     transport = mesh.edge_transport[triangle, k]

@@ -19,6 +19,8 @@ from ..annotation.singularity_marks import (
 )
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from ..field.blocks import concatenated_ranges
+from ..field.frames import dot
 from ..projection.camera import Camera
 from .outline import OUTLINE_KINDS
 from .stroke_set import Strokes
@@ -137,7 +139,6 @@ def svg_text(
         singularities. Each stroke is one path.
     """
     pen = pen or Pen()
-    report(0.0, "writing strokes")
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixels[:, 1] = camera.height - pixels[:, 1]
     size = f'width="{camera.width}" height="{camera.height}"'
@@ -162,7 +163,6 @@ def svg_text(
     for family, (name, color) in enumerate(
         zip(strokes.names, pen.family_colors(strokes.names), strict=True)
     ):
-        report(family / len(strokes.names), "writing strokes")
         family_strokes = strokes.select(strokes.family == family)
         if not len(family_strokes):
             continue
@@ -172,13 +172,11 @@ def svg_text(
             f'fill="none" stroke={quoteattr(color)} stroke-width="{pen.width:.3g}" '
             'stroke-linecap="round" stroke-linejoin="round">'
         )
-        start, stop = (done / len(strokes.names) for done in (family, family + 1))
-        with progress(start, stop):
-            lines += (
-                _plotter_paths(family_pixels, family_strokes)
-                if pen.plotter
-                else _stroke_paths(family_pixels, family_strokes, pen.width, color)
-            )
+        with progress(family / len(strokes.names), (family + 1) / len(strokes.names)):
+            if pen.plotter:
+                lines += _plotter_paths(family_pixels, family_strokes)
+            else:
+                lines += _stroke_paths(family_pixels, family_strokes, pen.width, color)
         lines.append("</g>")
     if marks is not None and len(marks):
         lines += _singularity_layer(marks, camera.height)
@@ -195,12 +193,9 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
         f'stroke="{OUTLINE_COLOR}" stroke-width="{outline:.3g}" stroke-linecap="round" '
         'stroke-linejoin="round">'
     ]
+    columns = marks.position, marks.radius, marks.index, marks.is_visible
     for (x, y), radius, index, is_visible in zip(
-        marks.position.tolist(),
-        marks.radius.tolist(),
-        marks.index.tolist(),
-        marks.is_visible.tolist(),
-        strict=True,
+        *(column.tolist() for column in columns), strict=True
     ):
         opacity = "" if is_visible else f' opacity="{HIDDEN_OPACITY}"'
         lines.append(
@@ -211,13 +206,11 @@ def _singularity_layer(marks: SingularityMarks, height: int) -> list[str]:
     for label in placed_labels(marks):
         segments = label.segments() * (1, -1) + (0, height)
         path = " ".join(f"M{_format_points(segment)}" for segment in segments)
-        for color, line_width in (
-            (HALO_COLOR, width + 2 * HALO * marks.size),
-            (LABEL_COLOR, width),
-        ):
-            lines.append(
-                f'<path fill="none" stroke="{color}" stroke-width="{line_width:.3g}" d="{path}"/>'
-            )
+        halo_width = width + 2 * HALO * marks.size
+        lines += [
+            f'<path fill="none" stroke="{color}" stroke-width="{line_width:.3g}" d="{path}"/>'
+            for color, line_width in ((HALO_COLOR, halo_width), (LABEL_COLOR, width))
+        ]
     return [*lines, "</g>"]
 
 
@@ -264,8 +257,8 @@ def _stroke_paths(pixels: np.ndarray, strokes: Strokes, width: float, color: str
             attribute = "" if is_full else f' stroke-width="{width_px:.3g}"'
             paths.append(f'<path{attribute} d="{_line_path(points[span], closed)}"/>')
         else:
-            outline = _outline_path(left[span], right[span], radius[span][[0, -1]])
-            paths.append(f'<path fill={quoteattr(color)} stroke="none" d="{outline}"/>')
+            data = _tapered_path(left[span], right[span], radius[span][[0, -1]])
+            paths.append(f'<path fill={quoteattr(color)} stroke="none" d="{data}"/>')
     return paths
 
 
@@ -292,7 +285,7 @@ def _offset_sides(
     return points + offset, points - offset
 
 
-def _outline_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) -> str:
+def _tapered_path(left: np.ndarray, right: np.ndarray, end_radii: np.ndarray) -> str:
     """Return the path data of a closed outline with round caps of the radii at both ends."""
     reversed_right = right[::-1]
     return (
@@ -321,7 +314,7 @@ def _format_points(points: np.ndarray) -> str:
 def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np.ndarray:
     """Choose the points of simplified polylines.
 
-    The method is that of Ramer, Douglas and Peucker, for all polylines at once.
+    This is the Ramer-Douglas-Peucker algorithm, for all polylines at once.
 
     Parameters
     ----------
@@ -345,16 +338,14 @@ def simplify_mask(points: np.ndarray, start: np.ndarray, tolerance: float) -> np
         count = last - first - 1
         begin = np.concatenate([[0], np.cumsum(count)[:-1]])
         segment = np.repeat(np.arange(len(first)), count)
-        point = np.arange(count.sum()) + np.repeat(first + 1 - begin, count)
+        point = concatenated_ranges(first + 1, count)
         origin = points[first][segment]
         chord = points[last][segment] - origin
         delta = points[point] - origin
-        chord_squared = np.einsum("ni,ni->n", chord, chord)
-        fraction = np.einsum("ni,ni->n", delta, chord) / np.where(
-            chord_squared > 0, chord_squared, 1
-        )
+        chord_squared = dot(chord, chord)
+        fraction = dot(delta, chord) / np.where(chord_squared > 0, chord_squared, 1)
         delta = delta - np.clip(fraction, 0, 1)[:, None] * chord
-        distance = np.einsum("ni,ni->n", delta, delta)
+        distance = dot(delta, delta)
         max_distance = np.maximum.reduceat(distance, begin)
         split = max_distance > tolerance**2
         farthest = np.flatnonzero(distance == max_distance[segment])
@@ -441,8 +432,7 @@ def _ring_cells(center: tuple[int, int], radius: int) -> list[tuple[int, int]]:
     x, y = center
     if not radius:
         return [center]
-    row = range(-radius, radius + 1)
-    column = range(-radius + 1, radius)
-    return [(x + i, y + j) for i in row for j in (-radius, radius)] + [
-        (x + i, y + j) for i in (-radius, radius) for j in column
-    ]
+    across, along = range(-radius, radius + 1), range(-radius + 1, radius)
+    cells = [(i, j) for i in across for j in (-radius, radius)]
+    cells += [(i, j) for i in (-radius, radius) for j in along]
+    return [(x + i, y + j) for i, j in cells]

@@ -77,7 +77,7 @@ class TangentMesh:
     neighbor_edge : (T, 3) int8 ndarray
         The number of that edge in the neighbor.
     edge_transport : (T, 3) complex128 ndarray
-        Unit factors that transport tangents from the frame of the triangle to that of the neighbor.
+        Unit factors that transport tangents from the frame of the triangle to the frame of the neighbor.
     area : (T,) float64 ndarray
         World space; 0 for degenerate triangles.
     triangle_vertex : (T, 3) int32 ndarray
@@ -128,7 +128,7 @@ class TangentMesh:
         return normalize(np.einsum("nk,nki->ni", weights, self.corner_normal[triangle]))
 
     def limited_normals_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the shading normals, but at most `MAX_TILT` off those of the triangles."""
+        """Return the shading normals, turned to at most `MAX_TILT` from the normals of the triangles."""
         shading = self.shading_normals_at(triangle, weights)
         flat = self.normal[triangle]
         cosine = dot(shading, flat)
@@ -145,12 +145,15 @@ class TangentMesh:
         """Return (n,) complex128: the tangential parts of (n, 3) vectors in the frames of triangles."""
         return dot(vectors, self.x[triangle]) + 1j * dot(vectors, self.y[triangle])
 
+    def z_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return (n,) complex128: the interpolated representation of the field."""
+        return np.einsum("nk,nk->n", weights, self.z[triangle])
+
     def members_at(
         self, triangle: np.ndarray, weights: np.ndarray, reference: np.ndarray
     ) -> np.ndarray:
         """Return (n,) complex128: the unit member nearest to a unit tangent; 0 where z is 0."""
-        z = np.einsum("nk,nk->n", weights, self.z[triangle])
-        return nearest_member(reference, z, self.degree)
+        return nearest_member(reference, self.z_at(triangle, weights), self.degree)
 
     def is_same_family(
         self,
@@ -286,16 +289,13 @@ def build_tangent_mesh(
         )
     with progress(0.0, 0.3):
         corner_field = cached_corner_field(instance, display, cache)
-    label = "preparing the surface"
-    report(0.3, label)
+    report(0.3, "preparing the surface")
     points = instance.world_points()[surface.triangle_vertex]
     normal, x, y, area = _triangle_frames(points)
-    report(0.4, label)
     corner_normal = corner_field.corner_normals.astype(np.float64).transpose(2, 0, 1)
     rotations = _rotations_to_planes(
         corner_field.reference_tangent.astype(np.float64).T, corner_normal, normal, x, y
     )
-    report(0.5, label)
     z = corner_field.representation.T.astype(np.complex128) * power(rotations, field.degree)
     z *= (area > 0)[:, None]
     if not z.any():
@@ -307,17 +307,7 @@ def build_tangent_mesh(
             harmonics.append((channel[1], values))
         elif channel != REPRESENTATION:
             family_z = values.sum(axis=1)
-    with progress(0.6, 1.0):
-        neighbor, neighbor_edge, edge_transport = _adjacency(
-            surface,
-            points,
-            x,
-            y,
-            normal,
-            (z != 0).any(axis=1),
-            None if cross_creases else crease_angle,
-        )
-    return TangentMesh(
+    mesh = TangentMesh(
         degree=field.degree,
         family_count=field_symmetry(field).line_count,
         points=points,
@@ -330,12 +320,15 @@ def build_tangent_mesh(
         z=z,
         harmonics=tuple(harmonics),
         family_z=family_z,
-        neighbor=neighbor,
-        neighbor_edge=neighbor_edge,
-        edge_transport=edge_transport,
+        neighbor=np.full((len(points), 3), -1, dtype=np.int32),
+        neighbor_edge=np.zeros((len(points), 3), dtype=np.int8),
+        edge_transport=np.ones((len(points), 3), dtype=np.complex128),
         area=area,
         triangle_vertex=surface.triangle_vertex,
     )
+    with progress(0.6, 1.0, "connecting triangles"):
+        _connect(mesh, surface, None if cross_creases else crease_angle)
+    return mesh
 
 
 def take_triangles(mesh: TangentMesh, kept: np.ndarray) -> TangentMesh:
@@ -424,51 +417,36 @@ def _rotations_to_planes(
     return rotations
 
 
-def _adjacency(
-    surface: Surface,
-    points: np.ndarray,
-    x: np.ndarray,
-    y: np.ndarray,
-    normal: np.ndarray,
-    defined: np.ndarray,
-    crease_angle: float | None,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
+def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) -> None:
+    """Fill `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
 
-    Strokes stop at triangles that are not `defined` (T,) and, unless `crease_angle` is None, at
-    creases.
+    Strokes stop at triangles on which the field is zero and, unless `crease_angle` is None, at creases.
     """
-    count, label = len(points), "connecting triangles"
-    with progress(0.0, 0.5, label):
+    corner_count = mesh.neighbor.size
+    with progress(0.0, 0.5):
         edges = build_edges(
-            surface.triangle_vertex.ravel(), np.arange(0, 3 * count + 1, 3, dtype=np.int32)
+            surface.triangle_vertex.ravel(), np.arange(0, corner_count + 1, 3, dtype=np.int32)
         )
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    triangle_a, triangle_b = a // 3, b // 3
-    passable = defined[triangle_a] & defined[triangle_b]
+    defined = (mesh.z != 0).any(axis=1)
+    passable = defined[a // 3] & defined[b // 3]
     if crease_angle is not None:
-        passable &= ~(
-            is_sharp_edge(surface, a, b)
-            & (dot(normal[triangle_a], normal[triangle_b]) < np.cos(crease_angle))
-        )
-    a, b, triangle_a, triangle_b = (values[passable] for values in (a, b, triangle_a, triangle_b))
-    report(0.7, label)
-    neighbor = np.full((count, 3), -1, dtype=np.int32)
-    neighbor_edge = np.zeros((count, 3), dtype=np.int8)
-    edge_transport = np.ones((count, 3), dtype=np.complex128)
+        is_bent = dot(mesh.normal[a // 3], mesh.normal[b // 3]) < np.cos(crease_angle)
+        passable &= ~(is_sharp_edge(surface, a, b) & is_bent)
+    a, b = a[passable], b[passable]
+    triangle_a, triangle_b = a // 3, b // 3
     # The edge from corner c to the next is opposite to the corner before c.
     edge_a, edge_b = (a + 2) % 3, (b + 2) % 3
-    edge_vector = points[triangle_a, (a + 1) % 3] - points[triangle_a, a % 3]
-    edge_in_a = dot(edge_vector, x[triangle_a]) + 1j * dot(edge_vector, y[triangle_a])
-    edge_in_b = dot(edge_vector, x[triangle_b]) + 1j * dot(edge_vector, y[triangle_b])
-    factor = unit(edge_in_b * edge_in_a.conj(), np.ones_like(edge_in_a))
-    neighbor[triangle_a, edge_a], neighbor[triangle_b, edge_b] = triangle_b, triangle_a
-    neighbor_edge[triangle_a, edge_a], neighbor_edge[triangle_b, edge_b] = edge_b, edge_a
-    edge_transport[triangle_a, edge_a], edge_transport[triangle_b, edge_b] = (
-        factor,
-        factor.conj(),
-    )
-    return neighbor, neighbor_edge, edge_transport
+    along = mesh.points[triangle_a, (a + 1) % 3] - mesh.points[triangle_a, a % 3]
+    edge_in_a = mesh.to_frame(triangle_a, along)
+    factor = unit(mesh.to_frame(triangle_b, along) * edge_in_a.conj(), np.ones_like(edge_in_a))
+    for own, edge, other, other_edge, transported in (
+        (triangle_a, edge_a, triangle_b, edge_b, factor),
+        (triangle_b, edge_b, triangle_a, edge_a, factor.conj()),
+    ):
+        mesh.neighbor[own, edge] = other
+        mesh.neighbor_edge[own, edge] = other_edge
+        mesh.edge_transport[own, edge] = transported
 
 
 def is_sharp_edge(surface: Surface, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Trace evenly spaced strokes on a tangent mesh, to `Strokes`."""
+"""Trace evenly spaced strokes on a tangent mesh, and close those that return to their first point."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
-from .closed_strokes import close_loops
+from ..field.frames import dot, normalize
 from .lateral_neighbors import SeparationRules
 from .placement import StreamlinePlacer
 from .seeding import (
@@ -20,7 +20,7 @@ from .seeding import (
 from .separation import enforce_separation
 from .spacing import CornerSpacing
 from .stroke_set import Strokes
-from .surface_particles import SurfaceParticles
+from .surface_particles import SurfaceParticles, TracedPath, advance
 from .tangent_mesh import TangentMesh
 
 #: Label of the progress.
@@ -43,6 +43,23 @@ FIRST_LENGTH_FACTOR, SECOND_LENGTH_FACTOR, FILL_SEPARATION_FACTOR = 3.3, 1.7, 0.
 #: ring around them: by these numbers of samples at once. At first they have another minimum separation,
 #: in spacings.
 FIRST_WARMUP, SECOND_WARMUP, WARMUP_SEPARATION = (3, 3), (2, 2, 2, 2, 2), 0.6
+
+#: Largest angle in radians between the field and a stroke that is traced again to close.
+MAX_CLOSING_ANGLE = np.radians(0.09)
+
+#: Largest distances between the ends of a stroke that can be closed, along and across the stroke,
+#: in spacings.
+MAX_FORWARD_GAP, MAX_LATERAL_GAP = 1.5, 0.4
+
+#: Minimum length of a loop in spacings.
+MIN_LOOP_LENGTH = 6.0
+
+#: Maximum number of secant iterations, and the largest distance in spacings by which the end of a
+#: loop may miss its first point after them.
+MAX_ITERATIONS, CLOSING_TOLERANCE = 4, 1e-3
+
+#: Step of a particle in spacings, and the number of steps between two reports.
+TRACE_STEP, STEPS_PER_REPORT = 0.5, 8
 
 
 def trace_on_mesh(
@@ -135,10 +152,7 @@ def _add_uncovered_seeds(
 
     The points of the seeds are about `seed_spacing` apart, in spacings; all are tried if it is 0.
     """
-    label = "looking for gaps"
-    report(placer.samples.coverage, label)
     seeds = uncovered_seeds(placer.samples, candidates)
-    report(placer.samples.coverage, label)
     if seed_spacing and len(seeds):
         median = float(np.median(placer.spacing.values))
         ratio = placer.samples.spacing_at(seeds) / median
@@ -162,7 +176,6 @@ def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
             # Each call closes the sides that it tried. Try others twice more.
             if not placer.seed_neighbors() and not placer.seed_neighbors():
                 return
-        report(placer.samples.coverage, TRACING)
         tip_count = len(placer.tips)
         max_tips = max(max_tips, tip_count)
         if tip_count < straggler_ratio * max_tips:
@@ -173,15 +186,14 @@ def _grow_until(placer: StreamlinePlacer, straggler_ratio: float = 0.0) -> None:
 
 def collect(placer: StreamlinePlacer) -> Strokes:
     """Return the strokes of a placer. They are all in one family; see `label_families`."""
-    label = "collecting strokes"
-    report(0.0, label)
+    report(0.0, "collecting strokes")
     samples = placer.samples
     columns = [np.concatenate(column) for column in zip(*placer.segments, strict=True)]
     placer.segments.clear()
     keep = np.flatnonzero(placer.strokes.alive[columns[0]])
     stroke, sign, triangle, begin_weights, weights, direction = (column[keep] for column in columns)
     del columns
-    report(0.5, label)
+    report(0.5, "collecting strokes")
     # Each segment adds one point: its end in the forward half of a stroke, its beginning in the
     # backward half. The first point is the end of the last backward segment, or the seed.
     backward = np.flatnonzero(sign < 0)
@@ -189,27 +201,178 @@ def collect(placer: StreamlinePlacer) -> Strokes:
     last_backward = np.full(placer.strokes.count, -1)
     last_backward[stroke[backward]] = backward
     last_backward = last_backward[stroke_ids]
-    seed, from_seed = placer.strokes.seed_sample[stroke_ids], last_backward[:, None] < 0
-    first_triangle = np.where(last_backward < 0, samples.triangle[seed], triangle[last_backward])
-    first_weights = np.where(from_seed, samples.weights[seed], weights[last_backward])
-    first_direction = np.where(
-        last_backward < 0, samples.local_direction[seed], -direction[last_backward]
-    )
+    seed, is_seed = placer.strokes.seed_sample[stroke_ids], last_backward < 0
+    first_triangle = np.where(is_seed, samples.triangle[seed], triangle[last_backward])
+    first_weights = np.where(is_seed[:, None], samples.weights[seed], weights[last_backward])
+    first_direction = np.where(is_seed, samples.local_direction[seed], -direction[last_backward])
     weights[backward] = begin_weights[backward]
     rank = sign * (np.arange(len(stroke)) + 1.0)
-    order = np.lexsort(
-        (
-            np.concatenate([rank, np.where(last_backward < 0, 0.0, -last_backward - 1.5)]),
-            np.concatenate([stroke, stroke_ids]),
+    rank = np.concatenate([rank, np.where(is_seed, 0.0, -last_backward - 1.5)])
+    stroke = np.concatenate([stroke, stroke_ids])
+    order = np.lexsort((rank, stroke))
+    stroke = stroke[order]
+    triangle, weights, direction = (
+        np.concatenate(pair)[order]
+        for pair in (
+            (triangle, first_triangle),
+            (weights, first_weights),
+            (direction * sign, first_direction),
         )
     )
-    report(0.6, label)
-    stroke = np.concatenate([stroke, stroke_ids])[order]
-    triangle = np.concatenate([triangle, first_triangle])[order]
-    weights = np.concatenate([weights, first_weights])[order]
-    direction = np.concatenate([direction * sign, first_direction])[order]
-    report(0.8, label)
     count = np.bincount(np.searchsorted(stroke_ids, stroke), minlength=len(stroke_ids))
     spacing = placer.spacing.at(triangle, weights, direction)
     triangle = triangle.astype(np.int32)
     return Strokes.on_mesh(placer.mesh, count, triangle, weights, direction, spacing)
+
+
+# --- closed strokes ---------------------------------------------------------------------------------
+
+
+def close_loops(mesh: TangentMesh, strokes: Strokes, spacing: CornerSpacing) -> Strokes:
+    """Close the strokes whose ends almost meet.
+
+    A stroke around a tube stops when it comes near its own other end. If its ends almost meet, it is
+    traced again from its first point, at a small constant angle to the field. The secant method finds
+    the angle at which the stroke arrives at its first point. Strokes for which it does not converge, or
+    for which the angle is larger than `MAX_CLOSING_ANGLE`, stay open.
+
+    Parameters
+    ----------
+    mesh : TangentMesh
+        The mesh on which the strokes were traced.
+    strokes : Strokes
+        Strokes before `label_families`: all are in one family.
+    spacing : CornerSpacing
+
+    Returns
+    -------
+    Strokes
+        The open strokes, then the loops.
+    """
+    candidates = _candidates(strokes)
+    if not len(candidates):
+        return strokes
+    first, last = strokes.start[:-1][candidates], strokes.start[1:][candidates] - 1
+    tolerance = CLOSING_TOLERANCE * strokes.spacing[first]
+    # The first two points of the secant method are angle 0 with the offset of the stroke as it was
+    # traced, and the angle that would remove this offset if the stroke were straight.
+    angle_before = np.zeros(len(candidates))
+    offset_before = _left_offset(strokes, first, strokes.points[last])
+    angle = np.clip(
+        -offset_before / strokes.length[candidates], -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE
+    )
+    for iteration in range(MAX_ITERATIONS):
+        with progress(iteration / MAX_ITERATIONS, (iteration + 1) / MAX_ITERATIONS):
+            path, offset, passed = _trace_loops(mesh, strokes, candidates, angle)
+        if (np.abs(offset) <= tolerance).all():
+            break
+        change = offset - offset_before
+        correction = np.divide(
+            -offset * (angle - angle_before), change, out=np.zeros_like(angle), where=change != 0
+        )
+        angle_before, offset_before = angle, offset
+        angle = angle + np.clip(correction, -MAX_CLOSING_ANGLE, MAX_CLOSING_ANGLE)
+    closes = passed & (np.abs(offset) <= tolerance) & (np.abs(angle) <= MAX_CLOSING_ANGLE)
+    if not closes.any():
+        return strokes
+    is_open = np.ones(len(strokes), dtype=bool)
+    is_open[candidates[closes]] = False
+    start = _particles_at_start(mesh, strokes, first[closes])
+    keep = closes[path.particle]
+    particle = np.concatenate([np.flatnonzero(closes), path.particle[keep]])
+    order = np.argsort(particle, kind="stable")
+    triangle, weights, direction = (
+        np.concatenate([at_start, traced[keep]])[order]
+        for at_start, traced in (
+            (start.triangle, path.triangle),
+            (start.weights, path.end_weights),
+            (start.member, path.direction),
+        )
+    )
+    count = np.bincount(particle, minlength=len(candidates))[closes]
+    spacings = spacing.at(triangle, weights, direction)
+    loops = Strokes.on_mesh(mesh, count, triangle, weights, direction, spacings, closed=True)
+    return Strokes.join([strokes.select(is_open), loops])
+
+
+def _left_offset(strokes: Strokes, first: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the (n,) signed distances of points to the left of the first points of strokes.
+
+    `first` holds the numbers of the first points. Left is relative to the direction of the stroke
+    there, seen from outside the surface.
+    """
+    left = np.cross(strokes.normal[first], strokes.member[first])
+    return dot(points - strokes.points[first], normalize(left))
+
+
+def _candidates(strokes: Strokes) -> np.ndarray:
+    """Return the numbers of open strokes whose last point is near their first point."""
+    first, last = strokes.start[:-1], strokes.start[1:] - 1
+    spacing, length = strokes.spacing[first], strokes.length
+    gap = strokes.points[first] - strokes.points[last]
+    forward = dot(gap, normalize(strokes.member[first] + strokes.member[last]))
+    lateral = np.sqrt(np.maximum(dot(gap, gap) - forward * forward, 0))
+    is_candidate = (dot(strokes.member[first], strokes.member[last]) > 0.8) & ~strokes.closed
+    is_candidate &= dot(strokes.normal[first], strokes.normal[last]) > 0.8
+    is_candidate &= np.abs(forward) < MAX_FORWARD_GAP * spacing
+    is_candidate &= lateral < np.minimum(MAX_LATERAL_GAP * spacing, 2 * MAX_CLOSING_ANGLE * length)
+    return np.flatnonzero(is_candidate & (length > MIN_LOOP_LENGTH * spacing))
+
+
+def _trace_loops(
+    mesh: TangentMesh, strokes: Strokes, candidates: np.ndarray, angle: np.ndarray
+) -> tuple[TracedPath, np.ndarray, np.ndarray]:
+    """Trace n candidates from their first points until they pass these points again or miss them.
+
+    `angle` is the (n,) angle in radians to the left of the field.
+
+    Returns
+    -------
+    path : TracedPath
+        The particles are the candidates.
+    left_offset : (n,) float64 ndarray
+        Signed distance to the left of the first point at which a particle passed it, in world space.
+    passed : (n,) bool ndarray
+        Whether the particle passed its first point.
+    """
+    first = strokes.start[:-1][candidates]
+    origin, tangent = strokes.points[first], strokes.member[first]
+    spacing, length = strokes.spacing[first], strokes.length[candidates]
+    particles = _particles_at_start(mesh, strokes, first)
+    total_walked = np.zeros(len(candidates))
+    passed = np.zeros(len(candidates), dtype=bool)
+    active = np.arange(len(candidates))
+    paths: list[TracedPath] = []
+    while len(active):
+        if len(paths) % STEPS_PER_REPORT == 0:
+            report(1 - len(active) / len(candidates), "closing loops")
+        current = particles.take(active)
+        to_origin = origin[active] - mesh.points_at(current.triangle, current.weights)
+        forward = dot(to_origin, tangent[active])
+        is_near = (total_walked > length - 2 * spacing)[active] & (
+            dot(to_origin, to_origin) < spacing[active] ** 2
+        )
+        arrived = is_near & (forward < 1e-6 * spacing[active])
+        passed[active[arrived]] = True
+        overran = total_walked[active] > length[active] + (MAX_FORWARD_GAP + 1) * spacing[active]
+        continuing = np.flatnonzero(~arrived & ~overran)
+        if not len(continuing):
+            break
+        step = TRACE_STEP * spacing[active]
+        step = np.where(is_near, np.minimum(forward, step), step)[continuing]
+        active, current = active[continuing], current.take(continuing)
+        current, walked, ended, path = advance(mesh, current, step, angle[active])
+        paths.append(path._replace(particle=active[path.particle]))
+        particles.assign(active, current)
+        total_walked[active] += walked
+        active = active[~ended & (walked > 0)]
+    end = mesh.points_at(particles.triangle, particles.weights)
+    return TracedPath.concatenate(paths), _left_offset(strokes, first, end), passed
+
+
+def _particles_at_start(mesh: TangentMesh, strokes: Strokes, first: np.ndarray) -> SurfaceParticles:
+    """Return particles at the first points of strokes that move along the strokes."""
+    triangle, weights = strokes.triangle[first], strokes.weights[first]
+    reference = mesh.to_frame(triangle, strokes.member[first])
+    member = mesh.members_at(triangle, weights, reference)
+    return SurfaceParticles(triangle, weights, member, np.ones(len(first)))

@@ -1,9 +1,9 @@
-"""Visibility of strokes: projection to pixels, and clipping to the frame and by a depth buffer."""
+"""Strokes in the picture: projection to pixels, clipping by the frame and a depth buffer, smoothing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
@@ -26,7 +26,7 @@ BLOCK_POINTS = 1 << 16
 #: Pixels whose depth is computed at once.
 BLOCK_PIXELS = 1 << 20
 
-#: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of the
+#: Visible runs, and gaps between them, that are shorter than this in pixels are artifacts of
 #: rasterization.
 MIN_RUN_PX = 2.5
 
@@ -37,6 +37,22 @@ DEPTH_BIAS_PX = 1.5
 #: Largest amount that the steepness of the surface adds to this bias, in pixels. Steepness is the
 #: tangent of the angle between the normal and the direction to the camera.
 MAX_BIAS_STEEPNESS = 4.0
+
+#: Standard deviation of the binomial filter in pixels. It moves a corner of 20 degrees by half a pixel,
+#: and an arc with a radius of 20 pixels by a fifth.
+FILTER_PX = 3.0
+
+#: Largest standard deviation in spacings: strokes that are near each other bend more.
+FILTER_SPACINGS = 0.3
+
+#: Turns in the picture that are sharper than this are corners and stay, in outlines and in strokes, in radians.
+MAX_OUTLINE_TURN, MAX_STROKE_TURN = np.radians(45), np.radians(100)
+
+#: Rounds of the filter (1, 2, 1) / 4, whose variance is half a squared distance between points.
+ROUNDS = round(2 * (FILTER_PX / SAMPLE_STEP_PX) ** 2)
+
+#: Points of strokes that are smoothed at once.
+SMOOTHED_POINTS = 1 << 15
 
 
 def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -61,8 +77,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
         ndc = clip[:, :2] / clip[:, 3:]
     pixels = (ndc + 1) * (np.array([camera.width, camera.height]) / 2)
     pixels[(clip[:, 3] <= 0) | (clip[:, 2] < -clip[:, 3])] = np.nan
-    depth_row = camera.view[2]
-    return pixels, -(points @ depth_row[:3] + depth_row[3])
+    return pixels, camera.depths(points)
 
 
 def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
@@ -72,8 +87,7 @@ def pixel_size(points: np.ndarray, camera: Camera) -> np.ndarray:
     """
     if not camera.is_perspective:
         return np.full(len(points), 1 / camera.pixels_per_unit)
-    depth_row = camera.view[2]
-    depth = -(points @ depth_row[:3] + depth_row[3])
+    depth = camera.depths(points)
     return np.maximum(depth, 1e-6 * np.abs(depth).max(initial=0)) / camera.pixels_per_unit
 
 
@@ -98,7 +112,7 @@ def clip_to_visible(strokes: Strokes, camera: Camera, depth_buffer: DepthBuffer 
     A point is compared with the triangles that are visible at the four pixel centers around it. It
     is hidden if the planes of all four are in front of it by more than a bias: `DEPTH_BIAS_PX` plus
     the steepness of the plane, in pixels. Planes are used because the depth at a pixel center
-    differs from that at the point, by the slope times up to half a pixel. A point is also hidden if
+    differs from the depth at the point, by the slope times up to half a pixel. A point is also hidden if
     it is behind only one of them, but one of the two faces the camera and the other faces away.
     """
     if depth_buffer is None:
@@ -132,17 +146,12 @@ def visible_runs(
     max_gap, min_run : float
         Lengths in pixels below which hidden runs are filled and visible runs are removed.
     """
-    label = "finding visible strokes"
-    report(0.0, label)
     if not len(strokes):
         return strokes
     clipped = []
     counts = pixel_counts(strokes, camera)
-    # Each block ends with the stroke that reaches the next multiple of its size.
-    block_index = np.cumsum(counts)[strokes.start[1:] - 1] // BLOCK_POINTS
-    cuts = [0, *np.flatnonzero(np.diff(block_index)) + 1, len(strokes)]
-    for first, stop in pairwise(cuts):
-        report(first / len(strokes), label)
+    for first, stop in _stroke_blocks(np.cumsum(counts)[strokes.start[1:] - 1], BLOCK_POINTS):
+        report(first / len(strokes), "finding visible strokes")
         block = strokes.subdivided(counts, first, stop)
         pixels, _ = project_to_pixels(block.points, camera)
         inside = in_frame(pixels, camera)
@@ -153,8 +162,15 @@ def visible_runs(
         block = block.take_points(order)
         visible = clean_runs(visible[order], pixels[order], block.start, max_gap, min_run)
         clipped.append(block.runs_where(visible, free_at_removed=inside[order]))
-    report(1.0, label)
     return Strokes.join(clipped)
+
+
+def _stroke_blocks(point_count: np.ndarray, size: int) -> Iterator[tuple[int, int]]:
+    """Return the first and last strokes of blocks, given the number of points up to each stroke.
+
+    Each block ends with the stroke that reaches the next multiple of its size.
+    """
+    return pairwise([0, *np.flatnonzero(np.diff(point_count // size)) + 1, len(point_count)])
 
 
 def _from_hidden_points(strokes: Strokes, visible: np.ndarray) -> np.ndarray:
@@ -179,9 +195,9 @@ def in_frame(pixels: np.ndarray, camera: Camera) -> np.ndarray:
 
 
 def pixel_counts(strokes: Strokes, camera: Camera) -> np.ndarray:
-    """Return (n,) int64: the parts of at most `SAMPLE_STEP_PX` pixels of the segment before a point.
+    """Return (n,) int64: how many parts of at most `SAMPLE_STEP_PX` pixels the segment before a point has.
 
-    As for `Strokes.subdivided`. A segment that is partly behind the camera is not divided.
+    They are the counts of `Strokes.subdivided`. A segment that is partly behind the camera is not divided.
     """
     pixels, _ = project_to_pixels(strokes.points, camera)
     pixel_distance = np.zeros(len(pixels))
@@ -221,7 +237,6 @@ class DepthBuffer:
 def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthBuffer:
     """Rasterize mesh instances to a depth buffer."""
     label = "finding the nearest surface"
-    report(0.0, label)
     corners = np.concatenate([_camera_triangles(instance, camera) for instance in instances])
     flat_corners = corners.reshape(-1, 3)
     clip = flat_corners @ camera.projection[:, :3].T + camera.projection[:, 3]
@@ -235,7 +250,6 @@ def rasterize_depth(instances: Sequence[MeshInstance], camera: Camera) -> DepthB
         report(0.8, label)
         corner_depth = corners[fragments.triangle[block], :, 2]
         depth.flat[fragments.pixel[block]] = -dot(fragments.barycentric[block], corner_depth)
-    report(0.9, label)
     normal = normalize(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     start = tuple(accumulate((len(i.surface.triangles) for i in instances), initial=0))
     return DepthBuffer(camera, start, triangle, depth, normal, dot(normal, corners[:, 0]))
@@ -274,8 +288,8 @@ def _is_hidden(
     for plane in planes_around(points, pixels, depth_buffer):
         faces_away = np.sign(plane.facing) * facing < 0
         hidden &= plane.hides
-        # A point that faces away is behind a triangle that does not, or the reverse: at a
-        # silhouette, one of the four pixels is enough, without a bias.
+        # At a silhouette, a point that faces away is behind a triangle that does not, or the reverse. Then
+        # one of the four pixels is enough, without a bias.
         behind_front |= (plane.triangle >= 0) & faces_away & (plane.distance > 0)
     return hidden | behind_front
 
@@ -331,9 +345,8 @@ def planes_around(
             with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
                 distance = np.where(facing != 0, behind_plane / facing, 0) * length
                 steepness = np.sqrt(np.maximum(length**2 / facing**2 - 1, 0))
-            steepness = np.minimum(
-                np.nan_to_num(steepness, posinf=MAX_BIAS_STEEPNESS), MAX_BIAS_STEEPNESS
-            )
+            # NaN if the square of `facing` is 0 and the length as well.
+            steepness = np.minimum(np.nan_to_num(steepness), MAX_BIAS_STEEPNESS)
             bias = footprint * (DEPTH_BIAS_PX + steepness)
             hides = (triangle >= 0) & (distance > bias)
             yield PlanesAround(triangle, facing, distance, hides)
@@ -385,3 +398,49 @@ def clean_runs(
             flip &= ~ends[first] & ~ends[last + 1]
         visible = visible ^ flip[np.cumsum(starts_run) - 1]
     return visible
+
+
+# --- smoothing --------------------------------------------------------------------------------------
+
+
+def smooth(strokes: Strokes, camera: Camera) -> Strokes:
+    """Filter the points of lines, so that they do not have corners where the mesh has edges.
+
+    Parameters
+    ----------
+    strokes : Strokes
+        As `clip_to_visible` returns them, with points at most `SAMPLE_STEP_PX` pixels apart.
+    camera : Camera
+
+    Returns
+    -------
+    Strokes
+        Ends and sharp corners are where they were. The lines leave the surface by a fraction of a pixel.
+    """
+    points = strokes.points.copy()
+    for first, stop in _stroke_blocks(strokes.start[1:], SMOOTHED_POINTS):
+        report(first / max(len(strokes), 1), "smoothing strokes")
+        block = slice(strokes.start[first], strokes.start[stop])
+        points[block] = _smoothed_points(strokes.select(np.arange(first, stop)), camera)
+    return replace(strokes, points=points)
+
+
+def _smoothed_points(strokes: Strokes, camera: Camera) -> np.ndarray:
+    """Return the (n, 3) filtered points of strokes."""
+    points = strokes.points
+    before, after = np.arange(len(points)) - 1, np.arange(len(points)) + 1
+    first, last = strokes.start[:-1], strokes.start[1:] - 1
+    before[first] = np.where(strokes.closed, last - 1, first)
+    after[last] = np.where(strokes.closed, first + 1, last)
+    pixels, _ = project_to_pixels(points, camera)
+    incoming, outgoing = pixels - pixels[before], pixels[after] - pixels
+    norm = np.hypot(*incoming.T) * np.hypot(*outgoing.T)
+    # False at ends, where a vector is zero, and behind the camera, where it is NaN.
+    spacing = strokes.spacing / pixel_size(points, camera)
+    max_turn = np.where(spacing > 0, MAX_STROKE_TURN, MAX_OUTLINE_TURN)
+    moves = dot(incoming, outgoing) > np.cos(max_turn) * norm
+    width = np.where(spacing > 0, FILTER_SPACINGS * spacing, FILTER_PX)
+    strength = moves * 0.25 * np.minimum(width / FILTER_PX, 1) ** 2
+    for _ in range(ROUNDS):
+        points = points + strength[:, None] * (points[before] + points[after] - 2 * points)
+    return points

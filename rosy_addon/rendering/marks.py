@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation.arrow_marks import ArrowMarks, arrow_marks
-from ..annotation.draw_arrows import draw_arrows
-from ..annotation.draw_marks import draw_marks
+from ..annotation.draw_marks import draw_arrows, draw_marks
 from ..annotation.key_contents import PictureKey, sorted_indices
 from ..annotation.singularity_marks import cached_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities

@@ -17,7 +17,7 @@ from ..core.errors import RosyError
 from ..field.analysis import FieldComparison, compare_fields
 from ..projection.ambient_occlusion import DIRECTION_COUNT, ambient_occlusion
 from ..projection.gbuffer import MeshInstance
-from ..surface_texture.direction_maps import corner_tangents
+from ..surface_texture.line_order import corner_tangents
 from ..worker.job import Call, Steps, call_steps, job
 from .field_attributes import (
     VECTOR_TYPE,

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..core.color import from_hex, to_linear
-from ..line_drawing.drawing_outputs import StrokeGeometry, SurfacePoints
+from ..line_drawing.drawing_outputs import StrokeGeometry, SurfaceAttachment
 from ..line_drawing.outline import OUTLINE_KINDS
 from .datablocks import OWNED_TAG, STROKES_TAG
 from .node_builder import NodeBuilder, enabled_output, new_emissive_material, new_modifier_group
@@ -61,8 +61,8 @@ def new_curves(
     set_attribute(data, "member", "FLOAT_VECTOR", "POINT", strokes.member)
     set_attribute(data, "surface_normal", "FLOAT_VECTOR", "POINT", strokes.normal)
     set_attribute(data, "face_index", "INT", "POINT", strokes.face)
-    if geometry.places is not None:
-        for key, (data_type, column) in attribute_values(geometry.places).items():
+    if geometry.attachment is not None:
+        for key, (data_type, column) in attribute_values(geometry.attachment).items():
             set_attribute(data, key, data_type, "POINT", column)
     material = new_emissive_material(name, INK_ATTRIBUTE)
     register(material, name)
@@ -199,13 +199,13 @@ VERTEX_ATTRIBUTES = ("surface_vertex_0", "surface_vertex_1", "surface_vertex_2")
 WEIGHTS_ATTRIBUTE, HEIGHT_ATTRIBUTE = "surface_weights", "surface_height"
 
 
-def attribute_values(places: SurfacePoints) -> dict[str, tuple[str, object]]:
+def attribute_values(attachment: SurfaceAttachment) -> dict[str, tuple[str, object]]:
     """Return the data types and values of the attributes of the points, by their names."""
     values: dict[str, tuple[str, object]] = {
-        name: ("INT", places.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
+        name: ("INT", attachment.vertices[:, index]) for index, name in enumerate(VERTEX_ATTRIBUTES)
     }
-    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", places.weights)
-    values[HEIGHT_ATTRIBUTE] = ("FLOAT", places.height)
+    values[WEIGHTS_ATTRIBUTE] = ("FLOAT_VECTOR", attachment.weights)
+    values[HEIGHT_ATTRIBUTE] = ("FLOAT", attachment.height)
     return values
 
 

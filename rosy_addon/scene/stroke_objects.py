@@ -114,7 +114,8 @@ def store_strokes(
     collection : bpy.types.Collection, optional
         The collection of a new object. By default, or if it is linked, the collection of the scene.
     vertex_count : int
-        Number of vertices of the evaluated mesh of `owner`, if the geometry has places on it.
+        Number of vertices of the evaluated mesh of `owner`, if the points of the geometry are attached
+        to it.
 
     Returns
     -------
@@ -148,7 +149,7 @@ def store_strokes(
     obj.parent = owner
     obj.matrix_parent_inverse = Matrix() if owner is None else owner.matrix_world.inverted_safe()
     obj.matrix_basis = Matrix()
-    if kind == "CURVES" and geometry.places is not None:
+    if kind == "CURVES" and geometry.attachment is not None:
         follow_surface(obj, owner, vertex_count)
     else:
         stop_following(obj)

@@ -124,7 +124,7 @@ def brushed_metal_shader(
     ----------
     build : NodeBuilder
     image_node : bpy.types.Node
-        Node of an image from `surface_texture.direction_maps`.
+        Node of an image from `surface_texture.line_order`.
     uv_map : str
         Name of the UV map.
     """

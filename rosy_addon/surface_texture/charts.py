@@ -1,4 +1,4 @@
-"""`UvCharts`: the triangles of a tangent mesh in a UV map, and frames that turn little in it.
+"""The charts of a UV map: the triangles of a tangent mesh in it, and frames that turn little in it.
 
 A chart is a part of the surface whose triangles are connected in the UV map. Tangents of the surface
 are complex numbers in the frame of their triangle (see `line_drawing.tangent_mesh`). The map from
@@ -19,7 +19,7 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.frames import dot, transport
 from ..field.surface import Surface, connected_components
-from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
+from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges, unit
 
 #: Corners are at the same point of a UV map if their coordinates differ by at most this much.
 SAME_UV = 1e-6
@@ -58,7 +58,7 @@ class UvCharts:
 
     @property
     def density(self) -> np.ndarray:
-        """(T,) area in the UV map of a square Blender unit; negative for mirrored triangles."""
+        """The (T,) area in the UV map of a square Blender unit; negative for mirrored triangles."""
         return np.abs(self.linear) ** 2 - np.abs(self.conjugate) ** 2
 
     def to_uv(self, triangle: np.ndarray, tangent: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ class UvCharts:
         return linear.conj() * scale, -conjugate * scale
 
     def stretch(self) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) largest and smallest length in the UV map of a Blender unit."""
+        """Return the (T,) largest and smallest length in the UV map of a Blender unit."""
         linear, conjugate = np.abs(self.linear), np.abs(self.conjugate)
         return linear + conjugate, np.abs(linear - conjugate)
 
@@ -90,7 +90,7 @@ def uv_charts(surface: Surface, mesh: TangentMesh, uv: np.ndarray) -> UvCharts:
     ----------
     surface : Surface
     mesh : TangentMesh
-        Of the surface. Charts end where its streamlines stop.
+        Tangent mesh of the surface. Charts end where its streamlines stop.
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
 
@@ -136,7 +136,7 @@ def _checked(surface: Surface, uv: np.ndarray) -> np.ndarray:
 
 
 def _gradients(corner_uv: np.ndarray) -> np.ndarray:
-    """(T, 3) complex gradients of the barycentric coordinates; 0 for triangles without area."""
+    """Return (T, 3) complex gradients of the barycentric coordinates; 0 for triangles without area."""
     # Edges opposite to the corners. A gradient is perpendicular to its edge.
     edge = corner_uv[:, [2, 0, 1]] - corner_uv[:, [1, 2, 0]]
     double_area = (edge[:, 0].conj() * edge[:, 1]).imag[:, None]
@@ -154,9 +154,9 @@ def _chart_edges(mesh: TangentMesh, corner_uv: np.ndarray) -> SharedEdges:
 
 
 def uv_tangents(surface: Surface, mesh: TangentMesh, charts: UvCharts) -> np.ndarray:
-    """Compute unit tangents in the direction of u, averaged at the corners over each smooth fan.
+    """Return unit tangents in the direction of u, averaged at the corners over each smooth fan.
 
-    As renderers do for normal maps.
+    Renderers compute the same tangents for normal maps.
 
     Returns
     -------
@@ -209,6 +209,5 @@ def _averaged_at_corners(
 
 
 def _unit(values: np.ndarray) -> np.ndarray:
-    """Scale complex numbers to the modulus 1; 0 and tiny numbers become 0."""
-    norm = np.abs(values)
-    return np.divide(values, norm, out=np.zeros_like(values), where=norm > 1e-300)
+    """Return complex numbers scaled to the modulus 1; 0 stays 0."""
+    return unit(values, np.zeros_like(values))

@@ -40,18 +40,23 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.surface_sampling import values_in_triangles
 from .charts import UvCharts, uv_charts
-from .direction_maps import direction_map
 from .hatching import lit_ink, thresholds
-from .margin import fill_margin
-from .texel_field import texel_field
-from .texel_noise import texel_noise
-from .texels import Texels, TexelSurface, TextureFrame, rasterize_charts, texture_frame
+from .line_order import direction_map
+from .texel_field import texel_field, texel_noise
+from .texels import (
+    Texels,
+    TexelSurface,
+    TextureFrame,
+    fill_margin,
+    rasterize_charts,
+    texture_frame,
+)
 
-#: Pixels of a look along the side of a square as large as the surface. A picture of 1000 pixels that the
-#: mesh fills has lines of about the same width.
+#: Pixels of a look along the side of a square with the area of the surface. Lines are then about as wide as in
+#: a picture of 1000 pixels that the mesh fills.
 SURFACE_PIXELS = 1024
 
-#: A step is one texel long where the UV map is finest, but for this fraction of the texels.
+#: Fraction of the texels in which a step may be longer than one texel, as the UV map is finest there.
 FINE_FRACTION = 0.05
 
 #: Smallest length of a step, in texels of the mean size.
@@ -95,7 +100,7 @@ CONTENTS = {
 #: The settings of a look that a map of directions is drawn with.
 DIRECTION_SETTINGS = ("display", "cross_creases", "crease_angle", "guiding_angle")
 
-#: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
+#: Smallest fraction of overlapping charts that is reported to the user. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
 
 #: Share of the time after which a texture is drawn.
@@ -112,7 +117,7 @@ class Texture:
     rgba : (H, W, 4) float32 ndarray
         Rows from the bottom. The tiles of a UDIM texture are stacked.
     overlap : float
-        Fraction of the area of the UV map that lies under other parts of it. They show the same texels.
+        Fraction of the area of the UV map that lies under other charts, which show the same texels.
     is_data : bool
         Whether the pixels are thresholds of ink (`compositor.ink_thresholds`) or directions, and not
         linear colors.
@@ -127,7 +132,7 @@ class Texture:
     line_count: int
 
     def overlap_note(self, name: str) -> str:
-        """Return what to tell the user of overlapping charts of the mesh `name`; empty if nothing."""
+        """Return a message about overlapping charts of the mesh `name`; empty if they hardly overlap."""
         if self.overlap <= NOTABLE_OVERLAP:
             return ""
         return (
@@ -137,7 +142,7 @@ class Texture:
 
     def tiles(self) -> dict[int, np.ndarray]:
         """Return the (size, size, 4) picture of each tile, by its UDIM number."""
-        # All tiles of a texture that is not of the kind UDIM show the picture of the first one.
+        # If the texture is not UDIM, all tiles show the picture of the first one.
         pictures = np.split(self.rgba, len(self.rgba) // self.frame.size)
         return dict(zip(self.frame.tile_names(), pictures, strict=False))
 
@@ -237,7 +242,7 @@ def draw_texture(
 
 
 def texture_colors_values(look: Look, content: str = "look") -> bool:
-    """Return whether a texture has the colors of numbers on the surface. Hatching has those of its ink."""
+    """Return whether numbers on the surface color a texture. Hatching has the colors of its ink instead."""
     return content == "look" and colors_values(look) and not is_hatched(look)
 
 
@@ -288,7 +293,7 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
 
 
 def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
-    """(P, 4) linear colors of the field at texels, and 1."""
+    """Return (P, 4): the linear colors of the field at texels, and the opacity 1."""
     with progress(0.0, 0.3):
         noise = texel_noise(on, look)
     with progress(0.3, 0.95):
@@ -311,7 +316,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
 
 
 class TextureSettings(NamedTuple):
-    """How a texture is drawn; see `draw_texture`."""
+    """The settings of `draw_texture` besides the look."""
 
     size: int = DEFAULT_SIZE
     margin: int = DEFAULT_MARGIN

@@ -1,4 +1,4 @@
-"""Hatching at texels: the thresholds of the lines of a field, whatever the light (`ink_thresholds`)."""
+"""Hatching at texels: thresholds of the lines of a field, from which any light makes ink (`ink_thresholds`)."""
 
 from __future__ import annotations
 
@@ -43,17 +43,16 @@ from ..core.color import LUMINANCE_WEIGHTS
 from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from ..projection.rest_coordinates import matrix_scale, rest_positions
-from ..projection.surface_lines import MAX_TRIANGLES, SurfaceLines, cached_surface_lines
+from ..projection.surface_lines import MAX_TRIANGLES, cached_surface_lines
 from .line_order import first_line_weights, line_order
-from .texel_field import frames_at
-from .texel_noise import texel_noise
+from .texel_field import frames_at, texel_noise
 from .texels import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
 SWAP_GRAINS = 8.0
 
-#: Largest number of triangles on which lines are spaced, for each texel. It is reached only where texels
-#: are much smaller on parts of the surface than in the map as a whole, as where charts lie on each other.
+#: Largest number of triangles on which lines are spaced, for each texel. It is reached only if texels on parts
+#: of the surface are much smaller than on average, for example if charts overlap.
 TRIANGLES_PER_TEXEL = 16
 
 #: Least number of spots along the side of a texture where a field has no direction.
@@ -83,7 +82,7 @@ def thresholds(
     Returns
     -------
     (P, 4) float32 ndarray
-        As of `threshold_pixels`.
+        As `threshold_pixels` returns them.
     """
     look = sharp_look(look)
     with progress(0.0, 0.1):
@@ -169,29 +168,24 @@ def _lines(
     """Draw the streaks or the even lines of a field, and what makes them uneven."""
     is_spaced, is_broken = is_even(look), has_breaks(look)
     undefined = not field.representation.all()
-    images = even_lines = break_images = noise = undirected = paper_grain = None
+    even_lines = noise = undirected = paper_grain = None
     if not is_spaced or is_broken or undefined:
         with progress(0.0, 0.3):
             noise = texel_noise(on, look)
-    break_look = replace(look, length=break_steps(look))
     if is_spaced:
         with progress(0.3, 0.6):
             even_lines = _even_lines(on, field, look, wobble_angle, cache)
-        if is_broken:
-            with progress(0.6, 0.8):
-                (break_images,) = lic_lengths(field, [break_look], noise)
-    elif is_broken:
-        with progress(0.3, 0.8):
-            images, break_images = lic_lengths(field, [look, break_look], noise)
-    else:
-        with progress(0.3, 0.8):
-            (images,) = lic_lengths(field, [look], noise)
+    looks = [] if is_spaced else [look]
+    if is_broken:
+        looks.append(replace(look, length=break_steps(look)))
+    with progress(0.6 if is_spaced else 0.3, 0.8):
+        lic = lic_lengths(field, looks, noise) if looks else []
     with progress(0.8, 0.9):
         look_streak_statistics(look)
     if undefined:
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
-        # Spots of one size in texels, as wide as lines where the map is as usual.
+        # Spots have one size in texels: the median width of lines.
         grain = look.grain * on.step * float(np.median(texels_per_unit)) * size
         grain = min(grain, size / MIN_SPOTS)
         seen_noise = unconvolved_noise(noise, look)
@@ -199,8 +193,8 @@ def _lines(
     if has_paper_grain(look):
         with progress(0.9, 1.0):
             paper_grain = _paper_grain(on, field, look)
-    return images, LineModulation(
-        break_images=break_images,
+    return None if is_spaced else lic[0], LineModulation(
+        break_images=lic[-1] if is_broken else None,
         paper_grain=paper_grain,
         undirected=undirected,
         even_lines=even_lines,
@@ -241,15 +235,8 @@ def _even_lines(
     spacing = SPACING_GRAINS * look.grain * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
     with progress(0.0, 0.8):
-        lines: SurfaceLines = cached_surface_lines(
-            instance.surface,
-            instance.matrix,
-            instance.field,
-            look.display,
-            spacing,
-            cache,
-            max_triangles,
-        )
+        geometry = instance.surface, instance.matrix, instance.field, look.display
+        lines = cached_surface_lines(*geometry, spacing, cache, max_triangles)
     triangles, corners = np.arange(len(on.mesh.points)), on.mesh.points
     sides = [on.mesh.to_frame(triangles, corners[:, k] - corners[:, 0]) for k in (1, 2)]
     members = all_members(field, look.guiding_angle)

@@ -1,6 +1,7 @@
-"""The order of the lines of a field on a surface: which line comes first in light tones.
+"""The order of the lines of a field on a surface, and maps of the direction of its first line.
 
-In a picture, the line nearest to the guiding angle comes first. Where the field turns, another line
+The first line is drawn in light tones, the others join in darker ones. In a picture, the line nearest to the
+guiding angle comes first. Where the field turns, another line
 becomes the nearest, and the hatching changes its direction there. On a surface the first line can
 continue instead, as far as the field allows. Around singularities it cannot: somewhere, two lines
 have to swap.
@@ -8,6 +9,16 @@ have to swap.
 The order is found by threshold dynamics: each point takes the line nearest to the guide, the lines are
 averaged over a length, and so again with shorter lengths. The curves where lines swap then shrink. The
 last average is over a few widths of lines, and blends the lines where they swap.
+
+Renderers read the direction of the first line from an anisotropy map of glTF or a flow map. An anisotropy map
+has the components along the tangent, which is the direction of u, and the bitangent. Opposite directions mean
+the same in it, but a filter must not average them: the directions are combed. A flow map has the components
+along u and v, in which a shader moves a texture.
+
+References
+----------
+The Khronos Group, "KHR_materials_anisotropy", 2023. Flow maps: Vlachos, "Water Flow in Portal 2", SIGGRAPH 2010
+course "Advances in Real-Time Rendering".
 """
 
 from __future__ import annotations
@@ -22,9 +33,19 @@ from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
 from ..field.representation import power
-from ..field.surface import build_surface, connected_components
+from ..field.rosy_field import RosyField
+from ..field.surface import Surface, build_surface, connected_components
 from ..field.surface_averages import SurfaceAverages
-from ..line_drawing.tangent_mesh import TangentMesh, nearest_member, shared_edges
+from ..line_drawing.tangent_mesh import (
+    TangentMesh,
+    build_tangent_mesh,
+    nearest_member,
+    shared_edges,
+)
+from ..projection.gbuffer import MeshInstance
+from ..projection.pixel_blocks import pixel_blocks
+from .charts import uv_tangents
+from .texels import TexelSurface
 
 #: Longest edge of the triangles on which the order is computed, as a fraction of the side of a square
 #: as large as the surface; and the most triangles, unless the mesh has more.
@@ -39,8 +60,8 @@ X_AXIS_WEIGHT = 0.01
 #: Sharpness of the choice between lines. Those whose weight is below `MIN_WEIGHT` are not drawn.
 SHARPNESS, MIN_WEIGHT = 6.0, 0.02
 
-#: Label of the progress.
-LABEL = "ordering lines"
+#: Labels of the progress.
+LABEL, MAP_LABEL = "ordering lines", "drawing directions"
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +71,7 @@ class LineOrder:
     Attributes
     ----------
     degree : int
-        Of the representation of a line: 1 if opposite directions are on different lines, else 2.
+        Degree of the representation of a line: 1 if opposite directions are on different lines, else 2.
     tree : BisectionTree
         The triangles of the tangent mesh, and the L smaller ones in them.
     first : (L, 3) complex64 ndarray
@@ -85,8 +106,8 @@ class CombedDirections:
     ----------
     line : LineOrder
     sense : LineOrder
-        Of degree 1: which of the two opposite directions of a line is chosen. Where it turns over, the line
-        goes on.
+        Of degree 1: which of the two opposite directions of a line is chosen. Where the choice changes, the
+        line continues.
     """
 
     line: LineOrder
@@ -275,9 +296,9 @@ def _unit_root(values: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _guide(mesh: TangentMesh, guiding_angle: float, degree: int) -> np.ndarray:
-    """(T,) representations of the direction at an angle to the horizontal one.
+    """Return (T,) representations of the direction at an angle to the horizontal direction.
 
-    Its modulus decreases toward horizontal triangles, where the x axis takes its place.
+    The modulus decreases toward horizontal triangles, on which the x axis is the guide.
     """
     x, _, z = (mesh.x + 1j * mesh.y).T
     turn = np.exp(1j * guiding_angle)
@@ -300,3 +321,86 @@ def _welded(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray]:
     points = np.empty((int(group.max()) + 1, 3))
     points[group] = mesh.points.reshape(-1, 3)
     return points, group.reshape(-1, 3).astype(np.int32)
+
+
+# --- maps of directions ------------------------------------------------------------------------------
+
+
+def direction_map(on: TexelSurface, content: str, guiding_angle: float) -> np.ndarray:
+    """Compute the anisotropy map or the flow map of a field.
+
+    Parameters
+    ----------
+    on : TexelSurface
+    content : {"anisotropy", "flow"}
+    guiding_angle : float
+        Direction that the direction of the map is near to; see `line_order`.
+
+    Returns
+    -------
+    (P, 4) float32 ndarray
+        As stored in the file, 0 to 1: the components of a unit vector, from -1 to 1, in red and green. Blue is
+        1, and 0 where the field is undefined. Alpha is 1.
+    """
+    mesh, charts, texels = on.mesh, on.charts, on.texels
+    with progress(0.0, 0.7):
+        combed = combed_directions(mesh, guiding_angle)
+    is_flow = content == "flow"
+    tangents = None
+    if not is_flow:
+        with progress(0.7, 0.8):
+            tangents = uv_tangents(on.instance.surface, mesh, charts)
+    is_mirrored = charts.density < 0
+    values = np.ones((len(texels), 4), dtype=np.float32)
+    for block in pixel_blocks(len(texels)):
+        report(0.8 + 0.2 * block.start / len(texels), MAP_LABEL)
+        triangle, weights = texels.triangle[block], texels.barycentric[block]
+        direction, is_defined = _directions_at(mesh, combed, triangle, weights)
+        if is_flow:
+            relative = charts.to_uv(triangle, direction)
+            relative /= np.maximum(np.abs(relative), np.finfo(float).tiny)
+        else:
+            tangent = np.einsum("nk,nk->n", weights, tangents[triangle])
+            relative = direction * np.exp(-1j * np.angle(tangent))
+            relative[is_mirrored[triangle]] = relative[is_mirrored[triangle]].conj()
+        values[block, 0], values[block, 1] = relative.real, relative.imag
+        values[block, 2] = is_defined
+    values[:, :2] = 0.5 + 0.5 * values[:, :2]
+    return values
+
+
+def corner_tangents(surface: Surface, field: RosyField, guiding_angle: float) -> np.ndarray:
+    """Compute one direction of a field on each corner of a surface.
+
+    Parameters
+    ----------
+    surface : Surface
+    field : RosyField
+    guiding_angle : float
+        Direction that it is near to; see `line_order`.
+
+    Returns
+    -------
+    (C, 3) float32 ndarray
+        Unit vectors in object space; 0 where the field is undefined.
+    """
+    with progress(0.0, 0.3):
+        mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), field))
+    with progress(0.3, 0.9):
+        combed = combed_directions(mesh, guiding_angle)
+    report(0.9, MAP_LABEL)
+    triangle = np.repeat(np.arange(len(mesh.x)), 3)
+    weights = np.tile(np.eye(3, dtype=np.float32), (len(mesh.x), 1))
+    direction, is_defined = _directions_at(mesh, combed, triangle, weights)
+    vectors = mesh.to_world(triangle, direction) * is_defined[:, None]
+    tangents = np.zeros((len(surface.corner_vertex), 3), dtype=np.float32)
+    tangents[surface.triangles] = vectors.reshape(-1, 3, 3)
+    return tangents
+
+
+def _directions_at(
+    mesh: TangentMesh, combed: CombedDirections, triangle: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return (n,) unit tangents at points, the nearest to the combed ones, and whether they are defined."""
+    member = mesh.members_at(triangle, weights, combed.directions_at(triangle, weights))
+    return mesh.directions_at(triangle, weights, member), member != 0

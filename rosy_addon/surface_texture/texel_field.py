@@ -1,15 +1,23 @@
-"""The field at the texels of a UV map, and the steps from texel to texel along the surface.
+"""The field and the noise at the texels of a UV map, and the steps from texel to texel on the surface.
 
-Inside of a chart, a streamline steps to neighboring texels. Across a seam, and across the border of a
-tile, a step is a straight line on the surface: it is unfolded over the edges between the triangles, and
-leads to the texel where it ends.
+Inside a chart, a streamline steps to neighboring texels. Across a seam, and across the border of a tile, a
+step is a straight line on the surface: it is unfolded over the edges between the triangles, and leads to the
+texel in which it ends.
+
+The noise belongs to the surface. Its cells have one size in Blender units.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from ..compositor.flow import noise_channel_count
+from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
+from ..compositor.look import Look
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
+from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
 from ..field.blocks import row_blocks
 from ..field.frames import dot
@@ -18,8 +26,9 @@ from ..line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from ..line_drawing.tangent_mesh import unit
 from ..projection.field_channel import FieldChannel, rotation_order
 from ..projection.pixel_blocks import pixel_blocks
+from ..projection.rest_coordinates import RestCoordinates, matrix_scale, rest_positions
 from .charts import UvCharts
-from .texels import TexelSurface
+from .texels import TexelSurface, neighbor_places
 
 #: Neighboring texels are also neighbors on the surface if their distance there is at most this many
 #: times what the UV map stretches their distance to.
@@ -34,6 +43,22 @@ MAX_SEAM_STRETCH = 64.0
 
 #: Texels whose steps across seams are traced at once.
 SEAM_BLOCK = 1 << 14
+
+#: Smallest side of a cell of the noise, in texels of the coarser direction.
+MIN_CELL_TEXELS = 1.0
+
+#: Most points on each side of the grid of local means, which a high pass subtracts.
+MAX_GRID_SIDE = 256
+
+#: Side of a cell of that grid, in standard deviations of the blur. Values are spread to the corners of
+#: their cell and interpolated from them, both linearly.
+GRID_CELL_SIGMAS = 3**0.5
+
+#: One in this number of texels is spread over the grid.
+SAMPLE_STRIDE = 3
+
+#: Texels that are spread over the grid at once.
+GRID_BLOCK = 1 << 18
 
 #: Label of the progress.
 LABEL = "following the surface across seams"
@@ -82,10 +107,13 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
         if mesh.family_z is not None:
             turn = signed_power(frame.conj(), rotation_order(family, degree))
             channels[family][block] = mesh.family_z[triangle] * turn
+    # The texel at each place of the frame, or -1; also at place -1.
+    entry = np.full(texels.frame.width * texels.frame.height + 1, -1, dtype=np.int32)
+    entry[texels.index] = np.arange(count, dtype=np.int32)
     with progress(0.3, 0.7):
-        mask = _neighbor_masks(on, z != 0, crease_angle)
+        mask = _neighbor_masks(on, entry, z != 0, crease_angle)
     with progress(0.7, 1.0):
-        seam_steps = _find_seam_steps(on, mask, z != 0)
+        seam_steps = _find_seam_steps(on, entry, mask, z != 0)
     return PixelField(
         degree=degree,
         width=texels.frame.width,
@@ -100,7 +128,7 @@ def texel_field(on: TexelSurface, crease_angle: float | None) -> PixelField:
 
 
 def _interpolated(weights: np.ndarray, corners: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-    """(n,) values at (n, 3) barycentric coordinates, given those at the (T, 3) corners."""
+    """Return (n,) values at (n, 3) barycentric coordinates, given the (T, 3) values at corners."""
     a, b, c = corners.take(triangle, axis=0).T
     return weights[:, 0] * a + weights[:, 1] * b + weights[:, 2] * c
 
@@ -113,69 +141,55 @@ def frames_at(charts: UvCharts, triangle: np.ndarray, weights: np.ndarray) -> np
 
 
 def _neighbor_masks(
-    on: TexelSurface, defined: np.ndarray, crease_angle: float | None
+    on: TexelSurface, entry: np.ndarray, defined: np.ndarray, crease_angle: float | None
 ) -> np.ndarray:
-    """(P,) uint16 `PixelField.neighbor_mask`: the neighbors in the same chart, near on the surface."""
+    """Return (P,) uint16 `PixelField.neighbor_mask`: neighbors in the same chart, near on the surface.
+
+    `entry`, (H W + 1,) int32, holds the texel at each place of the frame.
+    """
     mesh, charts, texels = on.mesh, on.charts, on.texels
-    masks = np.zeros(len(texels), dtype=np.uint16)
+    masks = defined.astype(np.uint16) << np.uint16(NEIGHBOR_OFFSETS.index((0, 0)))
     # Squared length on the surface that a texel is stretched to at most.
     stretch = charts.stretch()[1] * texels.frame.size
     reach = np.divide(MAX_STRETCHED_STEP, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
     reach_squared = (reach * reach).astype(np.float32)
-    min_cosine = None if crease_angle is None else np.cos(crease_angle)
-    width, height = texels.frame.width, texels.frame.height
-    band_rows = max((1 << 16) // width, 1)
     corners, normals = mesh.points.astype(np.float32), mesh.corner_normal.astype(np.float32)
-    for first_row in range(0, height, band_rows):
-        report(first_row / height, LABEL)
-        # One more row: the first of the next band, or an empty one.
-        first, stop = np.searchsorted(
-            texels.index, [first_row * width, (first_row + band_rows + 1) * width]
-        ).tolist()
-        place = texels.index[first:stop] - np.int32(first_row * width)
-        triangle, weights = texels.triangle[first:stop], texels.barycentric[first:stop]
-        point = np.einsum("nk,nki->ni", weights, corners.take(triangle, axis=0))
-        normal = None
-        if min_cosine is not None:
-            normal = np.einsum("nk,nki->ni", weights, normals.take(triangle, axis=0))
-            normal /= np.sqrt(np.maximum(dot(normal, normal), 1e-20))[:, None]
-        shape = band_rows + 1, width
-        texel_at, triangle_at = np.empty(shape, np.int32), np.full(shape, -1, np.int32)
-        texel_at.reshape(-1)[place] = np.arange(len(place), dtype=np.int32)
-        triangle_at.reshape(-1)[place] = np.where(defined[first:stop], triangle, np.int32(-1))
-        mask_at = np.zeros(shape, np.uint16)
+    min_cosine = -2.0 if crease_angle is None else np.cos(crease_angle)
+    for block in pixel_blocks(len(texels)):
+        report(block.start / len(texels), LABEL)
+        start = block.start
+        # The block, and the neighbors of its texels in the next row.
+        around = slice(start, block.stop + texels.frame.width + 1)
+        triangle, weights = texels.triangle[around], texels.barycentric[around]
+        point, normal = (
+            np.einsum("nk,nki->ni", weights, values.take(triangle, axis=0))
+            for values in (corners, normals)
+        )
+        normal /= np.sqrt(np.maximum(dot(normal, normal), 1e-20))[:, None]
         for dx, dy in ((1, 0), (-1, 1), (0, 1), (1, 1)):
-            left, right = max(-dx, 0), width - max(dx, 0)
-            source = slice(0, band_rows + 1 - dy), slice(left, right)
-            target = slice(dy, band_rows + 1), slice(left + dx, right + dx)
-            a, b = triangle_at[source], triangle_at[target]
-            linked = a == b
-            linked &= a >= 0
-            other = np.nonzero((a != b) & (a >= 0) & (b >= 0))
-            own, neighbor = texel_at[source][other], texel_at[target][other]
-            a, b = a[other], b[other]
-            offset = point.take(own, axis=0) - point.take(neighbor, axis=0)
-            near = dot(offset, offset) <= np.float32(dx * dx + dy * dy) * np.maximum(
-                reach_squared.take(a), reach_squared.take(b)
-            )
+            other = entry[neighbor_places(texels.frame, texels.index[block], dx, dy)]
+            own = np.flatnonzero((other >= 0) & defined[block] & defined[other])
+            other = other[own] - start
+            linked = triangle[own] == triangle[other]
+            apart = np.flatnonzero(~linked)
+            first, second = own[apart], other[apart]
+            a, b = triangle[first], triangle[second]
+            offset = point.take(first, axis=0) - point.take(second, axis=0)
+            reach = np.maximum(reach_squared.take(a), reach_squared.take(b))
+            near = dot(offset, offset) <= np.float32(dx * dx + dy * dy) * reach
             near &= charts.chart.take(a) == charts.chart.take(b)
-            if normal is not None:
-                near &= dot(normal.take(own, axis=0), normal.take(neighbor, axis=0)) >= min_cosine
-            linked[other] = near
+            near &= dot(normal.take(first, axis=0), normal.take(second, axis=0)) >= min_cosine
+            linked[apart] = near
             bit = NEIGHBOR_OFFSETS.index((dx, dy))
-            linked = linked.astype(np.uint16)
-            mask_at[source] |= linked << np.uint16(bit)
-            mask_at[target] |= linked << np.uint16(8 - bit)
-        masks[first:stop] |= mask_at.reshape(-1).take(place)
-    masks[defined] |= np.uint16(1 << 4)
+            masks[start + own[linked]] |= np.uint16(1 << bit)
+            masks[start + other[linked]] |= np.uint16(1 << (8 - bit))
     return masks
 
 
-def _find_seam_steps(on: TexelSurface, mask: np.ndarray, defined: np.ndarray) -> SeamSteps:
+def _find_seam_steps(
+    on: TexelSurface, entry: np.ndarray, mask: np.ndarray, defined: np.ndarray
+) -> SeamSteps:
     """Trace the steps that `mask` does not have along the surface."""
-    texels = on.texels
-    entry = np.full(texels.frame.width * texels.frame.height, -1, dtype=np.int32)
-    entry[texels.index] = np.arange(len(texels), dtype=np.int32)
     border = np.flatnonzero(defined & (mask != 0b111_111_111))
     source, bit = np.nonzero(mask[border, None] >> np.arange(9, dtype=np.uint16) & 1 == 0)
     source, bit = border[source].astype(np.int32), bit.astype(np.uint8)
@@ -196,13 +210,13 @@ def _seam_steps(
     bit: np.ndarray,
     offset: np.ndarray,
 ) -> SeamSteps:
-    """Return those of n steps that lead to a texel.
+    """Trace n steps, and return the steps that lead to a texel.
 
     Parameters
     ----------
     source, bit, offset : (n,) ndarrays
         Texels, and the steps from them, also as complex numbers in texels.
-    entry : (H W,) int32 ndarray
+    entry : (H W + 1,) int32 ndarray
         The texel at each place of the frame, or -1.
     """
     mesh, charts, texels = on.mesh, on.charts, on.texels
@@ -219,7 +233,7 @@ def _seam_steps(
     target, reached = _nearest_texels(on, entry, end.triangle, uv)
     arrived &= target >= 0
     arrived[arrived] &= defined[target[arrived]]
-    # Tangents are rotated by this from the frame of the one triangle to that of the other.
+    # The rotation of tangents from the frame of the first triangle to the frame of the last one.
     turn = direction * ahead.conj()
     back, back_conjugate = charts.inverse(triangle)
     ahead, ahead_conjugate = charts.linear[end.triangle], charts.conjugate[end.triangle]
@@ -254,7 +268,7 @@ def _nearest_texels(
     Returns
     -------
     texel : (n,) int32 ndarray
-        -1 if none of the nine around the point is one.
+        -1 if none of the nine texels around the point is in the chart.
     offset : (n,) complex128 ndarray
         The point, relative to the center of that texel.
     """
@@ -262,8 +276,7 @@ def _nearest_texels(
     chart, best = on.charts.chart, np.full(len(uv), np.inf)
     texel, offset = np.full(len(uv), -1, dtype=np.int32), np.zeros(len(uv), dtype=np.complex128)
     for dx, dy in NEIGHBOR_OFFSETS:
-        index = on.texels.frame.flat_indices(column + dx, row + dy)
-        candidate = np.where(index >= 0, entry.take(np.maximum(index, 0)), -1)
+        candidate = entry[on.texels.frame.flat_indices(column + dx, row + dy)]
         same = chart.take(on.texels.triangle.take(candidate)) == chart.take(triangle)
         delta = uv - (column + dx + 0.5 + 1j * (row + dy + 0.5))
         distance = np.where((candidate >= 0) & same, np.abs(delta), np.inf)
@@ -271,3 +284,120 @@ def _nearest_texels(
         for values, new in ((best, distance), (texel, candidate), (offset, delta)):
             values[nearer] = new[nearer]
     return texel, offset
+
+
+# --- noise -------------------------------------------------------------------------------------------
+
+
+def texel_noise(on: TexelSurface, look: Look, channels: int | None = None) -> np.ndarray:
+    """Make noise that is anchored to the surface, at its texels.
+
+    Parameters
+    ----------
+    on : TexelSurface
+    look : Look
+        In steps of streamlines. Its `grain`, `density`, `high_pass` and `seed` are used.
+    channels : int, optional
+        K; by default the channels of the look (`noise_channel_count`).
+
+    Returns
+    -------
+    (P, K) float32 ndarray
+        With the mean `NOISE_MEAN`.
+    """
+    surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
+    # Blender units of the world in one of object space.
+    scale = matrix_scale(on.instance.matrix)
+    channels = noise_channel_count(look) if channels is None else channels
+    rest = rest_positions(surface).astype(np.float32)
+    triangle_vertex = surface.triangle_vertex
+    gradient = (charts.gradient / texels.frame.size).astype(np.complex64)
+    stretch = charts.stretch()[1] * (texels.frame.size * scale)
+    coarse = np.divide(MIN_CELL_TEXELS, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
+    cell_size = np.maximum(look.grain * step / scale, coarse).astype(np.float32)
+    instance_hash = instance_hashes([surface.name])
+    total = np.empty((channels, len(texels)), dtype=np.float32)
+    for block in pixel_blocks(len(texels)):
+        report(0.7 * block.start / len(texels), "making noise")
+        triangle = texels.triangle[block]
+        corners = triangle_vertex.take(triangle, axis=0).T
+        change = gradient.take(triangle, axis=0).T
+        size = cell_size.take(triangle)
+        coordinates = RestCoordinates(
+            texels.barycentric[block].T,
+            change.real,
+            change.imag,
+            tuple(rest.take(corner, axis=0).T for corner in corners),
+            size,
+        )
+        block_hash = np.broadcast_to(instance_hash, len(triangle))
+        solid_noise(coordinates, size, block_hash, look.seed, look.density, out=total[:, block])
+    if look.high_pass:
+        sigma = BLUR_FACTOR * look.high_pass * step / scale
+        _subtract_local_means(on, rest, total, sigma)
+    noise = np.empty(total.shape[::-1], dtype=np.float32)
+    for block in pixel_blocks(len(noise)):
+        report(1.0, "making noise")
+        noise[block] = total[:, block].T + np.float32(NOISE_MEAN)
+    return noise
+
+
+def _subtract_local_means(
+    on: TexelSurface, rest: np.ndarray, channels: np.ndarray, sigma: float
+) -> None:
+    """Subtract a blur over the surface from (K, P) values at texels, in place.
+
+    The blur is three-dimensional: values are spread over a grid in space and interpolated from it. So it
+    does not depend on the charts.
+
+    Parameters
+    ----------
+    rest : (V, 3) float32 ndarray
+        `rest_positions` of the surface.
+    sigma : float
+        Standard deviation of the blur, in Blender units of rest space.
+    """
+    texels = on.texels
+    used = rest[on.instance.surface.used_vertices]
+    low, extent = used.min(axis=0), float(np.ptp(used, axis=0).max())
+    side = max(GRID_CELL_SIGMAS * sigma, extent / (MAX_GRID_SIDE - 2))
+    shape = (np.ptp(used, axis=0) / side).astype(np.intp) + 2
+    stride = np.array([shape[1] * shape[2], shape[2], 1])
+    area = np.abs(on.charts.density)
+    area = np.divide(1, area, out=np.zeros(len(area)), where=area > 0)
+    count = len(texels)
+    blocks = [slice(start, start + GRID_BLOCK) for start in range(0, count, GRID_BLOCK)]
+
+    def cells(block: slice) -> tuple[np.ndarray, np.ndarray]:
+        """Return the (n,) lowest points of the cells of texels, and (n, 3) places in the cells."""
+        position = (on.interpolated(rest, block) - low) / np.float32(side)
+        cell = np.clip(position.astype(np.intp), 0, shape - 2)
+        return cell @ stride, np.clip(position - cell, 0, 1).astype(np.float32)
+
+    sums = np.zeros((1 + len(channels), int(shape.prod())))
+    for number, block in enumerate(blocks):
+        report(0.7 + 0.15 * number / len(blocks), "making noise")
+        block = slice(block.start, block.stop, SAMPLE_STRIDE)
+        first, place = cells(block)
+        weight = area[texels.triangle[block]]
+        for offset, share in _corner_shares(place, stride):
+            point, share = first + offset, share * weight
+            sums[0] += np.bincount(point, share, sums.shape[1])
+            for values, out in zip(channels, sums[1:], strict=True):
+                out += np.bincount(point, share * values[block], sums.shape[1])
+    means = (sums[1:] / np.maximum(sums[0], np.finfo(float).tiny)).astype(np.float32)
+    for number, block in enumerate(blocks):
+        report(0.85 + 0.15 * number / len(blocks), "making noise")
+        first, place = cells(block)
+        for offset, share in _corner_shares(place, stride):
+            for values, mean in zip(channels, means, strict=True):
+                values[block] -= share * mean.take(first + offset)
+
+
+def _corner_shares(place: np.ndarray, stride: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Iterate over the corners of a cell in the grid: their offsets, and (n,) weights of linear interpolation.
+
+    `place` is (n, 3), from 0 to 1.
+    """
+    x, y, z = np.stack([1 - place, place]).transpose(2, 0, 1)
+    return ((int(np.dot((i, j, k), stride)), x[i] * y[j] * z[k]) for i, j, k in np.ndindex(2, 2, 2))

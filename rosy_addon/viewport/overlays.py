@@ -18,7 +18,7 @@ from mathutils import Vector
 
 from ..annotation import arrow_marks
 from ..annotation.arrow_marks import ArrowMarks
-from ..annotation.draw_arrows import head_outline
+from ..annotation.draw_marks import head_outline
 from ..annotation.index_labels import MAX_LABELS, place_indices
 from ..annotation.singularity_marks import (
     COLOR_BY_SIGN,

@@ -111,7 +111,7 @@ def test_missing_and_invalid_files(tmp_path):
 def with_stroke_settings(saved):
     """The same file, with stroke settings that differ from those of the command line."""
     settings = bpy.context.scene.rosy.strokes
-    settings.spacing, settings.width, settings.tone, settings.light = 16.0, 1.7, True, "lamp"
+    settings.spacing, settings.width, settings.light = 16.0, 1.7, "lamp"
     settings.inks, settings.outline, settings.overshoot = "FAMILIES", True, 6.0
     bpy.ops.wm.save_mainfile()
     return saved
@@ -136,11 +136,11 @@ def test_strokes_of_a_file_are_those_of_the_button(with_stroke_settings, tmp_pat
 def test_options_override_the_settings_of_the_scene(with_stroke_settings, tmp_path):
     scene = bpy.context.scene
     settings = scene.rosy.strokes
-    options = ["--distance", "0.5", "--no-tone", "--taper", "0", "--overshoot", "0"]
+    options = ["--distance", "0.5", "--light", "none", "--taper", "0", "--overshoot", "0"]
     options += ["--plotter", "--colors", "red,blue"]
     process = rosy(with_stroke_settings, "-o", tmp_path / "out.svg", *options, verb="strokes")
     assert process.returncode == 0, process.stderr
-    settings.unit, settings.distance, settings.tone = "world", 0.5, False
+    settings.unit, settings.distance, settings.light = "world", 0.5, "none"
     settings.taper, settings.overshoot = 0.0, 0.0
     pen = Pen(width=1.7, colors=["red", "blue"], paper=None, plotter=True)
     draw_strokes(scene, kind="FILE", path=tmp_path / "button.svg", pen=pen)

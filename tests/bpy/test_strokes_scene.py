@@ -300,10 +300,10 @@ def test_settings_of_the_scene_are_those_of_the_function(monkey, camera, scene, 
     settings = scene.rosy.strokes
     settings.kind, settings.filepath = "FILE", str(tmp_path / "a.svg")
     settings.spacing, settings.taper, settings.width = 9.3, 0.4, 0.7
-    settings.tone, settings.light, settings.outline = True, "lamp", True
+    settings.light, settings.outline = "lamp", True
     settings.inks, settings.outline_color = "FAMILIES", (1.0, 0.0, 0.0)
     assert draw_strokes(scene).path == tmp_path / "a.svg"
-    style = StrokeStyle(spacing=9.3, taper=0.4, tone=True, light="lamp", outline=True)
+    style = StrokeStyle(spacing=9.3, taper=0.4, light="lamp", outline=True)
     pen = Pen(width=0.7, colors=["#db8021", "#4594eb"], outline="#ff0000")
     draw_strokes(scene, kind="FILE", path=tmp_path / "b.svg", style=style, pen=pen)
     text = (tmp_path / "a.svg").read_text()

@@ -37,7 +37,7 @@ class LateralGaps(NamedTuple):
         Whether the surface continues on that side for 1.25 spacings. If it does not, or if a crease
         stops strokes, no stroke is expected there.
     nearest_distance : (n,) float64 ndarray
-        Distance to the nearest point of another stroke of the family in any direction, in spacings.
+        Distance to the nearest point of a stroke of the family in any direction, in spacings.
     """
 
     point: np.ndarray
@@ -134,8 +134,7 @@ def _measure(
     distance = np.sqrt(dot(tangential, tangential)) * arc_ratio
     spacing = samples.spacing[sample]
     nearest_distance = np.full(len(batch), np.inf)
-    other_stroke = stroke[sample] != stroke[other]
-    np.minimum.at(nearest_distance, query[other_stroke], (distance / spacing)[other_stroke])
+    np.minimum.at(nearest_distance, query, distance / spacing)
     forward = dot(tangential, tangent[sample])
     alongside = np.abs(forward) <= 0.6 * SAMPLE_STEP * spacing + 0.05 * distance
     side = (dot(tangential, np.cross(samples.normal[sample], tangent[sample])) < 0).astype(np.intp)

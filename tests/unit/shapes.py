@@ -1,4 +1,4 @@
-"""Surfaces in closed form, and a translation matrix, for tests."""
+"""Surfaces in closed form, instances with fields, and a translation matrix, for tests."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import awkward
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rosy_addon.field.generate import generate
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.projection.gbuffer import MeshInstance
 
 
 def grid_of_quads(
@@ -128,3 +130,16 @@ def cube() -> Surface:
     """A unit cube of six quads."""
     points, faces = awkward.cube()
     return build_surface(points, np.concatenate(faces), range(0, 25, 4), name="cube")
+
+
+def sharp_cube() -> Surface:
+    """A unit cube whose twelve edges are sharp."""
+    smooth = cube()
+    return build_surface(
+        smooth.vertices, smooth.corner_vertex, smooth.face_start, name="cube", sharp_angle=0.5
+    )
+
+
+def instance_of(surface: Surface, degree: int, kind: str = "smoothest") -> MeshInstance:
+    """A surface at its place with a generated field."""
+    return MeshInstance(surface, np.eye(4), generate(surface, kind, degree))

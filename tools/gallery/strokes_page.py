@@ -27,7 +27,7 @@ WIDTH = 1.3
 #: Styles of the strokes on Suzanne, by label.
 STYLES = {
     "evenly spaced, with an outline": StrokeStyle(spacing=6, outline=True),
-    "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, tone=True, light="lamp"),
+    "by tone, of a lamp": StrokeStyle(spacing=4, outline=True, light="lamp"),
 }
 
 

@@ -7,20 +7,25 @@ import re
 import numpy as np
 import pytest
 from conftest import long
-from shapes import globe, icosphere, torus
+from shapes import globe, icosphere, instance_of, torus
 
 from rosy_addon.annotation.draw_marks import draw_marks
-from rosy_addon.annotation.index_labels import LETTERS, placed_labels, text_segments, text_width
+from rosy_addon.annotation.index_labels import (
+    LETTERS,
+    place_labels,
+    placed_labels,
+    text_segments,
+    text_width,
+)
 from rosy_addon.annotation.singularity_marks import COLOR_BY_SIGN, OUTLINE, SingularityMarks
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.color import from_hex, to_linear
-from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.singularities import find_singularities, format_index
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import svg_text
+from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import look_at, perspective_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
@@ -40,20 +45,13 @@ def marks(position, index, degree=4, depth=1.0, is_visible=True, **settings) -> 
     )
 
 
-def drawn(rgba, singularities):
-    return draw_marks(rgba, singularities)
-
-
 def gray(height=60, width=80):
     return np.full((height, width, 4), (0.2, 0.2, 0.2, 1), dtype=np.float32)
 
 
 def view_of(surface, degree, **settings):
-    instance = MeshInstance(
-        surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), degree)
-    )
     look = Look(length=8).with_settings(settings)
-    return ViewInput((instance,), CAMERA, look)
+    return ViewInput((instance_of(surface, degree),), CAMERA, look)
 
 
 def rendered(view, **options):
@@ -63,7 +61,7 @@ def rendered(view, **options):
 @pytest.mark.parametrize("index", [1, -2, 4])
 def test_the_area_of_a_dot_is_proportional_to_its_index(index):
     picture = np.zeros((60, 80, 4), dtype=np.float32)
-    picture = drawn(picture, marks([(30.3, 20.8)], [index], size=10.0))
+    picture = draw_marks(picture, marks([(30.3, 20.8)], [index], size=10.0))
     radius = 5 * abs(index) ** 0.5 + OUTLINE * 10
     assert picture[..., 3].sum() == pytest.approx(np.pi * radius**2, rel=0.01)
     fill = to_linear(from_hex(COLOR_BY_SIGN[np.sign(index)]))
@@ -74,19 +72,21 @@ def test_the_area_of_a_dot_is_proportional_to_its_index(index):
 
 def test_nearer_dots_are_above_and_hidden_ones_faint():
     positions = [(20, 20), (24, 20), (24, 16)]
-    picture = drawn(gray(), marks(positions, [1, -1, 1], depth=[1, 2, 0.5], is_visible=[1, 1, 0]))
+    picture = draw_marks(
+        gray(), marks(positions, [1, -1, 1], depth=[1, 2, 0.5], is_visible=[1, 1, 0])
+    )
     colors = {sign: to_linear(from_hex(code)) for sign, code in COLOR_BY_SIGN.items()}
     np.testing.assert_allclose(picture[19, 21, :3], colors[1], atol=1e-6)
     np.testing.assert_allclose(picture[20, 27, :3], colors[-1], atol=1e-6)
-    faint = drawn(gray(), marks([(40, 30)], [1], is_visible=False, has_labels=True))
+    faint = draw_marks(gray(), marks([(40, 30)], [1], is_visible=False, has_labels=True))
     np.testing.assert_allclose(faint[30, 40, :3], 0.7 * 0.2 + 0.3 * colors[1], atol=1e-6)
     assert (faint != gray()).any(axis=2).sum() < 200  # no label
 
 
 def test_dots_beside_the_frame_and_none_at_all():
-    np.testing.assert_array_equal(drawn(gray(), marks(np.zeros((0, 2)), [])), gray())
-    np.testing.assert_array_equal(drawn(gray(), marks([(-40, 10), (9e9, 3)], [1, 1])), gray())
-    assert (drawn(gray(), marks([(-2, 30)], [1]))[30, 0, :3] != 0.2).any()
+    np.testing.assert_array_equal(draw_marks(gray(), marks(np.zeros((0, 2)), [])), gray())
+    np.testing.assert_array_equal(draw_marks(gray(), marks([(-40, 10), (9e9, 3)], [1, 1])), gray())
+    assert (draw_marks(gray(), marks([(-2, 30)], [1]))[30, 0, :3] != 0.2).any()
 
 
 def test_labels_say_the_index_and_cover_no_dot():
@@ -94,7 +94,7 @@ def test_labels_say_the_index_and_cover_no_dot():
     labels = placed_labels(dots)
     assert [label.text for label in labels] == ["+1/4", "-1/2", "+3/2"]
     picture, plain = (
-        drawn(gray(100, 160), shown) for shown in (dots, marks(dots.position, dots.index))
+        draw_marks(gray(100, 160), shown) for shown in (dots, marks(dots.position, dots.index))
     )
     is_dot = np.zeros((100, 160), dtype=bool)
     y, x = np.mgrid[:100, :160] + 0.5
@@ -125,10 +125,7 @@ def test_visible_singularities_of_a_mesh_have_dots_at_their_vertices(degree):
     picture, without = rendered(view), rendered(plain)
     vertex, index = find_singularities(surface, view.instances[0].field)
     towards_eye = (surface.vertices[vertex] * (CAMERA.eye - surface.vertices[vertex])).sum(axis=1)
-    clip = (
-        np.c_[surface.vertices[vertex], np.ones(len(vertex))] @ (CAMERA.projection @ CAMERA.view).T
-    )
-    place = (clip[:, :2] / clip[:, 3:] + 1) / 2 * (CAMERA.width, CAMERA.height)
+    place, _ = project_to_pixels(surface.vertices[vertex], CAMERA)
     y, x = np.mgrid[: CAMERA.height, : CAMERA.width] + 0.5
     near = np.zeros(x.shape, dtype=bool)
     for (dot_x, dot_y), sign, dot in zip(place, np.sign(index), towards_eye, strict=True):
@@ -145,30 +142,22 @@ def test_processes_and_supersampling_draw_the_same_dots():
     surface = globe(48, 96)
     views = [view_of(surface, 4, singularity_dots="all", supersampling=s) for s in (1, 2)]
     np.testing.assert_array_equal(rendered(views[0]), rendered(views[0], workers=2))
-    dots = [
-        np.abs(rendered(view) - rendered(view_of(surface, 4, supersampling=samples))).max(axis=2)
-        > 0
-        for samples, view in zip((1, 2), views, strict=True)
-    ]
+    plain = [view_of(surface, 4, supersampling=s) for s in (1, 2)]
+    dots = [(rendered(a) != rendered(b)).any(axis=2) for a, b in zip(views, plain, strict=True)]
     np.testing.assert_array_equal(*dots)
 
 
 @pytest.mark.slow
 def test_drawings_have_the_same_dots_as_pictures():
-    instance = view_of(torus(48, 24), 4).instances[0]
-    sphere = MeshInstance(icosphere(3), np.eye(4), None)
-    field = generate(sphere.surface, GeneratorSettings("smoothest"), 4)
-    instances = [instance, MeshInstance(sphere.surface, np.eye(4), field)]
+    instances = [instance_of(torus(48, 24), 4), instance_of(icosphere(3), 4)]
     style = StrokeStyle(spacing=40.0, singularity_dots="all_indices")
     drawing = draw_instances(instances, CAMERA, style)
     text = svg_text(drawing.strokes, CAMERA, None, drawing.marks)
     circles = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)" r="([\d.]+)" fill="(#\w+)"', text)
     expected = drawing.marks.in_drawing_order()
     assert len(circles) == len(expected) >= 8
-    np.testing.assert_allclose([float(c[0]) for c in circles], expected.position[:, 0], atol=0.01)
-    np.testing.assert_allclose(
-        [float(c[1]) for c in circles], CAMERA.height - expected.position[:, 1], atol=0.01
-    )
+    centers = [(float(x), CAMERA.height - float(y)) for x, y, *_ in circles]
+    np.testing.assert_allclose(centers, expected.position, atol=0.01)
     assert text.count("opacity=") == (~expected.is_visible).sum() > 0
     assert text.count('<path fill="none" stroke="#ffffff"') == expected.is_visible.sum()
     plain = draw_instances(instances, CAMERA, StrokeStyle(spacing=40.0))
@@ -177,8 +166,9 @@ def test_drawings_have_the_same_dots_as_pictures():
 
 @pytest.mark.parametrize("size, width, halo", [(3.0, 1.0, 1.96), (12.0, 2.04, 5.88)])
 def test_lines_of_labels_in_drawings_are_at_least_a_pixel_wide(size, width, halo):
-    instance = view_of(icosphere(2), 4).instances[0]
-    strokes = draw_instances([instance], CAMERA, StrokeStyle(spacing=40.0)).strokes
+    strokes = draw_instances(
+        [instance_of(icosphere(2), 4)], CAMERA, StrokeStyle(spacing=40.0)
+    ).strokes
     labeled = marks([(80, 50)], [1], size=size, has_labels=True)
     layer = svg_text(strokes, CAMERA, None, labeled).partition('id="singularities"')[2]
     widths = re.findall(r'<path [^>]*stroke="(#\w+)" stroke-width="([\d.]+)"', layer)
@@ -193,3 +183,20 @@ def test_labels_stay_in_the_frame_with_their_halos(size):
         (label,) = placed_labels(marks([(x, 50)], [1], size=size, has_labels=True))
         ends.append(label.segments()[..., 0].max())
     assert 160 - reach - 0.11 < max(ends) < 160 - reach + 1e-9
+
+
+def test_a_label_is_above_and_to_the_right_of_its_dot():
+    assert place_labels([(10, 20)], [(30, 12)], 5, (90, 90)).tolist() == [[15, 25]]
+
+
+def test_labels_cover_neither_each_other_nor_dots():
+    random = np.random.default_rng(1)
+    dots, sizes = random.uniform(0, 400, (120, 2)), random.uniform((20, 10), (30, 12), (120, 2))
+    corners = place_labels(dots, sizes, 4, (400, 400))
+    has_place = ~np.isnan(corners[:, 0])
+    assert 40 < has_place.sum() < 120
+    low, high = corners[has_place], (corners + sizes)[has_place]
+    assert low.min() >= 0 and high.max() <= 400
+    overlaps = ((low[:, None] < high) & (high[:, None] > low)).all(axis=2)
+    assert overlaps.sum() == len(low)
+    assert not ((dots[:, None] + 4 > low) & (dots[:, None] - 4 < high)).all(axis=2).any()

@@ -33,10 +33,9 @@ def drawn(surface, field, **settings):
 
 
 CASES = {
-    "one direction": (1, {}),
     "three directions": (3, {}),
     "seven directions": (7, {}),
-    "tone, gaps and outline": (3, {"tone": True, "gaps": 0.3, "outline": True, "overshoot": 6.0}),
+    "tone and outline": (3, {"light": "headlight", "outline": True, "overshoot": 6.0}),
     "with hidden strokes": (1, {"hidden": True, "cross_creases": True}),
 }
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import cube, cylinder, torus
+from shapes import cylinder, instance_of, sharp_cube, torus
 
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.smoothest import smoothest_field
-from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.visibility import project_to_pixels
@@ -22,21 +20,15 @@ CAMERA = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=2.0
 SIDE_LIGHT = Light("sun", np.array([-0.8, 0.3, 0.52]), np.ones(3), 0.9)
 
 
-def sharp_cube():
-    smooth = cube()
-    surface = build_surface(
-        smooth.vertices, smooth.corner_vertex, smooth.face_start, name="cube", sharp_angle=0.5
-    )
-    return MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0.2, 1.0, 0.1)))
+CUBE = MeshInstance(sharp_cube(), np.eye(4), axis_field(sharp_cube(), 4, (0.2, 1.0, 0.1)))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tone", [False, True])
-def test_spacing_and_width_are_even_up_to_creases(tone):
+@pytest.mark.parametrize("light", ["none", "scene"])
+def test_spacing_and_width_are_even_up_to_creases(light):
     """A flat face under a sun has one tone and, without perspective, one spacing."""
-    instance = sharp_cube()
-    style = StrokeStyle(spacing=7.0, tone=tone, layering=0.0, taper=0.0)
-    strokes = draw_instances([instance], CAMERA, style, lights=[SIDE_LIGHT]).strokes
+    style = StrokeStyle(spacing=7.0, light=light, layering=0.0, taper=0.0)
+    strokes = draw_instances([CUBE], CAMERA, style, lights=[SIDE_LIGHT]).strokes
     assert len(np.unique(strokes.face)) == 3
     spacings = set()
     for face in np.unique(strokes.face):
@@ -50,8 +42,7 @@ def test_spacing_and_width_are_even_up_to_creases(tone):
 @pytest.mark.slow
 def test_strokes_reach_creases_at_full_width():
     """Only ends inside faces are tapered: at creases, tapered ends leave a pale margin."""
-    surface = sharp_cube().surface
-    instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, 4))
+    instance = instance_of(sharp_cube(), 4)
     strokes = draw_instances([instance], CAMERA, StrokeStyle(spacing=7.0, taper=0.8)).strokes
     ends = np.concatenate([strokes.start[:-1], strokes.start[1:] - 1])
     at_crease = (np.abs(np.abs(strokes.points[ends] - 0.5) - 0.5) < 1e-6).sum(axis=1) >= 2

@@ -8,8 +8,6 @@ from shapes import icosphere, plane
 
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.line_drawing.mesh_in_view import MARGIN_PIXELS, MARGIN_RATIO, mesh_in_view
-from rosy_addon.line_drawing.pipeline import draw_instances
-from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, trace_geodesics
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.line_drawing.visibility import project_to_pixels
@@ -104,27 +102,3 @@ def test_a_mesh_in_the_frame_is_not_changed():
     mesh = build_tangent_mesh(MeshInstance(surface, np.eye(4), generate(surface, "form", 4)))
     camera = perspective_camera(look_at((0, -5, 1), (0, 0, 0)), 100, 100)
     assert mesh_in_view(mesh, camera).mesh is mesh
-
-
-@pytest.mark.slow
-def test_ground_up_to_the_horizon():
-    """Strokes keep their distance in the picture on a ground of any number of faces, and end."""
-    spacing, counts = 9.0, []
-    for columns in (1, 20):
-        ground = plane(columns, columns, 1000.0)
-        instance = MeshInstance(ground, np.eye(4), axis_field(ground, 4, (1, 0, 0)))
-        strokes = draw_instances([instance], ABOVE_GROUND, StrokeStyle(spacing=spacing)).strokes
-        pixels, _ = project_to_pixels(strokes.points, ABOVE_GROUND)
-        length = np.linalg.norm(np.diff(pixels, axis=0), axis=1)
-        in_rows = [
-            length[
-                (np.diff(strokes.stroke) == 0) & (pixels[1:, 1] >= low) & (pixels[1:, 1] < low + 15)
-            ]
-            for low in (0, 15, 30, 45)
-        ]
-        density = np.array([row.sum() for row in in_rows]) / (15 * ABOVE_GROUND.width)
-        # Two families; foreshortened lines are kept at most this much denser. Strokes depend on the last
-        # bits of the camera: in some rows, between 1.6 and 2.1.
-        assert np.all((density > 1.5 / spacing) & (density < 3.2 / spacing)), density
-        counts.append(density)
-    np.testing.assert_allclose(counts, np.mean(counts, axis=0)[None].repeat(2, axis=0), rtol=0.3)

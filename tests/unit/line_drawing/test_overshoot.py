@@ -7,16 +7,14 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from harness.stroke_tracing import visible_strokes
-from shapes import cube, icosphere, moved, plane
+from shapes import icosphere, instance_of, moved, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
-from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing.outline import OUTLINE_KINDS
-from rosy_addon.line_drawing.overshoot import MIN_EXTENSION_RATIO, extend_free_ends
 from rosy_addon.line_drawing.pipeline import TIP_WIDTH, draw_instances
+from rosy_addon.line_drawing.stroke_ends import MIN_EXTENSION_RATIO, extend_free_ends
 from rosy_addon.line_drawing.style import StrokeStyle
-from rosy_addon.line_drawing.svg import Pen, svg_text
 from rosy_addon.line_drawing.visibility import project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -28,7 +26,7 @@ MAX_PIXELS = 12.0
 SQUARE = MeshInstance(plane(8, 8), IDENTITY, generate(plane(8, 8), ALONG_X, 2))
 TOP_CAMERA = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 300, scale=3.0)
 
-SPHERE = MeshInstance(icosphere(4), IDENTITY, generate(icosphere(4), "smoothest", 4))
+SPHERE = instance_of(icosphere(4), 4)
 FRONT_CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 400, 360, fov=np.radians(40))
 
 
@@ -99,39 +97,12 @@ def test_extensions_cross_the_silhouette():
     assert outside.sum() > 200 and radius.max() < max_radius + MAX_PIXELS + 1
     assert radius.max() > max_radius + 0.5 * MAX_PIXELS
     # Extensions are at a constant depth, and straight.
-    checked = 0
-    for first, last in zip(extended.start[:-1], extended.start[1:], strict=True):
-        for end in (slice(first, first + 4), slice(last - 4, last)):
-            if not (outside[end].all() and (radius[end] > max_radius + 1).all()):
-                continue
-            assert np.ptp(depth[end]) < 1e-9
-            steps = np.diff(pixels[end], axis=0)
-            assert np.allclose(steps, steps[:1], atol=1e-6)
-            checked += 1
-    assert checked > 20
-
-
-@pytest.mark.slow
-def test_extensions_have_the_direction_of_their_strokes():
-    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=6.0)
-    plain_pixels, extended_pixels = (
-        project_to_pixels(strokes.points, FRONT_CAMERA)[0] for strokes in (plain, extended)
-    )
-    cosines = []
-    for number, (last, plain_last) in enumerate(
-        zip(extended.start[1:] - 1, plain.start[1:] - 1, strict=True)
-    ):
-        if np.allclose(extended.points[last], plain.points[plain_last]):
-            continue
-        if plain_last - plain.start[number] < 40:
-            continue
-        extension = extended_pixels[last] - extended_pixels[last - 3]
-        direction = plain_pixels[plain_last - 8] - plain_pixels[plain_last - 12]
-        cosines.append(
-            extension @ direction / np.linalg.norm(extension) / np.linalg.norm(direction)
-        )
-    assert len(cosines) > 15
-    assert np.median(cosines) > np.cos(np.radians(4)) and np.min(cosines) > np.cos(np.radians(30))
+    is_beyond = outside & (radius > max_radius + 1)
+    inner = is_beyond[:-2] & is_beyond[1:-1] & is_beyond[2:]
+    inner &= (np.diff(extended.stroke)[1:] == 0) & (np.diff(extended.stroke)[:-1] == 0)
+    assert inner.sum() > 50
+    assert np.abs(np.diff(depth)[1:][inner]).max() < 1e-9
+    assert np.abs(np.diff(pixels, 2, axis=0)[inner]).max() < 1e-6
 
 
 @pytest.mark.slow
@@ -152,7 +123,7 @@ def test_extensions_lie_on_occluders_in_front():
 
 @pytest.mark.slow
 def test_extensions_into_the_light_follow_the_surface():
-    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=6.0, tone=True, light="lamp")
+    plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=6.0, light="lamp")
     # Where the sphere is visible, points are on it, within about half a pixel.
     pixels, _ = project_to_pixels(extended.points, FRONT_CAMERA)
     column, row = pixels.astype(int).T
@@ -161,29 +132,12 @@ def test_extensions_into_the_light_follow_the_surface():
     compared = (triangle >= 0) & (facing > 0.5)
     height = np.linalg.norm(extended.points[compared], axis=1) - 1
     assert np.abs(height).max() < 0.02
-    # The amount of ink, width times length in the picture, grows only a little at all tones.
-    ink = []
-    for strokes in (plain, extended):
-        pixels, _ = project_to_pixels(strokes.points, FRONT_CAMERA)
-        length = np.hypot(*np.diff(pixels, axis=0).T) * (np.diff(strokes.stroke) == 0)
-        light = normalize(strokes.points) @ (FRONT_CAMERA.view[:3, :3].T @ [-0.5, 0.6, 0.62])
-        bins = np.digitize(light[1:], [0.0, 0.3, 0.6, 0.9])
-        ink.append(np.bincount(bins, strokes.width[1:] * length, 5))
-    ratio = ink[1] / ink[0]
-    assert ratio.min() > 1 and ratio.max() < 1.1
+    assert pixel_growth(plain, extended, FRONT_CAMERA).mean() > 1
 
 
 @pytest.mark.slow
-def test_ends_at_gaps_and_at_neighbors_are_not_extended():
-    crossed = MeshInstance(SQUARE.surface, IDENTITY, axis_field(SQUARE.surface, 4, (1, 0, 0)))
-    plain, extended = draw_both([crossed], TOP_CAMERA, spacing=20.0, gaps=0.3)
-    is_inner = np.abs(ends_of(plain)[:, :, :2]).max(axis=(1, 2)) < 1 - 1e-9
-    assert is_inner.sum() > 50 and not is_inner.all()
-    for number in np.flatnonzero(is_inner):
-        a, b = (strokes.select([number]) for strokes in (plain, extended))
-        assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
-    assert (pixel_growth(plain, extended, TOP_CAMERA)[~is_inner] > 1).all()
-    # On the sphere, strokes end where they come too near to others.
+def test_ends_at_neighbors_are_not_extended():
+    """On the sphere, strokes end where they come too near to others."""
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     facing = dot(normalize(ends_of(plain)), FRONT_CAMERA.view_directions(ends_of(plain))) > 0.5
     assert facing.sum() > 10
@@ -208,10 +162,7 @@ def test_closed_strokes_and_outlines_are_not_extended():
 
 @pytest.mark.slow
 def test_ends_at_creases_are_extended():
-    smooth = cube()
-    surface = build_surface(
-        smooth.vertices, smooth.corner_vertex, smooth.face_start, name="cube", sharp_angle=0.5
-    )
+    surface = sharp_cube()
     instance = MeshInstance(surface, IDENTITY, axis_field(surface, 2, (0.2, 1.0, 0.1)))
     camera = orthographic_camera(look_at((3, -5, 4), (0, 0, 0)), 300, 300, scale=3.0)
     plain, extended = draw_both([instance], camera, spacing=8.0)
@@ -235,14 +186,12 @@ def test_extensions_are_clipped_to_the_frame():
 @pytest.mark.slow
 @pytest.mark.parametrize("taper", [0.0, 1.0])
 def test_extensions_are_tapered(taper):
-    strokes = draw_instances(
-        [SQUARE], TOP_CAMERA, StrokeStyle(spacing=6, taper=taper, overshoot=MAX_PIXELS)
-    ).strokes
-    tips = strokes.width[np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)]
+    style = StrokeStyle(spacing=6, taper=taper, overshoot=MAX_PIXELS)
+    strokes = strokes_of((SQUARE,), TOP_CAMERA, style)
+    tips = strokes.width[np.stack([strokes.start[:-1], strokes.start[1:] - 1])]
     assert np.allclose(tips, TIP_WIDTH if taper else 1.0)
     from_tip = np.minimum(strokes.arc, strokes.length[strokes.stroke] - strokes.arc)
     assert np.allclose(strokes.width[from_tip >= taper * 0.06 + 1e-9], 1.0)
-    assert not taper or strokes.width[from_tip < 0.03].max() < 0.7
 
 
 @pytest.mark.slow
@@ -265,51 +214,29 @@ def test_with_hidden_strokes_extensions_are_straight_in_space():
 
 
 @pytest.mark.slow
-def test_points_beside_and_behind_the_camera_are_finite():
-    surface = plane(20, 20, size=40.0)
-    floor = MeshInstance(surface, IDENTITY, generate(surface, ALONG_X, 2))
+@pytest.mark.parametrize("hidden", [False, True])
+def test_points_beside_and_behind_the_camera_are_finite(hidden):
+    floor = instance_of(plane(20, 20, size=40.0), 2, ALONG_X)
     camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
-    for options in ({}, {"hidden": True}):
-        drawing = draw_instances(
-            [floor],
-            camera,
-            StrokeStyle(spacing=20, overshoot=MAX_PIXELS, **options),
-            clip_to_frame=False,
-        )
-        assert (
-            np.isfinite(drawing.strokes.points).all() and np.isfinite(drawing.strokes.width).all()
-        )
-        assert np.abs(drawing.strokes.points[:, 2]).max() < 1e-3
+    style = StrokeStyle(spacing=20, overshoot=MAX_PIXELS, hidden=hidden)
+    strokes = draw_instances([floor], camera, style, clip_to_frame=False).strokes
+    assert np.isfinite(strokes.points).all() and np.isfinite(strokes.width).all()
+    assert np.abs(strokes.points[:, 2]).max() < 1e-3
 
 
 @pytest.mark.slow
-def test_extensions_of_short_strokes_and_for_plotters():
-    extended = draw_instances(
-        [SPHERE], FRONT_CAMERA, StrokeStyle(spacing=9, overshoot=MAX_PIXELS)
-    ).strokes
-    assert svg_text(extended, FRONT_CAMERA, Pen(plotter=True)).count("<path") == len(extended)
-    traced = draw_instances([SQUARE], TOP_CAMERA, StrokeStyle(spacing=6, taper=0)).strokes
+def test_extensions_double_short_strokes():
+    """Each end is extended by at most half the length."""
+    traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))
     short = traced.runs_where(np.abs(traced.points[:, 0]) < 0.02)
     assert short.free_end_mask.all()
-    growth = pixel_growth(
-        short,
-        extend_free_ends(short, TOP_CAMERA, 100.0, rasterize_depth([SQUARE], TOP_CAMERA)),
-        TOP_CAMERA,
-    )
-    # Each end is extended by half the length, so strokes become twice as long.
-    assert np.allclose(growth, 100 * short.length)
+    depth_buffer = rasterize_depth([SQUARE], TOP_CAMERA)
+    extended = extend_free_ends(short, TOP_CAMERA, 100.0, depth_buffer)
+    assert np.allclose(pixel_growth(short, extended, TOP_CAMERA), 100 * short.length)
 
 
 @pytest.mark.slow
 def test_ends_of_traced_strokes_are_not_free():
-    traced = draw_instances([SQUARE], TOP_CAMERA, StrokeStyle(spacing=6, taper=0)).strokes
-    assert (
-        not traced.free_end_mask.any()
-        and not visible_strokes(traced, [SQUARE], TOP_CAMERA).free_end_mask.any()
-    )
-
-
-def test_errors_are_one_line(error_of):
-    assert "setting 'overshoot' is -1, expected a number from 0" in error_of(
-        StrokeStyle, overshoot=-1
-    )
+    traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))
+    for strokes in (traced, visible_strokes(traced, [SQUARE], TOP_CAMERA)):
+        assert not strokes.free_end_mask.any()

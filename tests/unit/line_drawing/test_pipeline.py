@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from harness.stroke_tracing import trace_strokes
 from listeners import cancel_at
-from shapes import from_triangles, icosphere, moved, plane
+from scipy.spatial import cKDTree
+from shapes import from_triangles, icosphere, instance_of, moved, plane
 
 from rosy_addon.compositor.shading import KEY_LIGHT, Light
 from rosy_addon.core.progress import listening
@@ -17,8 +18,8 @@ from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.surface import build_surface
 from rosy_addon.line_drawing import lateral_neighbors, seeding, separation, visibility
 from rosy_addon.line_drawing.drawing_outputs import offset_toward_camera, stroke_geometry
+from rosy_addon.line_drawing.outline import OUTLINE_KINDS
 from rosy_addon.line_drawing.pipeline import draw_instances
-from rosy_addon.line_drawing.polyline_files import simplify_strokes
 from rosy_addon.line_drawing.spacing import lit_tone
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
@@ -33,8 +34,9 @@ from rosy_addon.projection.gbuffer import MeshInstance
 
 IDENTITY = np.eye(4)
 ALONG_X = GeneratorSettings("axis", (1.0, 0.0, 0.0))
-SPHERE = MeshInstance(icosphere(3), IDENTITY, generate(icosphere(3), "smoothest", 4))
+SPHERE = instance_of(icosphere(3), 4)
 CAMERA = perspective_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, fov=np.radians(40))
+ORTHOGRAPHIC = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, scale=2.5)
 
 
 @pytest.mark.slow
@@ -45,14 +47,7 @@ def test_families_of_several_instances_are_merged_by_name():
         [occluder, SPHERE, degree_6], CAMERA, StrokeStyle(spacing=12, outline=True)
     )
     strokes = drawing.strokes
-    assert strokes.names == (
-        "family 1",
-        "family 2",
-        "family 3",
-        "silhouettes",
-        "creases",
-        "borders",
-    )
+    assert strokes.names == ("family 1", "family 2", "family 3", *OUTLINE_KINDS)
     for instance, expected in ((1, {0, 1}), (2, {0, 1, 2})):
         families = set(strokes.family[drawing.instance_index == instance].tolist())
         assert families - {3, 4, 5} == expected and 3 in families
@@ -93,21 +88,22 @@ def test_light_is_that_of_lambert():
     sun = Light("sun", np.array([0.6, 0.0, 0.8]), np.ones(3), 0.7)
     position = np.array([0.3, -1.7, 2.0])
     point = Light("point", rotation @ position + CAMERA.view[:3, 3], np.array([0, 1.0, 0]), 1.5)
-    sun_tone = 0.7 * np.maximum(normal @ (rotation.T @ sun.vector), 0)
-    np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun]), sun_tone, atol=0.01)
     to_light = position - SPHERE.surface.vertices
-    cosine = np.maximum(dot(normal, normalize(to_light)), 0)
-    point_tone = 1.5 * 0.7152 * cosine / dot(to_light, to_light)
-    np.testing.assert_allclose(
-        lit_tone(SPHERE, CAMERA, [point]), np.minimum(point_tone, 1), atol=0.01
-    )
-    both = np.minimum(sun_tone + point_tone, 1)
-    np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, [sun, point]), both, atol=0.02)
+    sun_tone = 0.7 * np.maximum(normal @ (rotation.T @ sun.vector), 0)
+    point_tone = 1.5 * 0.7152 * np.maximum(dot(normal, normalize(to_light)), 0)
+    point_tone /= dot(to_light, to_light)
+    for lights, tone in (
+        ([sun], sun_tone),
+        ([point], point_tone),
+        ([sun, point], sun_tone + point_tone),
+        ([], np.maximum(dot(normal, CAMERA.view_directions(SPHERE.surface.vertices)), 0)),
+    ):
+        np.testing.assert_allclose(lit_tone(SPHERE, CAMERA, lights), np.minimum(tone, 1), atol=0.02)
 
 
 @pytest.mark.slow
 def test_spacing_is_wider_in_the_light():
-    style = StrokeStyle(unit="world", distance=0.05, tone=True)
+    style = StrokeStyle(unit="world", distance=0.05, light="lamp")
     strokes = draw_instances([SPHERE], CAMERA, style, lights=[KEY_LIGHT]).strokes
     light = normalize(strokes.points) @ (CAMERA.view[:3, :3].T @ KEY_LIGHT.vector)
     assert strokes.spacing[light > 0.8].mean() > 2.5 * strokes.spacing[light < 0.0].mean()
@@ -118,35 +114,8 @@ def test_spacing_is_wider_in_the_light():
 
 
 @pytest.mark.slow
-def test_simplified_strokes_are_within_the_tolerance():
-    strokes = draw_instances([SPHERE], CAMERA, StrokeStyle(spacing=12)).strokes
-    simplified = simplify_strokes(strokes, CAMERA)
-    assert len(simplified) == len(strokes)
-    assert len(simplified.points) < 0.5 * len(strokes.points)
-    np.testing.assert_array_equal(
-        simplified.points[simplified.start[:-1]], strokes.points[strokes.start[:-1]]
-    )
-    # Every removed point is near a segment of the simplified stroke.
-    pixel = pixel_size(strokes.points, CAMERA)
-    max_distance = 0.0
-    for number in range(len(strokes)):
-        span = slice(*strokes.start[number : number + 2])
-        kept = simplified.points[slice(*simplified.start[number : number + 2])]
-        chord = np.diff(kept, axis=0)
-        delta = strokes.points[span][:, None] - kept[:-1]
-        fraction = np.einsum("nki,ki->nk", delta, chord) / (chord**2).sum(axis=1)
-        delta = delta - np.clip(fraction, 0, 1)[..., None] * chord
-        distance = np.sqrt((delta**2).sum(axis=2)).min(axis=1)
-        max_distance = max(max_distance, float((distance / pixel[span]).max()))
-    assert max_distance < 0.11
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ortho", [False, True])
-def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(ortho):
-    camera = CAMERA
-    if ortho:
-        camera = orthographic_camera(look_at((0.5, -4, 1), (0, 0, 0)), 240, 200, scale=2.5)
+@pytest.mark.parametrize("camera", [CAMERA, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(camera):
     strokes = draw_instances([SPHERE], camera, StrokeStyle(spacing=12)).strokes
     points = offset_toward_camera(strokes, camera, 2.0)
     pixels, depth = project_to_pixels(strokes.points, camera)
@@ -155,9 +124,7 @@ def test_offset_toward_the_camera_keeps_the_picture_and_clears_the_surface(ortho
     pixel = pixel_size(strokes.points, camera)
     assert ((depth - offset_depth) / pixel > 1.9).all()
     # A ribbon of 2 pixels extends into a slope by 1 pixel times its steepness.
-    eye = -camera.view[:3, :3].T @ camera.view[:3, 3]
-    to_camera = normalize(eye - strokes.points) if not ortho else camera.view[2, :3]
-    facing = dot(strokes.normal, np.broadcast_to(to_camera, strokes.points.shape))
+    facing = dot(strokes.normal, camera.view_directions(strokes.points))
     compared = facing > 0.15
     steepness = np.sqrt(1 - facing[compared] ** 2) / facing[compared]
     offset = np.linalg.norm(points - strokes.points, axis=1)[compared]
@@ -193,25 +160,18 @@ def test_seeding_ends_where_shading_normals_are_steep(tilt):
     assert 30 < strokes.length.sum() < 50
 
 
-def test_samples_are_compared_in_blocks(monkeypatch):
-    """Surfaces that lie on each other have very many pairs of samples."""
-    style = StrokeStyle(spacing=20)
-    expected = draw_instances([SPHERE], CAMERA, style).strokes
-    monkeypatch.setattr(lateral_neighbors, "PAIR_BLOCK", 50)
-    strokes = draw_instances([SPHERE], CAMERA, style).strokes
-    np.testing.assert_array_equal(strokes.points, expected.points)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("module", "name"),
-    [(separation, "BLOCK_POINTS"), (visibility, "BLOCK_POINTS"), (seeding, "SEED_BATCH_SIZE")],
-)
-def test_blocks_do_not_change_strokes(module, name, monkeypatch):
+def test_blocks_do_not_change_strokes(monkeypatch):
     style = StrokeStyle(spacing=10, outline=True)
-
     expected = draw_instances([SPHERE], CAMERA, style).strokes
-    monkeypatch.setattr(module, name, 100)
+    for module, name in (
+        (separation, "BLOCK_POINTS"),
+        (visibility, "BLOCK_POINTS"),
+        (visibility, "SMOOTHED_POINTS"),
+        (seeding, "SEED_BATCH_SIZE"),
+        (lateral_neighbors, "PAIR_BLOCK"),
+    ):
+        monkeypatch.setattr(module, name, 100)
     strokes = draw_instances([SPHERE], CAMERA, style).strokes
     for name, values in vars(expected).items():
         np.testing.assert_array_equal(getattr(strokes, name), values, err_msg=name)
@@ -234,25 +194,27 @@ def test_seeding_ends_where_all_strokes_are_short():
 
 @pytest.mark.slow
 def test_errors(error_of):
-    assert "no object has a field" in error_of(
-        draw_instances, [MeshInstance(plane(), IDENTITY)], CAMERA, StrokeStyle()
-    )
-    behind = MeshInstance(SPHERE.surface, moved(y=-50.0), SPHERE.field)
-    assert "no stroke is visible" in error_of(draw_instances, [behind], CAMERA, StrokeStyle())
-    unseen = draw_instances(
-        [behind], CAMERA, StrokeStyle(hidden=True, spacing=1), clip_to_frame=False
-    )
-    assert 20 < len(unseen.strokes) < 2000
-    assert "no stroke fits" in error_of(draw_instances, [SPHERE], CAMERA, StrokeStyle(spacing=500))
-    away = MeshInstance(SPHERE.surface, moved(x=9.0), SPHERE.field)
-    assert "no stroke is visible" in error_of(draw_instances, [away], CAMERA, StrokeStyle())
-    assert "setting 'spacing' is 0, expected a number from 0.5" in error_of(StrokeStyle, spacing=0)
-    assert "setting 'curvature' is nan" in error_of(StrokeStyle, curvature=np.nan)
-    assert "'sun', expected one of headlight, lamp, scene" in error_of(StrokeStyle, light="sun")
-    assert "pen" in error_of(Pen, width=0.0)
+    behind, away = replace(SPHERE, matrix=moved(y=-50.0)), replace(SPHERE, matrix=moved(x=9.0))
     pixel = float(pixel_size(SPHERE.world_points(), CAMERA).min())
-    fine = StrokeStyle(unit="world", distance=0.4 * pixel)
-    assert "strokes would be 0.4 pixels" in error_of(draw_instances, [SPHERE], CAMERA, fine)
+    for instance, settings, message in (
+        (replace(SPHERE, field=None), {}, "no object has a field"),
+        (behind, {}, "no stroke is visible"),
+        (away, {}, "no stroke is visible"),
+        (SPHERE, {"spacing": 500}, "no stroke fits"),
+        (SPHERE, {"unit": "world", "distance": 0.4 * pixel}, "strokes would be 0.4 pixels"),
+    ):
+        assert message in error_of(draw_instances, [instance], CAMERA, StrokeStyle(**settings))
+    for settings, message in (
+        ({"spacing": 0}, "setting 'spacing' is 0, expected a number from 0.5"),
+        ({"curvature": np.nan}, "setting 'curvature' is nan"),
+        ({"overshoot": -1}, "setting 'overshoot' is -1, expected a number from 0"),
+        ({"light": "sun"}, "'sun', expected one of none, headlight, lamp, scene"),
+    ):
+        assert message in error_of(StrokeStyle, **settings)
+    assert "pen" in error_of(Pen, width=0.0)
+    style = StrokeStyle(hidden=True, spacing=1)
+    unseen = draw_instances([behind], CAMERA, style, clip_to_frame=False)
+    assert 20 < len(unseen.strokes) < 2000
 
 
 @pytest.mark.slow
@@ -260,15 +222,16 @@ def test_swelling_strokes_are_evenly_spaced():
     """They are where strokes without a tone are, and their width is the darkness."""
     style = StrokeStyle(spacing=9, taper=0.0, hidden=True)
     even = draw_instances([SPHERE], CAMERA, style).strokes
-    swelling = draw_instances([SPHERE], CAMERA, replace(style, tone=True, swell=1.0)).strokes
-    denser = draw_instances([SPHERE], CAMERA, replace(style, tone=True)).strokes
-    places = set(map(tuple, np.round(even.points, 6).tolist()))
-
-    def share_of_places(strokes):
-        return np.mean([tuple(point) in places for point in np.round(strokes.points, 6).tolist()])
-
-    assert share_of_places(swelling) > 0.9 > 0.5 > share_of_places(denser)
+    swelling = draw_instances(
+        [SPHERE], CAMERA, replace(style, light="headlight", swell=1.0)
+    ).strokes
+    denser = draw_instances([SPHERE], CAMERA, replace(style, light="headlight")).strokes
+    share, share_of_denser = (
+        np.mean(cKDTree(even.points).query(strokes.points)[0] < 1e-6)
+        for strokes in (swelling, denser)
+    )
+    assert share > 0.9 > 0.5 > share_of_denser
     first = swelling.family[swelling.stroke] == 0
-    to_eye = normalize(np.linalg.inv(CAMERA.view)[:3, 3] - swelling.points)
+    to_eye = CAMERA.view_directions(swelling.points)
     darkness = 1 - np.clip(dot(normalize(swelling.points), to_eye), 0, 1)
     np.testing.assert_allclose(swelling.width[first], darkness[first], atol=0.05)

@@ -35,23 +35,3 @@ def test_all_pairs_are_found(octaves):
     )
     expected = expected[expected[:, 1] % 7 != 0]
     np.testing.assert_array_equal(actual, np.unique(expected, axis=0))
-
-
-def longest_list(grid):
-    """The largest number of blocks that a query of one cell visits."""
-    block, length = grid.last_block[grid.last_block >= 0], 0
-    while len(block):
-        block, length = grid.next_block[block], length + 1
-        block = block[block >= 0]
-    return length
-
-
-def test_no_cell_holds_many_points():
-    """The work for a cell does not grow with the ratio of the radii."""
-    lengths = []
-    for octaves in (1, 18):
-        points, radius = spread_points(20000, octaves)
-        grid = PointGrid(float(np.median(radius)), len(points))
-        grid.add(points, radius)
-        lengths.append(longest_list(grid))
-    assert lengths[1] <= 2 * lengths[0]

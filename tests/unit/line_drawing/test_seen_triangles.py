@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import long
 from harness.stroke_tracing import visible_strokes
-from shapes import icosphere, plane, torus
+from shapes import icosphere, instance_of, moved, plane, torus
 
-from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.mesh_in_view import (
     HIDDEN_MARGIN,
     seen_triangles,
@@ -23,13 +24,10 @@ from rosy_addon.line_drawing.visibility import (
     rasterize_depth,
 )
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
-from rosy_addon.projection.gbuffer import MeshInstance
 
 
 def instance(surface, location=(0, 0, 0)):
-    matrix = np.eye(4)
-    matrix[:3, 3] = location
-    return MeshInstance(surface, matrix, generate(surface, "smoothest", 4))
+    return replace(instance_of(surface, 4), matrix=moved(*location))
 
 
 def seen(instances, index, camera):

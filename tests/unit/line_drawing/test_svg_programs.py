@@ -5,29 +5,22 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import long
 from harness.stroke_tracing import trace_strokes, visible_strokes, write_svg
 from PIL import Image
-from scipy.ndimage import binary_erosion, gaussian_filter, sobel
+from scipy.ndimage import gaussian_filter
 from shapes import torus
 
-from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.field.generate import generate
-from rosy_addon.line_drawing.outline import outline
-from rosy_addon.line_drawing.pipeline import draw_instances
+from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.stroke_set import Strokes
-from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.svg import Pen
 from rosy_addon.line_drawing.visibility import pixel_size
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
 
 pytestmark = pytest.mark.slow
 
@@ -146,7 +139,7 @@ def strokes(scene):
         0.8, 0.15
     )
     return visible_strokes(
-        Strokes.concatenate(lines, outline(instance, camera)), [instance], camera
+        Strokes.concatenate(lines, outline_strokes(instance, camera)), [instance], camera
     )
 
 
@@ -163,32 +156,6 @@ def test_programs_draw_the_strokes_where_the_camera_sees_them(
     assert correlation(found, expected) > 0.98
     assert correlation(found, expected, 3.0) > 0.998
     assert abs(found.sum() / expected.sum() - 1) < 0.01
-
-
-@pytest.mark.parametrize("program", PROGRAMS[:1])
-def test_closed_paths_are_drawn_as_open_ones(program, scene, tmp_path):
-    """Open paths end at their first point, so they look the same."""
-    instance, camera = scene
-    crossed = MeshInstance(instance.surface, instance.matrix, generate(instance.surface, "axis", 4))
-    lines = visible_strokes(
-        trace_strokes(crossed, 10.0 * pixel_size(crossed.world_points(), camera)), [crossed], camera
-    )
-    lines = Strokes.concatenate(
-        lines, visible_strokes(outline(instance, camera), [instance], camera)
-    )
-    assert lines.closed.sum() >= 3
-    pictures = []
-    for name, variant in (
-        ("closed", lines),
-        ("open", replace(lines, closed=np.zeros_like(lines.closed))),
-    ):
-        write_svg(tmp_path / f"{name}.svg", variant, camera, Pen(width=4.0))
-        program(tmp_path / f"{name}.svg", tmp_path / f"{name}.png")
-        pictures.append(ink_of(tmp_path / f"{name}.png"))
-    assert (tmp_path / "closed.svg").read_text().count("Z") == lines.closed.sum()
-    # The edges of a round join and of two round caps are antialiased a little differently. A part that
-    # is missing differs by 1.
-    assert np.abs(pictures[0] - pictures[1]).max() < 0.03
 
 
 @needs_inkscape
@@ -211,59 +178,3 @@ def test_the_page_has_its_width_in_millimeters(strokes, scene, tmp_path):
     # 254 dpi are ten pixels per millimeter.
     inkscape(tmp_path / "a.svg", tmp_path / "a.png", "--export-dpi=254")
     assert correlation(ink_of(tmp_path / "a.png"), raster(strokes, scene[1], PEN_WIDTH)) > 0.98
-
-
-@needs_browser
-def test_strokes_have_the_directions_of_the_render(scene, tmp_path):
-    instance, camera = scene
-    lines = visible_strokes(
-        trace_strokes(instance, 5.0 * pixel_size(instance.world_points(), camera)),
-        [instance],
-        camera,
-    )
-    write_svg(tmp_path / "a.svg", lines, camera)
-    browser(tmp_path / "a.svg", tmp_path / "a.png")
-    picture, inside = rendered(scene, Look(shading=0.0), border=12)
-    product = line_directions(ink_of(tmp_path / "a.png")) * line_directions(picture).conj()
-    error = np.degrees(np.abs(np.angle(product[inside])) / 2)
-    assert np.median(error) < 3
-    assert np.cos(np.radians(2 * error)).mean() > 0.93
-
-
-@needs_inkscape
-def test_strokes_are_as_dark_as_the_render(scene, tmp_path):
-    instance, camera = scene
-    style = StrokeStyle(spacing=4.0, tone=True, light="lamp")
-    strokes = draw_instances([instance], camera, style, lights=[KEY_LIGHT]).strokes
-    write_svg(tmp_path / "a.svg", strokes, camera, Pen(width=2.0))
-    inkscape(tmp_path / "a.svg", tmp_path / "a.png")
-    ink = ink_of(tmp_path / "a.png")
-    picture, inside = rendered(scene, Look(ink="hatch", shading=1.0, light="lamp"), border=4)
-    weight = np.maximum(gaussian_filter(inside * 1.0, 12), 1e-9)
-    darkness = [
-        (gaussian_filter(np.where(inside, image, 0), 12) / weight)[inside]
-        for image in (ink, 1 - picture)
-    ]
-    assert np.corrcoef(darkness)[0, 1] > 0.9
-
-
-def rendered(scene, look, border):
-    """Render the scene.
-
-    Returns
-    -------
-    picture : (H, W) ndarray
-        Linear intensity. Row 0 is at the top.
-    inside : (H, W) bool ndarray
-        The pixels of the surface that are more than `border` pixels from its silhouette.
-    """
-    instance, camera = scene
-    rgba = compose(project([instance], camera), look).rgba[::-1]
-    return rgba[..., :3].mean(axis=2), binary_erosion(rgba[..., 3] > 0.99, iterations=border)
-
-
-def line_directions(image):
-    """Return (H, W) complex directions of lines with doubled angles, from the structure tensor."""
-    smooth = gaussian_filter(image, 1.0)
-    x, y = sobel(smooth, axis=1), sobel(smooth, axis=0)
-    return -gaussian_filter(x**2 - y**2, 6) - 2j * gaussian_filter(x * y, 6)

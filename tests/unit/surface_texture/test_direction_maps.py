@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import mainly
-from shapes import globe, torus
+from shapes import globe, instance_of, torus
 from uv_maps import patches_uv, torus_uv
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.surface_texture.direction_maps import corner_tangents
 from rosy_addon.surface_texture.draw import draw_texture
+from rosy_addon.surface_texture.line_order import corner_tangents
 
 #: Largest mean error of a direction in radians, and the largest one of 95 %. With 8 bits a direction is right
 #: to 0.3 degrees; tangents that are averaged over the faces around a corner differ from those of the face.
@@ -29,14 +29,10 @@ def decoded(image, surface, uv):
     texel = stored[place[:, 1], place[:, 0]]
     points = surface.vertices[surface.corner_vertex].reshape(-1, 4, 3)
     # Least squares: points are linear in u and v.
-    u, v = (corner_uv - corner_uv.mean(axis=1, keepdims=True)).transpose(2, 0, 1)
+    offset_uv = corner_uv - corner_uv.mean(axis=1, keepdims=True)
     offset = points - points.mean(axis=1, keepdims=True)
-    gram = np.stack([[(u * u).sum(1), (u * v).sum(1)], [(u * v).sum(1), (v * v).sum(1)]])
-    inverse = np.linalg.inv(gram.transpose(2, 0, 1))
-    along_u = np.einsum("fk,fki->fi", u, offset) * inverse[:, 0, 0, None]
-    along_u += np.einsum("fk,fki->fi", v, offset) * inverse[:, 0, 1, None]
-    along_v = np.einsum("fk,fki->fi", u, offset) * inverse[:, 1, 0, None]
-    along_v += np.einsum("fk,fki->fi", v, offset) * inverse[:, 1, 1, None]
+    along = np.linalg.pinv(offset_uv) @ offset
+    along_u, along_v = along[:, 0], along[:, 1]
     normal = surface.face_normal
     tangent = along_u - (along_u * normal).sum(axis=1, keepdims=True) * normal
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -61,7 +57,7 @@ def test_maps_decode_to_the_field(name, degree):
     """Also in charts that are turned and mirrored; the direction is one of the field."""
     uv = UV_MAPS[name]
     surface = torus()
-    kind = GeneratorSettings("curvature" if degree in (2, 4) else "smoothest")
+    kind = "curvature" if degree in (2, 4) else "smoothest"
     field = generate(surface, kind, degree)
     vectors = field.vectors.copy()
     vectors[:48] = 0
@@ -87,7 +83,7 @@ def test_a_line_goes_on_where_its_directions_turn_over():
     """On an ellipsoid they do between two umbilics; away from these, one family is followed everywhere."""
     ball = globe(48, 96)
     surface = build_surface(ball.vertices * (1, 0.7, 0.5), ball.corner_vertex, ball.face_start)
-    field, line = (generate(surface, GeneratorSettings("curvature"), n) for n in (4, 2))
+    field, line = (generate(surface, "curvature", n) for n in (4, 2))
     first = surface.triangles[:, 0]
     tangent = corner_tangents(surface, field, 0.0)[first]
     a, b, c = 1.0, 0.7, 0.5
@@ -105,10 +101,7 @@ def test_a_line_goes_on_where_its_directions_turn_over():
 
 def test_directions_do_not_turn_over_within_a_chart():
     """A filter would average opposite directions to none."""
-    surface = torus()
-    instance = MeshInstance(
-        surface, np.eye(4), generate(surface, GeneratorSettings("curvature"), 4)
-    )
+    instance = instance_of(torus(), 4, "curvature")
     rgba = draw_texture(instance, torus_uv(), Look(), 512, content="anisotropy").rgba
     inside = rgba[40:200, 40:470, :2]
     for axis in (0, 1):

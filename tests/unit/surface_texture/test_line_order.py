@@ -8,7 +8,7 @@ from conftest import mainly
 from scipy.spatial.transform import Rotation
 from shapes import cube, cylinder, icosphere, torus
 
-from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.generate import generate
 from rosy_addon.line_drawing.tangent_mesh import TangentMesh, build_tangent_mesh, nearest_member
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.surface_texture.line_order import first_line_weights, line_order
@@ -16,7 +16,7 @@ from rosy_addon.surface_texture.line_order import first_line_weights, line_order
 
 def mesh_of(surface, kind: str, degree: int, matrix=None) -> TangentMesh:
     """The tangent mesh of a surface with a field."""
-    field = generate(surface, GeneratorSettings(kind), degree)
+    field = generate(surface, kind, degree)
     matrix = np.eye(4) if matrix is None else matrix
     return build_tangent_mesh(MeshInstance(surface, matrix, field))
 

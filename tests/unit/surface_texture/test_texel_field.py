@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import mainly
-from shapes import torus
+from shapes import instance_of, torus
 from uv_maps import patches_uv
 
 from rosy_addon.compositor.covering import build_covering
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import look_on_surface
 from rosy_addon.compositor.streamline_batch import StreamlineBatch
-from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, advance
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh, nearest_member
-from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.surface_texture.charts import uv_charts
 from rosy_addon.surface_texture.draw import step_length
 from rosy_addon.surface_texture.texel_field import frames_at, texel_field
@@ -32,9 +30,7 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
     Particles know neither texels nor charts. Streamlines begin within half a texel of its center.
     """
     surface = torus()
-    instance = MeshInstance(
-        surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), degree)
-    )
+    instance = instance_of(surface, degree)
     mesh = build_tangent_mesh(instance)
     charts = uv_charts(surface, mesh, patches_uv(3))
     assert charts.chart.max() + 1 == 32
@@ -77,9 +73,7 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
 def test_steps_across_seams_are_isometries():
     """They lead as far on the surface as in the chart, and back to where they began."""
     surface = torus()
-    instance = MeshInstance(
-        surface, np.eye(4), generate(surface, GeneratorSettings("smoothest"), 4)
-    )
+    instance = instance_of(surface, 4)
     mesh = build_tangent_mesh(instance)
     charts = uv_charts(surface, mesh, patches_uv(3))
     texels = rasterize_charts(charts, texture_frame(charts, 512, "torus"), "torus")

@@ -1,6 +1,7 @@
-"""Overshoot: extend strokes beyond occluding edges, borders and the ends of shaded areas.
+"""The ends of strokes: which are free, how free ends are extended, and which ends meet head on.
 
-This imitates quick drawings by hand, in which lines continue a little too far.
+Extensions beyond occluding edges, borders and the ends of shaded areas (overshoot) imitate quick drawings
+by hand, in which lines continue a little too far.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import report
-from ..field.blocks import concatenated_ranges
-from ..field.frames import normalize
+from ..field.blocks import concatenated_ranges, row_blocks
+from ..field.frames import dot, normalize
 from ..projection.camera import Camera
+from .point_grid import PointGrid
 from .stroke_set import Strokes, arc_lengths
 from .tangent_mesh import TangentMesh
 from .visibility import (
@@ -27,9 +29,8 @@ from .visibility import (
 #: Shortest extension of an end, as a fraction of the longest.
 MIN_EXTENSION_RATIO = 0.3
 
-#: Distance in pixels before an end at which the extension leaves the stroke. The direction of the
-#: extension is measured over the same length. Both are at most the second constant as a fraction
-#: of the length of the stroke.
+#: Distance in pixels before an end at which the extension leaves the stroke, and largest distance as a
+#: fraction of the length of the stroke. The direction of the extension is measured over the same length.
 BACKTRACK_PX, MAX_BACKTRACK_RATIO = 6.0, 0.25
 
 #: Longest extension of an end, as a fraction of the length of the stroke.
@@ -37,6 +38,17 @@ MAX_EXTENSION_RATIO = 0.5
 
 #: A point is on an edge if a barycentric coordinate is below this.
 EDGE_EPS = 1e-9
+
+#: Region around an end in which the end of another stroke meets it: largest distances ahead, to the
+#: side and behind, in spacings.
+MAX_FORWARD, MAX_LATERAL, MAX_BACKWARD = 1.2, 0.8, 0.6
+
+#: Largest cosine between the outward directions of two ends that meet, and smallest cosine between
+#: their normals.
+MAX_DIRECTION_COSINE, MIN_NORMAL_COSINE = -0.8, 0.5
+
+#: Ends that are compared with others at once.
+BLOCK_ENDS = 1 << 12
 
 
 def mark_free_boundary_ends(strokes: Strokes, mesh: TangentMesh) -> Strokes:
@@ -86,41 +98,42 @@ def extend_free_ends(
     mark_free_boundary_ends : Marks the ends at borders.
     Strokes.runs_where : Marks the ends at removed points.
     """
-    label = "extending strokes"
-    report(0.0, label)
+    report(0.0, "extending strokes")
     if depth_buffer is None:
         strokes = strokes.subdivided(pixel_counts(strokes, camera))
-        report(0.2, label)
     screen = np.nan_to_num(project_to_pixels(strokes.points, camera)[0])
     arc = arc_lengths(screen, strokes.start)
     ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1)
     is_free = strokes.free_end_mask & strokes.member[ends].any(axis=2)
     stroke, side = np.nonzero(is_free & (arc[ends[:, 1]] > 0)[:, None])
     end, total = ends[stroke, side], arc[ends[stroke, 1]]
-    report(0.3, label)
-    extend = _extension_in_space if depth_buffer is None else _extension_in_picture
-    start_point, origin, step = extend(
-        strokes, arc, end, np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total), camera
-    )
+    backtrack = np.minimum(BACKTRACK_PX, MAX_BACKTRACK_RATIO * total)
+    if depth_buffer is None:
+        start_point, origin = end, strokes.points[end]
+        before = strokes.points[_point_before_end(arc, strokes, end, backtrack)]
+        step = pixel_size(origin, camera)[:, None] * normalize(origin - before)
+    else:
+        start_point, origin, step = _extension_in_picture(strokes, arc, end, backtrack, camera)
     length = np.minimum(
         max_pixels * _extension_ratios(len(strokes))[stroke, side], MAX_EXTENSION_RATIO * total
     )
     length = length + np.abs(arc[end] - arc[start_point])
     is_valid = step.any(axis=1) & np.isfinite(step).all(axis=1)
-    report(0.5, label)
     extended, distance = _append_extensions(
         strokes, *(column[is_valid] for column in (start_point, side, origin, step, length))
     )
-    report(0.9, label)
     if depth_buffer is None:
         return extended
     return _drop_onto_surfaces(extended, distance, depth_buffer, camera)
 
 
-def _extension_in_space(
+def _extension_in_picture(
     strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the lines along which (k,) ends are extended in world space.
+    """Return the lines along which (k,) ends are extended, if they are straight in the picture.
+
+    The lines lie in the plane through the end that is parallel to the image plane. They leave the stroke
+    `backtrack` pixels before its end, because strokes bend along the silhouette close to it.
 
     Parameters
     ----------
@@ -142,31 +155,14 @@ def _extension_in_space(
     step : (k, 3) float64 ndarray
         Steps of one pixel, in world space.
     """
-    before, origin = _point_before_end(arc, strokes, end, backtrack), strokes.points[end]
-    step = pixel_size(origin, camera)[:, None] * normalize(origin - strokes.points[before])
-    return end, origin, step
-
-
-def _extension_in_picture(
-    strokes: Strokes, arc: np.ndarray, end: np.ndarray, backtrack: np.ndarray, camera: Camera
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the lines along which (k,) ends are extended, if they are straight in the picture.
-
-    The parameters and results are those of `_extension_in_space`. The lines lie in the plane
-    through the end that is parallel to the image plane. They leave the stroke `backtrack` pixels
-    before its end, because strokes bend along the silhouette close to it.
-    """
     start_point = _point_before_end(arc, strokes, end, backtrack)
     before = _point_before_end(arc, strokes, end, backtrack + np.abs(arc[end] - arc[start_point]))
     start_pixel, depth = project_to_pixels(strokes.points[start_point], camera)
     before_pixel, _ = project_to_pixels(strokes.points[before], camera)
     _, end_depth = project_to_pixels(strokes.points[end], camera)
     origin = _move_to_depth(strokes.points[start_point], depth, end_depth, camera)
-    return (
-        start_point,
-        origin,
-        _pixel_steps_to_world(normalize(start_pixel - before_pixel), end_depth, camera),
-    )
+    step = _pixel_steps_to_world(normalize(start_pixel - before_pixel), end_depth, camera)
+    return start_point, origin, step
 
 
 def _point_before_end(
@@ -265,13 +261,9 @@ def _append_extensions(
     point, distance = point[order], distance[order]
     extended = strokes.take_points(point)
     counts = np.bincount(strokes.stroke[point], minlength=len(strokes))
-    extended = replace(
-        extended,
-        points=points[order],
-        weights=np.where(distance[:, None] > 0, np.nan, extended.weights),
-        start=np.concatenate([[0], np.cumsum(counts)]),
-    )
-    return extended, distance
+    extended.weights[distance > 0] = np.nan
+    start = np.concatenate([[0], np.cumsum(counts)])
+    return replace(extended, points=points[order], start=start), distance
 
 
 def _drop_onto_surfaces(
@@ -287,10 +279,8 @@ def _drop_onto_surfaces(
     frame_size = np.array([camera.width, camera.height])
     column, row = np.clip(np.nan_to_num(pixels), 0, frame_size - 1).astype(np.int64).T
     target_depth = depth_buffer.depth[row, column]
-    tolerance = (
-        MAX_BIAS_STEEPNESS * (distance[extended] + BACKTRACK_PX) * pixel_size(points, camera)
-    )
-    moves = target_depth < depth + tolerance
+    reach = MAX_BIAS_STEEPNESS * (distance[extended] + BACKTRACK_PX)
+    moves = target_depth < depth + reach * pixel_size(points, camera)
     extended = extended[moves]
     moved, normal = strokes.points.copy(), strokes.normal.copy()
     moved[extended] = _move_to_depth(points[moves], depth[moves], target_depth[moves], camera)
@@ -298,3 +288,47 @@ def _drop_onto_surfaces(
         depth_buffer.normal[depth_buffer.triangle[row, column][moves]] @ camera.view[:3, :3]
     )
     return replace(strokes, points=moved, normal=normal)
+
+
+# --- ends that meet ------------------------------------------------------------------------------------
+
+
+def head_on_ends(strokes: Strokes) -> np.ndarray:
+    """Return which ends of strokes meet the end of another stroke head on.
+
+    Strokes that grow toward each other are rarely aligned, so both end where they meet. If these ends
+    were tapered like others, a light band would appear along the front.
+
+    Parameters
+    ----------
+    strokes : Strokes
+
+    Returns
+    -------
+    (S, 2) bool ndarray
+        For the first and the last point of each stroke.
+    """
+    ends = np.stack([strokes.start[:-1], strokes.start[1:] - 1], axis=1).ravel()
+    next_to_end = np.stack([strokes.start[:-1] + 1, strokes.start[1:] - 2], axis=1).ravel()
+    position, normal, spacing = strokes.points[ends], strokes.normal[ends], strokes.spacing[ends]
+    outward = normalize(position - strokes.points[next_to_end])
+    result = np.zeros(len(ends), dtype=bool)
+    if not len(ends):
+        return result.reshape(-1, 2)
+    grid = PointGrid(MAX_FORWARD * float(np.median(spacing)), len(ends))
+    grid.add(position, MAX_FORWARD * spacing)
+    radius = float(np.hypot(MAX_FORWARD, MAX_LATERAL)) * spacing
+    for block in row_blocks(len(ends), BLOCK_ENDS):
+        report(block.start / len(ends), "shaping ends")
+        query, other = grid.pairs_within(position[block], radius[block])
+        query = query + block.start
+        delta = position[other] - position[query]
+        forward = dot(delta, outward[query])
+        lateral = np.sqrt(np.maximum(dot(delta, delta) - forward**2, 0))
+        meets = (query != other) & (dot(outward[query], outward[other]) < MAX_DIRECTION_COSINE)
+        meets &= dot(normal[query], normal[other]) > MIN_NORMAL_COSINE
+        meets &= forward < MAX_FORWARD * spacing[query]
+        meets &= forward > -MAX_BACKWARD * spacing[query]
+        meets &= lateral < MAX_LATERAL * spacing[query]
+        result[query[meets]] = True
+    return result.reshape(-1, 2)

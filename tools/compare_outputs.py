@@ -211,8 +211,8 @@ STROKES = {
     "tone-lamp-outline": "@suzanne.obj --degree 2 --light lamp --outline --overshoot 8",
     "outline": "@pair.stl --generate smoothest --outline --spacing 12",
     "hidden": "@cube.off --generate features --hidden --cross-creases --spacing 14",
-    "plotter": "@torus.obj --plotter --mm 200 --spacing 10",
-    "taper": "@bumpy.ply --taper 2 --colors #aa0000,#0000aa --no-paper",
+    "plotter": "@torus.obj --plotter --mm 200 --gaps 0.3 --spacing 10",
+    "gaps": "@bumpy.ply --gaps 0.5 --taper 2 --colors #aa0000,#0000aa --no-paper",
     "curvature": "@suzanne.obj --curvature 0.8 --spacing 12",
     "distance": "@wave.obj --distance 0.12 --up z --view -30,40 --ortho",
     "engraving": "@suzanne.obj --swell 1 --light lamp --layering 0.4",
@@ -221,7 +221,7 @@ STROKES = {
     "singularities-visible": "@torus.obj --degree 3 --spacing 14 --singularity-dots visible "
     "--singularity-size 14",
     "tone-plotter": "@wave.obj --light headlight --plotter --mm 120 --outline",
-    "tone-degree-1": "@bumpy.ply --degree 1 --light lamp",
+    "tone-degree-1": "@bumpy.ply --degree 1 --light lamp --gaps 0.4",
     "tone-degree-6": "@bumpy.ply --degree 6 --light headlight --layering 0.1 --taper 0.3",
     "free": "@torus.obj @free.rawfield --spacing 12",
     "tensors": "@torus.obj @tensors.txt --spacing 12 --taper 0",
@@ -497,7 +497,8 @@ OPERATORS = {
     "strokes.inks = 'FAMILIES'; ops.strokes(kind='FILE', filepath='out.svg')",
     "strokes-pencil": "strokes.spacing = 12; strokes.outline = True; ops.strokes(kind='PENCIL'); "
     "dump_pencil()",
-    "strokes-curves": "strokes.spacing = 10; ops.strokes(kind='CURVES'); dump_attributes()",
+    "strokes-curves": "strokes.spacing = 10; strokes.gaps = 0.3; ops.strokes(kind='CURVES'); "
+    "dump_attributes()",
     "strokes-remove": "strokes.spacing = 12; ops.strokes(kind='PENCIL'); ops.strokes_remove(); "
     "dump_names()",
     "strokes-scene": "cli('strokes scene.blend -o out.svg --spacing 12 --light headlight --outline')",

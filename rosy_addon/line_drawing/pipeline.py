@@ -18,6 +18,7 @@ from ..core.progress import progress, report
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from .arrowheads import arrowheads
+from .crossings import with_crossing_gaps
 from .families import label_families
 from .mesh_in_view import MeshInView, mesh_in_view, seen_triangles, triangles_near, whole_mesh
 from .outline import OUTLINE_KINDS, clip_outline, outline_strokes
@@ -260,6 +261,9 @@ def _instance_strokes(
     if tone is not None:
         point_tone = values_at_points(strokes, by_fan.surface, tone)
         strokes = weight_by_tone(strokes, point_tone, style.layering, max_ratio)
+    if style.gaps:
+        with progress(0.95, 0.98):
+            strokes = with_crossing_gaps(strokes, style.gaps)
     if style.taper:
         # Strokes reach creases and borders at full width, as they reach silhouettes. Those that will be
         # extended are tapered after the extension.

@@ -117,9 +117,26 @@ class Strokes:
         """Return a copy with some points, by number. The caller has to replace `start` and what depends on it."""
         return replace(self, **{name: getattr(self, name)[point] for name in POINT_COLUMNS})
 
+    def between(self, after: np.ndarray, fraction: np.ndarray) -> Strokes:
+        """Return a copy with (m,) points on segments: from the point before each of `after` to that point.
+
+        `fraction` is (m,), from 0 to 1. Normals are not of unit length. The weights of points before the end
+        of a segment are NaN: those of its two ends may be in different triangles.
+        """
+        before = np.maximum(after - 1, 0)
+        result = self.take_points(after)
+        for name in ("points", "normal", "spacing", "width"):
+            values, previous = getattr(result, name), getattr(self, name)[before]
+            values -= previous
+            values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
+            values += previous
+        result.weights[fraction < 1] = np.nan
+        return result
+
     def runs_where(
         self,
         kept: np.ndarray,
+        split_labels: np.ndarray | None = None,
         free_at_removed: np.ndarray | bool = True,
     ) -> Strokes:
         """Cut strokes into runs of two or more consecutive points that are kept.
@@ -127,6 +144,8 @@ class Strokes:
         Parameters
         ----------
         kept : (n,) bool ndarray
+        split_labels : (n,) ndarray, optional
+            Strokes are also split between points with different labels.
         free_at_removed : bool or (n,) bool ndarray
             Whether the ends of runs next to a removed point are free: one value for all, or one for
             each removed point.
@@ -138,7 +157,10 @@ class Strokes:
         """
         stroke = self.stroke
         starts_run = kept.copy()
-        starts_run[1:] &= ~kept[:-1] | (stroke[1:] != stroke[:-1])
+        boundary = stroke[1:] != stroke[:-1]
+        if split_labels is not None:
+            boundary |= split_labels[1:] != split_labels[:-1]
+        starts_run[1:] &= ~kept[:-1] | boundary
         run = np.cumsum(starts_run) - 1
         count = np.bincount(run[kept], minlength=int(starts_run.sum()))
         is_long = count >= 2
@@ -210,15 +232,7 @@ class Strokes:
         last = np.cumsum(counts) - 1
         row = np.repeat(np.arange(len(counts)), counts)
         fraction = (np.arange(len(row)) - (last - counts)[row]) / counts[row]
-        point = row + start[0]
-        divided, before = self.take_points(point), np.maximum(point - 1, 0)
-        for name in ("points", "normal", "spacing", "width"):
-            values, previous = getattr(divided, name), getattr(self, name)[before]
-            values -= previous
-            values *= fraction.reshape((-1,) + (1,) * (values.ndim - 1))
-            values += previous
-        # The weights of the previous point may be in another triangle, so they are not interpolated.
-        divided.weights[fraction < 1] = np.nan
+        divided = self.between(row + start[0], fraction)
         return replace(
             divided,
             start=np.concatenate([[0], last[start[1:] - start[0] - 1] + 1]),

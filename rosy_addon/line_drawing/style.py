@@ -80,6 +80,14 @@ class StrokeStyle:
         "Amount by which strokes are closer together where the surface is more curved",
         panel="density",
     )
+    gaps: float = number(
+        0.0,
+        0.0,
+        1.0,
+        "Gap in the lower of two crossing strokes, as a multiple of the spacing",
+        unit="spacings",
+        panel="ends",
+    )
     taper: float = number(
         0.8,
         0.0,
@@ -88,6 +96,7 @@ class StrokeStyle:
         "Ends that meet head on are not tapered",
         unit="spacings",
         panel="ends",
+        panel_before="gaps",
     )
     overshoot: float = number(
         0.0,
@@ -97,6 +106,7 @@ class StrokeStyle:
         "the shade, or an occluding edge",
         unit="pixels",
         panel="ends",
+        panel_before="gaps",
     )
     arrows: float = number(
         0.0,
@@ -107,6 +117,7 @@ class StrokeStyle:
         unit="spacings",
         label="Arrowheads",
         panel="ends",
+        panel_before="gaps",
     )
     outline: bool = switch(False, "Draw silhouettes, creases and borders as well")
     hidden: bool = switch(False, "Keep strokes that the camera does not see", label="Keep Hidden")

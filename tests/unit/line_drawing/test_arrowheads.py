@@ -35,7 +35,10 @@ def drawn(surface, field, **settings):
 CASES = {
     "three directions": (3, {}),
     "seven directions": (7, {}),
-    "tone and outline": (3, {"light": "headlight", "outline": True, "overshoot": 6.0}),
+    "tone, gaps and outline": (
+        3,
+        {"light": "headlight", "gaps": 0.3, "outline": True, "overshoot": 6.0},
+    ),
     "with hidden strokes": (1, {"hidden": True, "cross_creases": True}),
 }
 

@@ -136,8 +136,16 @@ def test_extensions_into_the_light_follow_the_surface():
 
 
 @pytest.mark.slow
-def test_ends_at_neighbors_are_not_extended():
-    """On the sphere, strokes end where they come too near to others."""
+def test_ends_at_gaps_and_at_neighbors_are_not_extended():
+    crossed = MeshInstance(SQUARE.surface, IDENTITY, axis_field(SQUARE.surface, 4, (1, 0, 0)))
+    plain, extended = draw_both([crossed], TOP_CAMERA, spacing=20.0, gaps=0.3)
+    is_inner = np.abs(ends_of(plain)[:, :, :2]).max(axis=(1, 2)) < 1 - 1e-9
+    assert is_inner.sum() > 50 and not is_inner.all()
+    for number in np.flatnonzero(is_inner):
+        a, b = (strokes.select([number]) for strokes in (plain, extended))
+        assert np.array_equal(a.points, b.points) and np.allclose(a.width, b.width)
+    assert (pixel_growth(plain, extended, TOP_CAMERA)[~is_inner] > 1).all()
+    # On the sphere, strokes end where they come too near to others.
     plain, extended = draw_both([SPHERE], FRONT_CAMERA, spacing=9.0)
     facing = dot(normalize(ends_of(plain)), FRONT_CAMERA.view_directions(ends_of(plain))) > 0.5
     assert facing.sum() > 10

@@ -14,7 +14,7 @@ from conftest import long, mainly
 from field_helpers import bumpy
 from harness.stroke_spacing import lateral_gaps
 from harness.stroke_tracing import trace_strokes, visible_strokes
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapes import cylinder, icosphere, instance_of, plane, sharp_cube, torus
 
@@ -25,6 +25,7 @@ from rosy_addon.field.generate import axis_field
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
+from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
 from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.outline import outline_strokes
 from rosy_addon.line_drawing.seeding import singularities
@@ -461,7 +462,7 @@ def test_no_global_families_around_singularities():
     assert set(trace_strokes(instance, 0.2).family.tolist()) == {0, 1}
 
 
-# --- tapers and ends ----------------------------------------------------------------------
+# --- tapers, ends and crossings ----------------------------------------------------------------------
 
 
 def test_taper_and_closed_strokes():
@@ -492,6 +493,50 @@ def test_ends_that_meet_head_on_are_not_tapered():
     first, last = tapered.start[:-1], tapered.start[1:] - 1
     end_width = np.stack([tapered.width[first], tapered.width[last]], axis=1)
     assert np.allclose(end_width, [[0.2, 1], [1, 0.2], [0.2, 1], [0.2, 0.2]])
+
+
+def test_parallel_strokes_do_not_cross():
+    """Their direction and their places are exact, but for rounding off the plane."""
+    random = np.random.default_rng(0)
+    step = np.array([1 / 64, 1 / 128, 0])
+    start = random.integers(0, 1024, (100, 1, 3)) / 1024 * (1, 1, 0)
+    points = start + np.arange(11)[:, None] * step
+    points[..., 2] = random.normal(scale=1e-16, size=points.shape[:2])
+    directions = np.tile(normalize(step), (points[..., 0].size, 1))
+    assert not len(find_crossings(planar_strokes(points, directions, 0.1)).stroke)
+
+
+@pytest.mark.parametrize("columns", [3, 7])
+def test_gaps_at_crossings(columns):
+    """All strokes cross all others once; some do so at the edges of triangles."""
+    instance = instance_of(plane(columns, columns), 4)
+    strokes = trace_strokes(instance, 0.2)
+    crossings = find_crossings(strokes)
+    max_count = (strokes.family == 0).sum() * (strokes.family == 1).sum()
+    assert len(crossings.stroke) == max_count
+    gapped = with_crossing_gaps(strokes, 0.3)
+    assert not len(find_crossings(gapped).stroke)
+    removed_length = strokes.length.sum() - gapped.length.sum()
+    assert np.isclose(removed_length, len(crossings.stroke) * 0.3 * 0.2, rtol=0.1)
+    for family in (
+        0,
+        1,
+    ):  # strokes pass over and under in turn, so each family has half of the gaps
+        cut = strokes.length[strokes.family == family].sum()
+        cut -= gapped.length[gapped.family == family].sum()
+        assert np.isclose(cut, removed_length / 2, rtol=0.1)
+
+
+@pytest.mark.slow
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.01, 1.9), st.floats(0.01, 0.5))
+def test_cut_intervals_remove_their_length(low, size):
+    strokes = trace_strokes(instance_of(plane(3, 3), 2), 0.2)
+    remaining = cut_intervals(strokes, np.array([0]), np.array([low]), np.array([low + size]))
+    total = strokes.length[0]
+    assume(low + size < total - 1e-6 or low + size > total + 1e-6)
+    removed_length = min(low + size, total) - min(low, total)
+    assert np.isclose(strokes.length.sum() - remaining.length.sum(), removed_length, atol=1e-9)
 
 
 # --- visibility --------------------------------------------------------------------------------------
@@ -657,7 +702,10 @@ def test_command_line(tmp_path, capsys, monkeypatch):
     command = ["strokes", str(mesh), "--generate", "smoothest", "--spacing", "12", "-o", str(out)]
     contents = []
     for _ in range(2):
-        assert main([*command, "--size", "300x200", "--outline", "--light", "lamp"]) == 0
+        assert (
+            main([*command, "--size", "300x200", "--outline", "--gaps", "0.3", "--light", "lamp"])
+            == 0
+        )
         contents.append(out.read_bytes())
     assert contents[0] == contents[1]
     root = ElementTree.fromstring(contents[0])

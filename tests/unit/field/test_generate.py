@@ -240,10 +240,10 @@ def test_the_length_of_an_axis_does_not_count(length):
 @pytest.mark.parametrize("length", [1e-320, 1e-160, 1e-9])
 def test_smoothing_over_no_distance_changes_nothing(length):
     surface = torus()
-    settings = GeneratorSettings("curvature", smoothing_length=length)
+    settings = GeneratorSettings("curvature", reach=length)
     vectors = generate(surface, settings, 4).vectors
     np.testing.assert_array_equal(vectors, curvature_field(surface, 4).vectors)
-    guides = GeneratorSettings("guided", smoothing_length=length, vectors=vectors)
+    guides = GeneratorSettings("guided", reach=length, vectors=vectors)
     exact = GeneratorSettings("guided", vectors=vectors)
     expected = generate(surface, exact, 4).vectors
     np.testing.assert_array_equal(generate(surface, guides, 4).vectors, expected)
@@ -320,11 +320,11 @@ def test_curvatures_next_to_nothing():
     surface = build_surface(points, grid.corner_vertex, grid.face_start)
     assert np.isfinite(generate(surface, "curvature", 4).vectors).all()
     surface = build_surface(0 * points + 1, grid.corner_vertex, grid.face_start)
-    settings = GeneratorSettings("curvature", smoothing_length=0.3)
+    settings = GeneratorSettings("curvature", reach=0.3)
     assert not generate(surface, settings, 4).vectors.any()
 
 
 def test_flat_faces_have_no_curvature_at_any_reach():
     """Nothing extends into them, and that is no error."""
-    for settings in ("curvature", GeneratorSettings("curvature", smoothing_length=0.3)):
+    for settings in ("curvature", GeneratorSettings("curvature", reach=0.3)):
         assert not generate(cube(), settings, 4).vectors.any()

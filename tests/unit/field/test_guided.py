@@ -218,7 +218,7 @@ def test_curvature_spreads_into_flat_regions():
     flat = surface.face_center[:, 0] < -1
     plain = generate(surface, "curvature", 4)
     assert plain.magnitude[flat].max() < 1e-3
-    field = generate(surface, GeneratorSettings("curvature", smoothing_length=0.05), 4)
+    field = generate(surface, GeneratorSettings("curvature", reach=0.05), 4)
     np.testing.assert_allclose(field.magnitude, 1, atol=1e-6)
     assert np.abs(field.vectors[flat]).max(axis=1).min() > np.cos(np.radians(1))
 

@@ -48,9 +48,7 @@ def test_strokes_on_a_sphere_are_followed(degree):
     strokes = great_circles(5)
     field = generate(BALL, GeneratorSettings("guided", strokes=strokes), degree)
     assert max(stroke_error(BALL, field, stroke) for stroke in strokes) < 2
-    soft = generate(
-        BALL, GeneratorSettings("guided", strokes=strokes, smoothing_length=0.005), degree
-    )
+    soft = generate(BALL, GeneratorSettings("guided", strokes=strokes, reach=0.005), degree)
     assert max(stroke_error(BALL, soft, stroke) for stroke in strokes) < 2
 
 
@@ -71,7 +69,7 @@ def test_ten_strokes_on_the_bunny(shared_data, reach):
         normal = bunny.face_normal[bunny.triangle_face[triangle]]
         corner = bunny.vertices[bunny.triangle_vertex[triangle, 0]]
         strokes.append(line - dot(line - corner, normal)[:, None] * normal)
-    field = generate(bunny, GeneratorSettings("guided", strokes=strokes, smoothing_length=reach), 4)
+    field = generate(bunny, GeneratorSettings("guided", strokes=strokes, reach=reach), 4)
     errors = [stroke_error(bunny, field, stroke) for stroke in strokes]
     assert max(errors) < 2, errors
 

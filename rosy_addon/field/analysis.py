@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import row_blocks
+from .connectivity import build_edges
 from .directional_field import field_directions
 from .frames import coordinates, dot, normalize
 from .representation import (
@@ -20,7 +21,7 @@ from .representation import (
 )
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
-from .surface import Surface, build_edges
+from .surface import Surface
 
 #: Singularities match if they are nearer than this fraction of the longest side of the mesh.
 DEFAULT_REACH = 0.05

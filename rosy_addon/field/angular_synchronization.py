@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import report
+from .connectivity import sorted_with_order
 from .representation import unit_complex
-from .surface import sorted_with_order
 
 #: Label of the progress.
 LABEL = "spacing lines"

@@ -13,9 +13,10 @@ from ..core.progress import progress, report
 from .field_io import field_from_raw
 from .formats.polygons import RawField
 from .frames import dot
+from .polygon_arrays import mean_per_face
 from .representation import face_frames, from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
-from .surface import Surface, mean_per_face
+from .surface import Surface
 from .validate import (
     MAX_OUTLIER_FRACTION,
     TOLERANCE_DEG,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .frames import dot, normalize, tangent_frame
+from .polygon_arrays import mean_per_face
 from .representation import complex_bincount, unit_complex
-from .surface import Surface, mean_per_face
+from .surface import Surface
 
 #: Largest sine of the angle between a vector and the plane of its face before the motion. Steeper
 #: vectors are not tangent to the face and stay as they are.

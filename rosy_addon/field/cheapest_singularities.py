@@ -14,13 +14,14 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
+from .polygon_arrays import face_area_vectors
 from .prescribed import index_at_nodes
 from .representation import face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
 from .sparse_multigrid import CSRMatrix, from_edges
-from .surface import Surface, face_area_vectors
+from .surface import Surface
 from .turning_angles import least_angles, potential_solver
 
 #: Largest number of steps to neighboring vertices.

@@ -20,9 +20,11 @@ from functools import cached_property
 import numpy as np
 
 from ..core.progress import report
+from .connectivity import build_edges, connected_components
 from .frames import dot
+from .polygon_arrays import next_corners
 from .sparse_multigrid import CSRMatrix, from_edges
-from .surface import Surface, build_edges, connected_components, next_corners
+from .surface import Surface
 
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
 MAX_COTANGENT = 1e3

@@ -6,8 +6,9 @@ import numpy as np
 
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
+from .polygon_arrays import face_blocks, next_corners
 from .representation import complex_bincount, power, unit_complex
-from .surface import Surface, face_blocks, next_corners
+from .surface import Surface
 
 
 def corner_rotations(

@@ -13,8 +13,10 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .blocks import mask
+from .connectivity import Edges, build_edges, connected_components
 from .frames import angle_between, dot, normalize
-from .surface import Edges, Surface, build_edges, connected_components, face_area_vectors
+from .polygon_arrays import face_area_vectors
+from .surface import Surface
 
 #: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
 FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35

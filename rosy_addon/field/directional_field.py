@@ -26,10 +26,11 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
+from .connectivity import build_edges
 from .frames import coordinates
 from .representation import face_frames, matching_angles, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, build_edges
+from .surface import Surface
 from .symmetry import FieldSymmetry
 
 #: Directions within these tolerances count as a RoSy: the error of the angle between neighboring

@@ -18,10 +18,12 @@ import numpy as np
 from ..core.progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
+from .connectivity import build_edges, connected_components, connected_corners
 from .frames import dot
+from .polygon_arrays import next_corners
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
-from .surface import Surface, build_edges, connected_components, connected_corners, next_corners
+from .surface import Surface
 
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4

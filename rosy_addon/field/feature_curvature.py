@@ -8,11 +8,13 @@ import numpy as np
 
 from ..core.progress import progress
 from .connection import build_connection
+from .connectivity import Edges, build_edges, smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
+from .polygon_arrays import face_area_vectors
 from .representation import face_frames
-from .surface import Edges, Surface, build_edges, face_area_vectors, smooth_fans
+from .surface import Surface
 from .surface_averages import SurfaceAverages
 
 #: Length over which curvature is averaged, relative to `Surface.extent`.

@@ -15,6 +15,7 @@ from ..core.progress import progress, report
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .guided_rotation import guided_rotation
+from .polygon_arrays import face_area_vectors
 from .representation import (
     complex_bincount,
     face_frames,
@@ -23,7 +24,7 @@ from .representation import (
     unit_complex,
 )
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, face_area_vectors
+from .surface import Surface
 from .turning_angles import turning_angles
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from .blocks import by_rows
 from .frames import dot, normalize
+from .polygon_arrays import face_blocks, next_corners
 from .rosy_field import RosyField
-from .surface import Surface, face_blocks, next_corners
+from .surface import Surface
 
 
 def power(base: np.ndarray, degree: int) -> np.ndarray:

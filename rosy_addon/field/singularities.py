@@ -9,10 +9,12 @@ import numpy as np
 from ..core.errors import counted
 from ..core.progress import progress, report
 from .blocks import mask
+from .connectivity import build_edges
 from .frames import dot
+from .polygon_arrays import face_blocks, next_corners
 from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
-from .surface import Surface, build_edges, face_blocks, next_corners
+from .surface import Surface
 
 
 def euler_characteristic(surface: Surface) -> int:

@@ -7,10 +7,11 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
+from .connectivity import build_edges
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
-from .surface import Surface, build_edges
+from .surface import Surface
 
 #: Stands for no vertex: what is moved there leaves the surface over a border.
 OUTSIDE = -1

@@ -26,7 +26,8 @@ from ..core.progress import progress, report
 from .angular_synchronization import LABEL, PhaseGraph, phase_graph, synchronize
 from .blocks import mask, row_blocks
 from .connection import sums_in_umbrellas, umbrella_order
-from .surface import build_edges, next_corners
+from .connectivity import build_edges
+from .polygon_arrays import next_corners
 
 #: Bounds of the cotangent weights of edges. The lower one also connects obtuse triangles.
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0

@@ -20,9 +20,10 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
+from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
-from .surface import Surface, connected_components
+from .surface import Surface
 
 #: Residual norm relative to that of the right-hand side at which the solver stops.
 TOLERANCE = 1e-10

@@ -20,6 +20,7 @@ from .directional_field import (
     ratios_from_harmonics,
 )
 from .frames import coordinates, dot, normalize, tangent_frame
+from .polygon_arrays import mean_per_face
 from .representation import (
     face_frames,
     from_representation,
@@ -27,7 +28,7 @@ from .representation import (
     to_representation,
 )
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, mean_per_face
+from .surface import Surface
 
 #: Largest angle in degrees between a vector and the plane of its face or vertex. Larger angles mean
 #: that the field belongs to another mesh or another space. Rounding in text files causes about a

@@ -9,9 +9,10 @@ from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.frames import normalize, tangent_frame
+from ..field.polygon_arrays import mean_per_face
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
-from ..field.surface import Surface, mean_per_face
+from ..field.surface import Surface
 from ..field.validate import (
     apply_nonfinite_policy,
     as_float64,

@@ -8,6 +8,7 @@ from conftest import mainly
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
 from rosy_addon.field.connection import build_connection, laplacian
+from rosy_addon.field.connectivity import build_edges
 from rosy_addon.field.creases import filtered_normals, salient_edges
 from rosy_addon.field.feature_curvature import noise_sample
 from rosy_addon.field.frames import dot, normalize
@@ -15,7 +16,7 @@ from rosy_addon.field.generate import generate
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.surface import Surface, build_edges, build_surface
+from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.field.surface_averages import SurfaceAverages
 
 AXES = np.array([1.0, 0.8, 0.6])

@@ -24,7 +24,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
 from .connectivity import build_edges
 from .frames import coordinates
@@ -69,13 +68,10 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     --------
     rosy_addon.field.validate.validated_directions : Check directions from outside first.
     """
-    label = "reading directions"
-    report(0.0, label)
     x, y = face_frames(surface)
     w = by_rows(coordinates, directions, x, y)
     within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
-    with progress(0.3, 0.6):
-        first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=label)
+    first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
     if within_tolerance:
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
@@ -83,8 +79,7 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
             np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
         )
     field = RosyField(directions.shape[1], vectors, direction_ratios)
-    with progress(0.6, 1.0, label):
-        return detect_families(surface, field)
+    return detect_families(surface, field)
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -233,7 +228,7 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
         zero where the two eigenvalues are equal.
     """
     frames = face_frames(surface)
-    vectors, ratios = by_rows(_tensor_directions, tensors, *frames, label="reading directions")
+    vectors, ratios = by_rows(_tensor_directions, tensors, *frames)
     return RosyField(4, vectors, ratios, 2)
 
 
@@ -272,17 +267,13 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
         one when the two faces are unfolded into a plane. Members are counted counter-clockwise from
         the stored ones. The same holds for directions.
     """
-    label = "matching directions"
-    report(0.0, label)
     x, y = face_frames(surface)
     edges = build_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)
-    with progress(0.4, 0.7):
-        closest_angle = matching_angles(surface, x, y, z, field.degree, a, b, label)
-    with progress(0.7, 1.0):
-        stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b, label)
+    closest_angle = matching_angles(surface, x, y, z, field.degree, a, b)
+    stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b)
     matching = (
         np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
         % field.degree

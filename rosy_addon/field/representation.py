@@ -143,7 +143,6 @@ def matching_angles(
     degree: int,
     a: np.ndarray,
     b: np.ndarray,
-    label: str | None = None,
 ) -> np.ndarray:
     """The angle between matching members of the two faces at each interior edge.
 
@@ -161,8 +160,6 @@ def matching_angles(
         N of the representations.
     a, b : (I,) int ndarray
         The columns of `Edges.halfedges`: the corners of both faces where the edge starts.
-    label : str, optional
-        Of the progress.
 
     Returns
     -------
@@ -176,4 +173,4 @@ def matching_angles(
         unfolding = edge_unfolding(surface, x, y, a, b)
         return np.angle(target * (source * power(unfolding, degree)).conj()) / degree
 
-    return by_rows(angles, a, b, label=label)
+    return by_rows(angles, a, b)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import RosyError, counted
-from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
@@ -46,9 +45,6 @@ MAX_COMPONENT = 1e30
 
 #: Vectors whose components are all smaller count as zero, because products would underflow.
 MIN_COMPONENT = 1e-30
-
-#: Label of the progress of checking vectors.
-LABEL = "checking the field"
 
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
 #: rounding error of float32, which Blender stores, so such vectors survive a round trip through
@@ -101,8 +97,7 @@ def validated_field(
     domain = _checked_domain(surface, len(vectors), domain, source)
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
     normal = tangent_normals(surface, domain)
-    with progress(0.4, 0.6):
-        vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
+    vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
     if domain == "vertex":
         rest = surface.in_rest_shape()
         x, y = face_frames(rest)
@@ -168,28 +163,23 @@ def validated_directions(
         x, y = tangent_frame(normal[rows])
         return is_rosy(coordinates(usable_directions[rows], x, y))
 
-    report(0.1, LABEL)
     if all(map(are_rosys, row_blocks(count))):
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
-        with progress(0.3, 0.6):
-            field = validated_field(surface, vectors, degree, source, nonfinite, domain)
-        with progress(0.6, 1.0, LABEL):
-            return replace(
-                detect_families(surface.in_rest_shape(), field), source_directions=source_directions
-            )
+        field = validated_field(surface, vectors, degree, source, nonfinite, domain)
+        return replace(
+            detect_families(surface.in_rest_shape(), field), source_directions=source_directions
+        )
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
     flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    with progress(0.3, 0.5):
-        directions = project_to_tangent(
-            flat_directions, normals, TOLERANCE_DEG[domain], source, domain
-        ).reshape(count, degree, 3)
+    directions = project_to_tangent(
+        flat_directions, normals, TOLERANCE_DEG[domain], source, domain
+    ).reshape(count, degree, 3)
     surface = surface.in_rest_shape()
-    with progress(0.5, 1.0, LABEL):
-        if domain == "face":
-            field = field_from_directions(surface, directions)
-            return replace(field, source_directions=source_directions)
-        return detect_families(surface, _average_directions(surface, directions, normal))
+    if domain == "face":
+        field = field_from_directions(surface, directions)
+        return replace(field, source_directions=source_directions)
+    return detect_families(surface, _average_directions(surface, directions, normal))
 
 
 def _average_directions(surface: Surface, directions: np.ndarray, normal: np.ndarray) -> RosyField:
@@ -200,15 +190,13 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
     w = coordinates(directions, x, y)
-    with progress(0.0, 0.2):
-        first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
+    first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
     face_x, face_y = face_frames(surface)
     average = _vertex_averages(surface, normal, face_x)
     z = average(rho * np.exp(1j * degree * first_angle), degree)
     member = np.exp(1j * np.angle(z) / degree)
     coefficients = {}
     for j, values in ratio_harmonics(direction_ratios).items():
-        report(0.5, LABEL)
         mean = average(values * np.exp(-1j * j * first_angle), -j)
         coefficients[j] = mean * signed_power(member, j)
     vectors = from_representation(z, face_x, face_y, degree)
@@ -300,7 +288,7 @@ def project_to_tangent(
     RosyError
         If more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
     """
-    tangent, angle, is_zero = by_rows(_project, vectors, normal, label=LABEL)
+    tangent, angle, is_zero = by_rows(_project, vectors, normal)
     outlier = angle > tolerance_deg
     if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(~is_zero):
         worst = int(np.argmax(angle))

@@ -18,7 +18,6 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress, report
 from ..blocks import row_blocks
 from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame
@@ -35,7 +34,7 @@ from ..surface import Surface
 from ..validate import vertex_normals
 from .obj import read_obj
 from .polygons import RawField
-from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, format_rows, read_rows
+from .text_rows import ROWS_PER_BLOCK, format_blocks, format_rows, read_rows
 
 
 def read_fieldgen(path: Path) -> RawField:
@@ -53,14 +52,10 @@ def read_fieldgen(path: Path) -> RawField:
         line for each vertex.
     """
     data = read_bytes(path, reject_binary=True)
-    with progress(0.0, 0.5):
-        polygons = read_obj(path)
-    with progress(0.5, 0.7):
-        rows = read_rows(path, comment=None, data=data)
+    polygons = read_obj(path)
+    rows = read_rows(path, comment=None, data=data)
     degree, is_vertex_row = None, np.zeros(len(rows), dtype=bool)
     for row, words in enumerate(rows.words):
-        if row % ROWS_PER_BLOCK == 0:
-            report(0.7 + 0.1 * row / len(rows), LABEL)
         if not words[0].startswith(b"#"):
             continue
         words = words[words[0] == b"#" :]
@@ -74,8 +69,7 @@ def read_fieldgen(path: Path) -> RawField:
             is_vertex_row[row] = True
     if degree is None or not is_vertex_row.any():
         raise RosyError(f"{path}: has no field: there are no lines '# field i x y z'")
-    with progress(0.8, 1.0):
-        numbers = rows.select(is_vertex_row, slice(-4, None)).floats("part of a vector")
+    numbers = rows.select(is_vertex_row, slice(-4, None)).floats("part of a vector")
     numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)
@@ -95,7 +89,6 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
     It is zero where the mean is zero.
     """
-    report(0.0, "averaging the field at the vertices")
     count = len(surface.vertices)
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import counted
-from ...core.progress import progress, report
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, read_rows
+from .text_rows import ROWS_PER_BLOCK, TextRows, read_rows
 
 
 def read_obj(path: Path) -> Polygons:
@@ -28,27 +27,23 @@ def read_obj(path: Path) -> Polygons:
     RosyError
         If the file cannot be read, a line is malformed, or an index is out of range.
     """
-    with progress(0.0, 0.4):
-        rows = read_rows(path)
+    rows = read_rows(path)
     is_vertex, is_face = _is_kind(rows, b"v"), _is_kind(rows, b"f")
-    with progress(0.5, 0.6):
-        vertices = rows.select(is_vertex, slice(1, 4)).points("vertex")
+    vertices = rows.select(is_vertex, slice(1, 4)).points("vertex")
     corners = rows.select(is_face, slice(1, None))
     for row, words in enumerate(corners.words):
         if len(words) < 3:
             raise corners.error(
                 row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
             )
-    with progress(0.6, 0.9):
-        positions = _position_indices(corners)
-    with progress(0.9, 1.0):
-        corner_vertex = _resolved(
-            positions,
-            "vertex of a face",
-            np.cumsum(is_vertex)[is_face],
-            len(vertices),
-            "a face refers to vertex {}, but the vertices",
-        )
+    positions = _position_indices(corners)
+    corner_vertex = _resolved(
+        positions,
+        "vertex of a face",
+        np.cumsum(is_vertex)[is_face],
+        len(vertices),
+        "a face refers to vertex {}, but the vertices",
+    )
     return Polygons(vertices, corner_vertex, offsets_from_sizes(list(map(len, corners.words))))
 
 
@@ -91,7 +86,6 @@ def _position_indices(corners: TextRows) -> TextRows:
     """Reduce corners v, v/vt, v//vn and v/vt/vn to v, the index of the position."""
     rows: list[Sequence[bytes]] = []
     for start in range(0, len(corners), ROWS_PER_BLOCK):
-        report(start / len(corners), LABEL)
         words = corners.words[start : start + ROWS_PER_BLOCK]
         joined = b"\n".join(b" ".join(row) for row in words)
         if b"/" in joined:

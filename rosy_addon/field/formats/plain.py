@@ -15,7 +15,6 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress
 from ..blocks import row_blocks
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
@@ -43,8 +42,7 @@ def read_text(path: Path) -> RawField:
         If the file cannot be read, holds no numbers, or its rows differ in length.
     """
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
-    with progress(0.0, 0.4):
-        rows = read_rows(path, data=data)
+    rows = read_rows(path, data=data)
     if not len(rows):
         raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
@@ -54,8 +52,7 @@ def read_text(path: Path) -> RawField:
             raise rows.error(
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
-    with progress(0.4, 1.0):
-        values = rows.floats("part of a vector")
+    values = rows.floats("part of a vector")
     return _raw_field(values.reshape(-1, columns))
 
 

@@ -14,10 +14,9 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress, report
 from ..validate import as_float64
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, TextRows, abbreviate, read_rows
+from .text_rows import TextRows, abbreviate, read_rows
 
 _DTYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -124,7 +123,6 @@ def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
     byte_order, elements, offset = _header(path, data)
     if byte_order == "":
         return _text_elements(path, data, elements), elements
-    report(0.1, LABEL)
     return _binary_elements(path, data, offset, byte_order, elements), elements
 
 
@@ -180,8 +178,7 @@ def _check_unique(
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
     """The values of all elements of a text file."""
     # The header is included, so that line numbers are those of the file.
-    with progress(0.0, 0.5):
-        rows = read_rows(path, comment=None, data=data)
+    rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
     columns = {}
     for element in elements:
@@ -189,8 +186,7 @@ def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[st
         if len(element_rows) < element.count:
             raise _truncated(path, element, len(element_rows))
         first += element.count
-        with progress(0.5, 1.0):
-            columns[element.name] = _text_columns(element_rows, element)
+        columns[element.name] = _text_columns(element_rows, element)
     return columns
 
 

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import RosyError, counted
-from ...core.progress import progress
 from ..rosy_field import RosyField, check_degree
 from .polygons import RawField
 from .text_rows import TextRows, abbreviate, format_blocks, read_rows
@@ -28,11 +27,9 @@ def read_rosy(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    with progress(0.0, 0.4):
-        rows = read_rows(path, comment=None)
+    rows = read_rows(path, comment=None)
     count, degree = _read_header(rows, "count", "degree")
-    with progress(0.4, 1.0):
-        table = _vector_table(rows, 3, count)
+    table = _vector_table(rows, 3, count)
     return RawField(table.reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count)
 
 
@@ -44,12 +41,10 @@ def read_rawfield(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    with progress(0.0, 0.4):
-        rows = read_rows(path, comment=None)
+    rows = read_rows(path, comment=None)
     degree, count = _read_header(rows, "degree", "count")
     degree = _validated_degree(rows, 0, degree)
-    with progress(0.4, 1.0):
-        table = _vector_table(rows, 3 * degree, count)
+    table = _vector_table(rows, 3 * degree, count)
     return RawField(table.reshape(-1, degree, 3), degree, count)
 
 

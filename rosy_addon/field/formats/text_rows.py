@@ -11,14 +11,10 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import report
 from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
-
-#: Label of the progress of reading a file.
-LABEL = "reading the file"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +80,6 @@ class TextRows:
                 raise self.error(
                     row, f"{label} has {counted(len(words), 'coordinate')}, expected 3"
                 )
-        report(0.0, LABEL)
         coordinates = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers)
         points = coordinates.floats(label).reshape(-1, 3)
         finite = np.isfinite(points).all(axis=1)
@@ -104,7 +99,6 @@ class TextRows:
         values = np.empty(count, dtype=dtype)
         words = chain.from_iterable(self.words)
         for start in range(0, count, WORDS_PER_BLOCK):
-            report(start / count, LABEL)
             stop = min(start + WORDS_PER_BLOCK, count)
             try:
                 values[start:stop] = list(map(convert, islice(words, stop - start)))
@@ -141,7 +135,6 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
         If the file cannot be read or is not text.
     """
     data = read_bytes(path, reject_binary=True) if data is None else data
-    report(0.0, LABEL)
     # Also accept a lone CR, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
@@ -150,15 +143,11 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
-    for start in range(0, len(lines), ROWS_PER_BLOCK):
-        report(start / len(lines), LABEL)
-        block = lines[start : start + ROWS_PER_BLOCK]
-        if has_comments:
-            block = [line.partition(comment)[0] for line in block]
-        for number, line in enumerate(block, start + 1):
-            if line_words := tuple(line.split()):
-                words.append(line_words)
-                line_numbers.append(number)
+    for number, line in enumerate(lines, 1):
+        text = line.partition(comment)[0] if has_comments else line
+        if line_words := tuple(text.split()):
+            words.append(line_words)
+            line_numbers.append(number)
     return TextRows(path, words, line_numbers)
 
 

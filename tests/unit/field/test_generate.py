@@ -10,7 +10,7 @@ from shapes import cube, cylinder, from_quads, from_triangles, icosphere, plane,
 
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.convert import Conversion, convert
-from rosy_addon.field.corner_fans import average_over_fans, corner_angles, corner_rotations
+from rosy_addon.field.corner_fans import average_over_fans, corner_rotations
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.frames import dot, normalize, tangent_frame, transport, view_frame
 from rosy_addon.field.generate import (
@@ -22,7 +22,6 @@ from rosy_addon.field.representation import (
     face_frames,
     face_representation,
     from_representation,
-    power,
     to_representation,
 )
 from rosy_addon.field.rosy_field import RosyField
@@ -93,12 +92,6 @@ def test_all_members_have_one_representation(angle, rho, degree, k):
     assert again == pytest.approx(z, abs=1e-9)
 
 
-@given(st.integers(1, 40))
-def test_power(degree):
-    index = np.exp(0.7j) * np.ones(1)
-    assert power(index, degree) == pytest.approx(index**degree)
-
-
 def test_corner_rotations_match_transport():
     surface = torus(12, 8)
     x, y = face_frames(surface)
@@ -134,12 +127,6 @@ def test_sharp_edges_and_flat_faces_separate_fans():
     assert len(np.unique(build_surface(*arrays).corner_fan)) == 6
     assert len(np.unique(build_surface(*arrays, sharp_edges=[shared]).corner_fan)) == 8
     assert len(np.unique(build_surface(*arrays, flat_faces=[True, False]).corner_fan)) == 8
-
-
-def test_corner_angles_of_polygons():
-    surface = plane(3, 3)
-    assert np.allclose(corner_angles(surface), np.pi / 2)
-    assert corner_angles(icosphere(0)) == pytest.approx(np.pi / 3)
 
 
 @pytest.mark.parametrize("degree", range(1, 13))

@@ -228,26 +228,16 @@ def test_a_field_is_transferred_by_position_with_a_note(degree, tmp_path):
     assert np.abs(dot(again.vectors, triangles.face_normal)).max() < 1e-12
 
 
-def test_reordered_faces_are_transferred_from_a_given_mesh(tmp_path):
-    order = np.random.default_rng(1).permutation(BALL.face_count)
-    mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
-    field = axis_field(BALL, 4, (0.0, 0.0, 1.0))
-    write_field(tmp_path / "a.rosy", field, BALL)
-    write_off(tmp_path / "own.off", BALL)
-    again = read_field(tmp_path / "a.rosy", mixed, mesh=tmp_path / "own.off")
-    assert np.allclose(again.vectors, field.vectors[order], atol=1e-12)
-
-
-def test_free_directions_are_transferred(tmp_path):
+@pytest.mark.parametrize("degree", [3, 4])
+def test_reordered_faces_are_transferred_from_a_given_mesh(degree, tmp_path):
+    """Also directions that are not a RoSy, and to fewer faces."""
     order = np.random.default_rng(1).permutation(BALL.face_count)[:-2]
     mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
-    np.save(tmp_path / "a.npy", free_directions(3))
-    write_off(tmp_path / "a.off", BALL)
-    again = read_field(tmp_path / "a.npy", mixed)
-    original = read_field(tmp_path / "a.npy", BALL)
-    assert np.allclose(
-        field_directions(mixed, again), field_directions(BALL, original)[order], atol=1e-9
-    )
+    np.save(tmp_path / "a.npy", free_directions(degree))
+    write_off(tmp_path / "own.off", BALL)
+    again = read_field(tmp_path / "a.npy", mixed, mesh=tmp_path / "own.off")
+    expected = field_directions(BALL, read_field(tmp_path / "a.npy", BALL))[order]
+    assert np.allclose(field_directions(mixed, again), expected, atol=1e-9)
 
 
 def test_another_shape_is_refused(tmp_path, error_of):

@@ -182,7 +182,7 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
 
 
 def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
-    """(F,) mean angles between the directions of two fields, for the best of their N matchings."""
+    """Return (F,) mean angles between the directions of two fields, for the best of their N matchings."""
     frames = face_frames(surface)
     z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
@@ -224,7 +224,7 @@ def format_degrees(degrees: float) -> str:
 
 
 def _triangle_areas(surface: Surface) -> np.ndarray:
-    """(T,) float64 areas of the triangles, in square Blender units."""
+    """Return (T,) float64 areas of the triangles, in square Blender units."""
     corner = surface.vertices[surface.triangle_vertex]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return np.sqrt(dot(cross, cross)) / 2

@@ -106,7 +106,7 @@ def vectors_on_rest_shape(
 
 
 def _planar_corners(surface: Surface) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """The tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
+    """Return the tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
     x, y = tangent_frame(surface.face_normal)
     face = surface.corner_face
     points = surface.vertices[surface.corner_vertex]

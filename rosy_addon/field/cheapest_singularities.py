@@ -91,7 +91,7 @@ def cheapest_singularities(
 
 
 def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """(n,) parts of the given indices on each closed component, spread over its nodes by area."""
+    """Return (n,) parts of the given indices on each closed component, spread over its nodes by area."""
     corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
     node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
     component = graph.node_component
@@ -103,7 +103,7 @@ def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndar
 
 
 def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
-    """(n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
+    """Return (n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
     if not added.any():
         return added
     with progress(0.0, 0.2):
@@ -171,7 +171,7 @@ class _Neighbors:
 
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
-    """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
+    """Return the matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))
     ends = np.concatenate([source, target])

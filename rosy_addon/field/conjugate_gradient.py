@@ -94,7 +94,7 @@ def conjugate_gradient(
 
 
 def _largest_part(*vectors: np.ndarray | None) -> float:
-    """The largest absolute value of a real or an imaginary part."""
+    """Return the largest absolute value of a real or an imaginary part."""
     return max(
         float(np.abs(part).max(initial=0))
         for vector in vectors
@@ -104,11 +104,11 @@ def _largest_part(*vectors: np.ndarray | None) -> float:
 
 
 def _norm(vector: np.ndarray) -> float:
-    """The Euclidean norm."""
+    """Return the Euclidean norm."""
     return float(np.sqrt(_real_inner_product(vector, vector)))
 
 
 def _real_inner_product(a: np.ndarray, b: np.ndarray) -> float:
-    """The real part of the inner product a* b."""
+    """Return the real part of the inner product a* b."""
     product = np.sum(a.real * b.real)
     return float(product + np.sum(a.imag * b.imag) if np.iscomplexobj(a) else product)

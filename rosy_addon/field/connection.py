@@ -145,7 +145,7 @@ def build_connection(surface: Surface) -> Connection:
 
 
 def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMatrix:
-    """The matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
+    """Return the matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
 def _corner_geometry(
     vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
+    """Return (3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
     corner_angle, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
     area = np.empty(len(triangles))
     for first in range(0, len(triangles), BLOCK_TRIANGLES):

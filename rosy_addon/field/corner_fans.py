@@ -17,7 +17,7 @@ def corner_rotations(
     corner_face: np.ndarray,
     corner_normal: np.ndarray,
 ) -> np.ndarray:
-    """The rotation from the frame of each face to the frame of each of its corners.
+    """Return the rotation from the frame of each face to the frame of each of its corners.
 
     Transport is the minimal rotation from the face normal to the corner normal. A tangent vector
     with the complex coordinate w in the frame of the face has the coordinate ``w * rotation`` in
@@ -50,7 +50,7 @@ def corner_rotations(
 def average_over_fans(
     values: np.ndarray, weights: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
-    """The weighted mean of corner values over the fan of each corner.
+    """Return the weighted mean of corner values over the fan of each corner.
 
     The corners of a fan must have the same normal, and so the same frame.
 
@@ -75,7 +75,7 @@ def average_over_fans(
 
 
 def corner_angles(surface: Surface) -> np.ndarray:
-    """(C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
+    """Return (C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)

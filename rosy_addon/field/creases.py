@@ -165,7 +165,7 @@ def salient_edges(
 
 
 def _largest_of_others(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
-    """(I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
+    """Return (I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
     all_angles = np.zeros(len(edges.ends))
     all_angles[edges.interior] = angle
     corner_angle = all_angles[edges.corner_edge]
@@ -252,7 +252,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 
 
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:
-    """(I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
+    """Return (I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
     angle = np.zeros(sides.shape[1])
     a, b = sides
     is_large = sum(x[a] * x[b] for x in np.ascontiguousarray(normals.T)) < np.cos(least)
@@ -261,7 +261,7 @@ def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.nd
 
 
 def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
-    """(F,) bool: the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
+    """Return (F,) bool, the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
     is_near = mask(len(surface.vertices), ends)
     for _ in range(FILTER_RINGS):
         faces = np.logical_or.reduceat(is_near[surface.corner_vertex], surface.face_start[:-1])
@@ -270,7 +270,7 @@ def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
 
 
 def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether normals are not interpolated across edges, given as of `Edges.halfedges`."""
+    """Return (n,) bool, whether normals are not interpolated across edges, given as of `Edges.halfedges`."""
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T
     return (fan[a] != fan[following[b]]) | (fan[following[a]] != fan[b])

@@ -116,7 +116,7 @@ def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def is_rosy(w: np.ndarray) -> bool:
-    """Whether all rows of (n, N) directions are RoSys within the tolerances.
+    """Return whether all rows of (n, N) directions are RoSys within the tolerances.
 
     Rows that contain a zero are ignored.
     """
@@ -136,7 +136,7 @@ def is_rosy(w: np.ndarray) -> bool:
 
 
 def _relative_angles(w: np.ndarray) -> np.ndarray:
-    """(n, N) counter-clockwise angles from the first direction, radians from 0 to 2 pi."""
+    """Return (n, N) counter-clockwise angles from the first direction, radians from 0 to 2 pi."""
     angle = np.angle(w)
     relative = (angle - angle[:, :1]) % (2 * np.pi)
     relative[:, 0] = 0
@@ -189,7 +189,7 @@ def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
 
 
 def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
-    """The same harmonics as `field_harmonics`, from (n, N) `direction_ratios`."""
+    """Return the same harmonics as `field_harmonics`, from (n, N) `direction_ratios`."""
     degree = direction_ratios.shape[1]
     member_angles = 2 * np.pi * np.arange(degree) / degree
     coefficients = {}
@@ -201,7 +201,7 @@ def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
 
 
 def ratios_from_harmonics(coefficients: dict[int, np.ndarray], degree: int) -> np.ndarray:
-    """(n, N) `direction_ratios` from harmonics; the inverse of `ratio_harmonics`."""
+    """Return (n, N) `direction_ratios` from harmonics; the inverse of `ratio_harmonics`."""
     member = np.exp(2j * np.pi * np.arange(degree) / degree)
     return sum(values[:, None] * signed_power(member, j) for j, values in coefficients.items())
 
@@ -235,7 +235,7 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
 def _tensor_directions(
     tensors: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The stored members and the `direction_ratios` of `tensor_field`, in the frames x, y."""
+    """Return the stored members and the `direction_ratios` of `tensor_field`, in the frames x, y."""
     a = np.einsum("fi,fij,fj->f", x, tensors, x)
     b = np.einsum("fi,fij,fj->f", x, tensors, y)
     c = np.einsum("fi,fij,fj->f", y, tensors, y)

@@ -279,7 +279,7 @@ class TriangleGraph:
         return (direction - self._turns_in_faces(angle, to_center))[first]
 
     def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
-        """(T,) angles from the direction of a face to that of each of its triangles."""
+        """Return (T,) angles from the direction of a face to that of each of its triangles."""
         face, inner = self.triangle_face, slice(self.face_edge_count, None)
         step = np.zeros(len(face))
         step[self.graph.target[inner]] = angle[inner]
@@ -344,7 +344,7 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
 
 
 def _cotangents(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 3) cotangents of the angles, and (T,) areas, of triangles with (T, 3, 3) points.
+    """Return (T, 3) cotangents of the angles, and (T,) areas, of triangles with (T, 3, 3) points.
 
     Areas are enlarged to `MIN_AREA`. That scales the cotangents of a triangle, so that their matrix stays
     positive semidefinite.

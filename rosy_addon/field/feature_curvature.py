@@ -152,7 +152,7 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
 
 
 def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
+    """Return (V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
     tail, head = ends.T
     degree = np.maximum(np.bincount(ends.ravel(), minlength=len(points)), 1)
 

@@ -198,7 +198,7 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
 def _source_surface(
     path: Path, raw: RawField, surface: Surface, mesh: str | os.PathLike[str] | None
 ) -> Surface | None:
-    """The surface that the rows of a file refer to, if it is not `surface`; None if it is."""
+    """Return the surface that the rows of a file refer to, if it is not `surface`; None if it is."""
     if mesh is not None:
         return read_mesh(mesh)
     count = len(raw.values)
@@ -291,7 +291,7 @@ def _check_storable(path: Path, field: RosyField) -> None:
 
 
 def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes]:
-    """The contents of a field file, as blocks that are formatted one by one."""
+    """Return the contents of a field file, as blocks that are formatted one by one."""
     if suffix == ".rosy":
         text = rosy_text(field)
     elif suffix == ".obj":

@@ -102,7 +102,7 @@ def guided_rotation(
 
 
 def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
-    """The Laplacian of the faces, with the penalty on its diagonal."""
+    """Return the Laplacian of the faces, with the penalty on its diagonal."""
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
@@ -117,7 +117,7 @@ def _initial_angle(
     offset: np.ndarray,
     penalty: np.ndarray,
 ) -> np.ndarray:
-    """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
+    """Return (F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
     unit = unit_complex(offset)
     with progress(0.0, 0.3):
         mean = _solve(matrix, penalty * unit, levels)

@@ -198,7 +198,7 @@ class GuidedSystem:
         )
 
     def face_representations_at(self, z: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """(m,) complex128 means of (n,) representations at the nodes, on (m,) faces."""
+        """Return (m,) complex128 means of (n,) representations at the nodes, on (m,) faces."""
         corner = self._corners_of_faces(face)
         value = z[self.averages.connection.corner_node[corner]] * self.averages.corner_area[corner]
         value *= np.exp(1j * self.degree * self.averages.frame_angle[corner])
@@ -206,7 +206,7 @@ class GuidedSystem:
         return complex_bincount(corner_face, value, self.surface.face_count)[face]
 
     def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """(m,) complex128 means of (F,) representations around each of (m,) faces."""
+        """Return (m,) complex128 means of (F,) representations around each of (m,) faces."""
         averages = self.averages
         corner = self.corners_of_nodes(self.nodes_of_faces(face))
         total = averages.node_sums(values, self.degree, corner)
@@ -217,17 +217,17 @@ class GuidedSystem:
         return self.face_representations_at(mean, face) / np.maximum(face_area, 1e-300)
 
     def _corners_of_faces(self, face: np.ndarray) -> np.ndarray:
-        """(k,) intp: the corners of the triangles of (m,) faces, in ascending order."""
+        """Return (k,) intp, the corners of the triangles of (m,) faces, in ascending order."""
         return np.flatnonzero(mask(self.surface.face_count, face)[self.averages.corner_face])
 
     def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
-        """(k,) intp: the nodes of (m,) faces, in ascending order."""
+        """Return (k,) intp, the nodes of (m,) faces, in ascending order."""
         connection = self.averages.connection
         node = connection.corner_node[self._corners_of_faces(face)]
         return np.flatnonzero(mask(connection.node_count, node))
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
-        """(k,) intp: the corners of triangles at (m,) nodes, in ascending order."""
+        """Return (k,) intp, the corners of triangles at (m,) nodes, in ascending order."""
         corner_node = self.averages.connection.corner_node
         return np.flatnonzero(mask(len(self.laplacian), node)[corner_node])
 

@@ -153,7 +153,7 @@ def _turning(
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The results of `turning_angles` that give vertices their indices, where nodes have (n,) defects."""
+    """Return the results of `turning_angles` that give vertices their indices, where nodes have (n,) defects."""
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
@@ -173,7 +173,7 @@ def _bent(
     target: np.ndarray,
     reach: float,
 ) -> np.ndarray:
-    """(F,) the representation z, turned to a target where there is one, with the same singularities."""
+    """Return (F,) the representation z, turned to a target where there is one, with the same singularities."""
     area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     penalty = np.linalg.norm(area, axis=1) / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
@@ -184,7 +184,7 @@ def _bent(
 def index_at_nodes(
     surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
 ) -> np.ndarray:
-    """(n,) int64 indices of the vertex nodes. That of a vertex is at its first node."""
+    """Return (n,) int64 indices of the vertex nodes. That of a vertex is at its first node."""
     vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
@@ -260,6 +260,6 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
-    """(F,) factors that turn the representation z to a target as a whole, on each connected component."""
+    """Return (F,) factors that turn the representation z to a target as a whole, on each connected component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
     return unit_complex(total, otherwise=1)[component]

@@ -46,7 +46,7 @@ def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
 
 
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
-    """(count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
+    """Return (count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
     real = np.bincount(index, weights.real, count)
     return real + 1j * np.bincount(index, weights.imag, count)
 
@@ -90,7 +90,7 @@ def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
 
 
 def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """The tangent frame x, y of each face.
+    """Return the tangent frame x, y of each face.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
-    """(F,) complex128 representations z of a field in `face_frames`."""
+    """Return (F,) complex128 representations z of a field in `face_frames`."""
     x, y = face_frames(surface)
     return to_representation(field.vectors, x, y, field.degree)
 
@@ -144,7 +144,7 @@ def matching_angles(
     a: np.ndarray,
     b: np.ndarray,
 ) -> np.ndarray:
-    """The angle between matching members of the two faces at each interior edge.
+    """Return the angle between matching members of the two faces at each interior edge.
 
     The faces are unfolded into one plane. A member of the first face matches the nearest member of
     the second face.

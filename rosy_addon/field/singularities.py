@@ -18,7 +18,7 @@ from .surface import Surface
 
 
 def euler_characteristic(surface: Surface) -> int:
-    """The Euler characteristic V - E + F: 2 for a sphere, 0 for a torus.
+    """Return the Euler characteristic V - E + F: 2 for a sphere, 0 for a torus.
 
     Vertices without a face are not counted.
     """
@@ -129,7 +129,7 @@ def first_pairs(pairs: np.ndarray) -> np.ndarray:
 
 
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
+    """Return (C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)

@@ -131,7 +131,7 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 
 
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(P,) bool: which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
+    """Return (P,) bool, which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
     while not is_near[pairs].any():

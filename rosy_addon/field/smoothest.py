@@ -163,11 +163,11 @@ def _lobpcg(
     tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
 
     def sums(values: np.ndarray) -> np.ndarray:
-        """(components,) sums of (n,) values over each component."""
+        """Return (components,) sums of (n,) values over each component."""
         return _component_sums(component, values, component_count)
 
     def gram_matrices(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-        """(components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
+        """Return (components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
         gram = np.empty((component_count, len(a), len(b)), dtype=np.complex128)
         for i, conjugate in enumerate(a):
             conjugate = conjugate.conj()
@@ -181,7 +181,7 @@ def _lobpcg(
         return values[component] if component_count > 1 else values
 
     def mass_norms(vector: np.ndarray) -> np.ndarray:
-        """(components,) mass norms of a vector."""
+        """Return (components,) mass norms of a vector."""
         return np.sqrt(sums(mass * (vector.real**2 + vector.imag**2)).real)
 
     def normalized(pair: np.ndarray) -> np.ndarray:
@@ -191,7 +191,7 @@ def _lobpcg(
         return pair
 
     def combine(pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
-        """The linear combination of pairs with (components, k) coefficients."""
+        """Return the linear combination of pairs with (components, k) coefficients."""
         total = pairs[0] * broadcast(coefficients[:, 0])
         for index, pair in enumerate(pairs[1:], 1):
             total += pair * broadcast(coefficients[:, index])
@@ -258,7 +258,7 @@ def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _component_sums(component: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) complex128 sums of (n,) values over each component."""
+    """Return (count,) complex128 sums of (n,) values over each component."""
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
     return complex_bincount(component, values, count)

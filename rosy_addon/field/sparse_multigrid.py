@@ -102,7 +102,7 @@ class CSRMatrix:
         return entries
 
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
-        """(k,) intp: the entries of (m,) rows, row by row."""
+        """Return (k,) intp, the entries of (m,) rows, row by row."""
         return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
@@ -171,7 +171,7 @@ def from_edges(
 
 
 def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
-    """The matrix product a b."""
+    """Return the matrix product a b."""
     return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
 
 
@@ -225,7 +225,7 @@ def _assemble_by_rows(
 
 
 def _sum_duplicates(key: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The distinct keys in ascending order, and the sum of the values of each."""
+    """Return the distinct keys in ascending order, and the sum of the values of each."""
     order = np.argsort(key, kind="stable")
     key = key.take(order)
     first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
@@ -350,20 +350,20 @@ def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
 
 
 def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
-    """(n,) weights of a Jacobi step that damps the upper part of the spectrum."""
+    """Return (n,) weights of a Jacobi step that damps the upper part of the spectrum."""
     diagonal = _positive_diagonal(matrix)
     scaled_row_sum = np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1]) / diagonal
     return 4 / (3 * scaled_row_sum.max() * diagonal)
 
 
 def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
-    """(n,) diagonal without zeros: the eigenvalue of a component of tiny area is lost in rounding."""
+    """Return (n,) diagonal without zeros: the eigenvalue of a component of tiny area is lost in rounding."""
     diagonal = matrix.diagonal
     return np.maximum(diagonal, SINGULAR_SHIFT * diagonal.max())
 
 
 def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
-    """The inverse of a sparse matrix as a dense array.
+    """Return the inverse of a sparse matrix as a dense array.
 
     If the matrix is singular, its diagonal is enlarged a little. The inverse is a preconditioner, so
     that changes the rate of convergence, not the solution.
@@ -384,7 +384,7 @@ def _smoothed_prolongation(
     count: int,
     phase: np.ndarray,
 ) -> CSRMatrix:
-    """The prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
+    """Return the prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
     unknowns = np.arange(len(matrix))
 
     def entries(block: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -118,7 +118,7 @@ def _least_angles_near(
     angle: np.ndarray,
     changed: np.ndarray,
 ) -> np.ndarray | None:
-    """(I,) angles of least squares near changed edges, where the other angles stay.
+    """Return (I,) angles of least squares near changed edges, where the other angles stay.
 
     The result is None if the angles around loops would change, because the neighborhoods of the edges surround
     a part of the surface.
@@ -152,7 +152,7 @@ def _least_angles_near(
 
 
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
-    """(I,) factors by which edges should resist angles more that are added to those present.
+    """Return (I,) factors by which edges should resist angles more that are added to those present.
 
     They are 1 where the sum is clearly below the limit.
     """
@@ -167,7 +167,7 @@ def least_angles(
     loops: list[tuple[np.ndarray, np.ndarray]],
     present: np.ndarray | float,
 ) -> np.ndarray:
-    """(I,) angles of least squares, divided by the conductances; see `turning_angles`."""
+    """Return (I,) angles of least squares, divided by the conductances; see `turning_angles`."""
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
     share = 0.5 / (len(loops) + 1)
@@ -200,7 +200,7 @@ def least_angles(
 def potential_solver(
     graph: FaceGraph, tolerance: float = TOLERANCE
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A function that computes the (n,) potential with (n,) sums around the interior nodes."""
+    """Return a function that computes the (n,) potential with (n,) sums around the interior nodes."""
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):
@@ -221,7 +221,7 @@ def potential_solver(
 
 
 def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
-    """The Laplacian of potentials at interior nodes, which are 0 at the others.
+    """Return the Laplacian of potentials at interior nodes, which are 0 at the others.
 
     On closed components, the first node is tied to 0 as well; the sums of a solvable equation do not change
     that node.
@@ -240,7 +240,7 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
 
 
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:
-    """(m,) coefficients c of least energy for which matrix @ c equals the sums up to multiples of a turn.
+    """Return (m,) coefficients c of least energy for which matrix @ c equals the sums up to multiples of a turn.
 
     The energy is c @ matrix @ c. The nearest multiples are found by rounding, then one by one and in
     pairs as long as that reduces the energy. This ends: the inverse is made positive definite, so that only

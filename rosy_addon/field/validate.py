@@ -108,7 +108,7 @@ def validated_field(
 
 
 def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
-    """The domain of a number of vectors. Raise an error if they are too many or too few for it."""
+    """Return the domain of a number of vectors. Raise an error if they are too many or too few for it."""
     domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
     if count != {"face": faces, "vertex": vertices}.get(domain):
@@ -206,7 +206,7 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
 def _vertex_averages(
     surface: Surface, normal: np.ndarray, face_x: np.ndarray
 ) -> Callable[[np.ndarray, int], np.ndarray]:
-    """A function that averages (V,) complex numbers of an order N onto the faces.
+    """Return a function that averages (V,) complex numbers of an order N onto the faces.
 
     They turn by exp(i N t) if a frame turns by -t. (V, 3) `normal` are the vertex normals, (F, 3) `face_x`
     the x axes of the frames of the faces.
@@ -222,7 +222,7 @@ def _vertex_averages(
 
 
 def infer_domain(surface: Surface, count: int) -> str | None:
-    """The domain, "face" or "vertex", with `count` elements; None for neither.
+    """Return the domain, "face" or "vertex", with `count` elements; None for neither.
 
     Faces take precedence.
     """
@@ -232,7 +232,7 @@ def infer_domain(surface: Surface, count: int) -> str | None:
 
 
 def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
-    """The normals of the tangent planes of faces or vertices, in the rest shape.
+    """Return the normals of the tangent planes of faces or vertices, in the rest shape.
 
     Returns
     -------

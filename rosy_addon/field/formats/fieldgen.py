@@ -111,7 +111,7 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
 
 
 def _face_lines(surface: Surface, faces: slice) -> str:
-    """Lines `f v//v ...` of a block of faces."""
+    """Return lines `f v//v ...` of a block of faces."""
     starts = surface.face_start[faces.start : faces.stop + 1]
     vertices = surface.corner_vertex[starts[0] : starts[-1]] + 1
     corners = [f"{v}//{v}" for v in vertices.tolist()]
@@ -120,6 +120,6 @@ def _face_lines(surface: Surface, faces: slice) -> str:
 
 
 def _field_lines(member: np.ndarray, rows: slice) -> str:
-    """Lines `# field i x y z` of a block of vertices."""
+    """Return lines `# field i x y z` of a block of vertices."""
     lines = enumerate(format_rows(member[rows]), rows.start + 1)
     return "".join([f"# field {number} {line}\n" for number, line in lines])

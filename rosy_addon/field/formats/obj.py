@@ -78,7 +78,7 @@ def _resolved(
 
 
 def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
-    """(rows,) bool: whether the first word of each row is that of a kind."""
+    """Return (rows,) bool, whether the first word of each row is that of a kind."""
     return np.array([words[0] == kind for words in rows.words], dtype=bool)
 
 

@@ -47,7 +47,7 @@ def read_off(path: Path) -> Polygons:
 
 
 def _after_keyword(rows: TextRows) -> TextRows:
-    """The rows from the counts on. The keyword is optional; the counts may share its line."""
+    """Return the rows from the counts on. The keyword is optional; the counts may share its line."""
     if not len(rows) or rows.words[0][0].isdigit():
         return rows
     keyword, *rest = rows.words[0]

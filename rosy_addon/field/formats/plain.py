@@ -100,7 +100,7 @@ def directions_text(directions: np.ndarray) -> Iterator[str]:
 
 
 def npy_blocks(directions: np.ndarray) -> Iterator[bytes]:
-    """The contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N), in blocks."""
+    """Return the contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N), in blocks."""
     rows = np.ascontiguousarray(directions.reshape(len(directions), -1))
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(rows))

@@ -60,7 +60,7 @@ def rawfield_text(directions: np.ndarray) -> Iterator[str]:
 
 
 def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
-    """The first two integers of the file, on one line or on two; `names` are for messages."""
+    """Return the first two integers of the file, on one line or on two; `names` are for messages."""
     words = [word for line in rows.words[:2] for word in line][:2]
     values = []
     for index, name in enumerate(names):
@@ -84,7 +84,7 @@ def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
 
 
 def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
-    """(n, columns) float64 numbers after the header; line breaks have no meaning.
+    """Return (n, columns) float64 numbers after the header; line breaks have no meaning.
 
     `count` is the number of rows that the header declares, for the message.
     """

@@ -71,7 +71,7 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
-    """(3 T, 3) float32 corners of the triangles of a binary file."""
+    """Return (3 T, 3) float32 corners of the triangles of a binary file."""
     available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
     if len(data) < _HEADER_BYTES:
         raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
@@ -83,7 +83,7 @@ def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
 
 
 def _text_points(path: Path, data: bytes) -> np.ndarray:
-    """(3 T, 3) float64 corners of the triangles of a text file."""
+    """Return (3 T, 3) float64 corners of the triangles of a text file."""
     rows = read_rows(path, comment=None, data=data)
     is_corner = np.array([words[0].lower() == b"vertex" for words in rows.words], dtype=bool)
     corners = rows.select(is_corner, slice(1, None))

@@ -41,7 +41,7 @@ class TextRows:
         return TextRows(self.path, self.words[rows], self.line_numbers[rows])
 
     def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
-        """Some of the rows, given as (rows,) bool, cut to some of their words."""
+        """Return some of the rows, given as (rows,) bool, cut to some of their words."""
         rows = np.flatnonzero(is_selected).tolist()
         return TextRows(
             self.path,
@@ -50,7 +50,7 @@ class TextRows:
         )
 
     def error(self, row: int, message: str) -> RosyError:
-        """The error to raise for a row: names the file and, if the row exists, its line."""
+        """Return the error to raise for a row: names the file and, if the row exists, its line."""
         if row < len(self.line_numbers):
             return RosyError(f"{self.path}:{self.line_numbers[row]}: {message}")
         return RosyError(f"{self.path}: {message}")
@@ -89,7 +89,7 @@ class TextRows:
         return points
 
     def row_of_word(self, word: int) -> int:
-        """The row that holds a word, which is counted from 0 over all rows."""
+        """Return the row that holds a word, which is counted from 0 over all rows."""
         ends = list(accumulate(map(len, self.words)))
         return int(np.searchsorted(ends, word, side="right"))
 
@@ -107,7 +107,7 @@ class TextRows:
         return values
 
     def _parse_error(self, convert: Callable, expected: str, first_row: int) -> RosyError:
-        """The error for the first word that cannot be converted, which is not above `first_row`."""
+        """Return the error for the first word that cannot be converted, which is not above `first_row`."""
         for row, words in enumerate(self.words[first_row:], first_row):
             for word in words:
                 try:

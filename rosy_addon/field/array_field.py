@@ -186,7 +186,7 @@ def array_field(
     12 ...   3 N numbers: all N directions
     =======  ====================================================================================
 
-    Vectors that are tangent to the surface are treated as those of a field file, see
+    Vectors that are tangent to the surface are treated like vectors of a field file; see
     `field.validate.validated_field`. Other vectors, such as velocities at the boundary of a volume,
     are replaced by their tangential components. Those at points are projected to each face at the
     point, and then averaged over the corners of the face as RoSys. Tensors are restricted to the
@@ -271,7 +271,7 @@ def _raw_field(array: FieldArray, source: str) -> RawField:
 def _tangential_on_faces(
     surface: Surface, vectors: np.ndarray, domain: str, degree: int
 ) -> np.ndarray | None:
-    """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
+    """Return the (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
     normal = tangent_normals(surface, domain)
     length = np.sqrt(dot(vectors, vectors))
     is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length

@@ -119,9 +119,9 @@ def bisect(
 
 
 class _Leaves:
-    """The leaves of a growing `BisectionTree`. The attributes are those of the tree.
+    """The leaves of a growing `BisectionTree`, with the arrays of the tree.
 
-    A node of the tree is a leaf until it is split. `node` is (L,) int32, the node of each leaf.
+    A node is a leaf until it is split. `node` is (L,) int32, the node of each leaf.
     """
 
     def __init__(self, vertices: np.ndarray, triangle_vertex: np.ndarray) -> None:

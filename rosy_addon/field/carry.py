@@ -86,7 +86,7 @@ def vectors_on_rest_shape(
     Returns
     -------
     (F, 3) float64 ndarray
-        Of the same lengths. Zero on faces without area in one of the shapes.
+        The lengths stay. Vectors are zero on faces without area in one of the shapes.
 
     See Also
     --------

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.progress import progress, report
 from .sparse_multigrid import CSRMatrix, hierarchy, w_cycle
 
-#: Residual norm relative to that of the right-hand side at which the iteration stops, by default.
+#: Residual norm at which the iteration stops by default, relative to the norm of the right-hand side.
 RELATIVE_TOLERANCE = 1e-9
 MAX_ITERATIONS = 400
 #: The least residual norm relative to the first one.
@@ -35,13 +35,13 @@ def conjugate_gradient(
         (n, n), Hermitian and positive definite.
     rhs : (n,) complex or float ndarray
     tolerance : float
-        Residual norm relative to that of `rhs` at which the iteration stops, unless rounding errors stop it
-        before.
+        Residual norm at which the iteration stops, relative to the norm of `rhs`. Rounding errors may stop
+        it before.
     precondition : callable, optional
         Applies an approximate inverse of the matrix, Hermitian and positive definite, to a vector. A W-cycle
         of multigrid by default.
     label : str
-        Of the progress.
+        Label of the progress.
     start : (n,) complex or float ndarray, optional
         First approximation; 0 by default.
     is_fixed : (n,) bool ndarray, optional

@@ -35,7 +35,7 @@ def corner_rotations(
     Returns
     -------
     (C,) complex ndarray
-        Of modulus 1; 0 for the corners of faces without a frame.
+        Numbers of modulus 1; 0 for the corners of faces without a frame.
     """
 
     def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ def average_over_fans(
     values : (C,) complex ndarray
     weights : (C,) float ndarray
     corner_fan : (C,) int ndarray
-        As in `Surface`.
+        `Surface.corner_fan`.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def smooth_face_values(
     z : (F,) complex ndarray
         Representations in the face frames that `rotation` was computed from.
     rotation : (C,) complex ndarray
-        From `corner_rotations`.
+        Result of `corner_rotations`.
     degree : int
         N of the representations.
     weights : (C,) float ndarray

@@ -189,7 +189,7 @@ def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
 
 
 def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
-    """Return the same harmonics as `field_harmonics`, from (n, N) `direction_ratios`."""
+    """Return the harmonics of (n, N) `direction_ratios`, as `field_harmonics` does for a field."""
     degree = direction_ratios.shape[1]
     member_angles = 2 * np.pi * np.arange(degree) / degree
     coefficients = {}
@@ -207,7 +207,7 @@ def ratios_from_harmonics(coefficients: dict[int, np.ndarray], degree: int) -> n
 
 
 def field_symmetry(field: RosyField) -> FieldSymmetry:
-    """The `FieldSymmetry` of a field: its degree and the orders of its harmonics."""
+    """Return the `FieldSymmetry` of a field: its degree and the orders of its harmonics."""
     return FieldSymmetry(field.degree, tuple(field_harmonics(field)))
 
 
@@ -223,7 +223,7 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
     Returns
     -------
     RosyField
-        The stored member lies along the major eigenvector, that of the greater signed eigenvalue.
+        The stored member lies along the major eigenvector, which has the greater signed eigenvalue.
         The directions have the absolute eigenvalues as lengths. `family_count` is 2. The field is
         zero where the two eigenvalues are equal.
     """

@@ -92,8 +92,8 @@ def load_field(
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     mesh : path-like, optional
-        The mesh file that the rows refer to, if its faces differ from those of `surface`, for
-        example because one of them was triangulated or reordered. The field is then transferred by
+        The mesh file that the rows refer to, if its faces differ from the faces of `surface`, for
+        example because one of the meshes was triangulated or reordered. The field is then transferred by
         position. If not given, and the counts differ, a mesh file of the same name in the same
         folder is used.
 
@@ -149,7 +149,7 @@ def field_from_raw(
     raw : RawField
     surface : Surface
     degree : int or None
-        Of rows with one member that state no degree; `DEFAULT_DEGREE` if None.
+        Degree of rows with one member that state none; `DEFAULT_DEGREE` if None.
     source : str
         Name of the file, for messages.
     nonfinite : {"error", "zero"}
@@ -157,7 +157,7 @@ def field_from_raw(
     Raises
     ------
     RosyError
-        As of `load_field`.
+        If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
     _check_count(raw, surface, source)
     values = raw.values
@@ -256,7 +256,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     Raises
     ------
     RosyError
-        As `write_field`, but nothing is written.
+        If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
     path = Path(path)
     _check_storable(path, field)

@@ -64,7 +64,7 @@ def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np
 
 
 def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-    """`dot` of vectors given as three component arrays; faster, because each is contiguous."""
+    """Return the `dot` of vectors given as three component arrays: faster, because each is contiguous."""
     product = a[0] * b[0]
     product += a[1] * b[1]
     product += a[2] * b[2]
@@ -74,7 +74,7 @@ def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarr
 def transport_components(
     vectors: Sequence[np.ndarray], source: Sequence[np.ndarray], target: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """`transport` of vectors given as three component arrays."""
+    """Return the `transport` of vectors given as three component arrays."""
     factor = dot_components(vectors, target)
     factor /= np.maximum(1 + dot_components(source, target), np.finfo(factor.dtype).eps)
     return [v - factor * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
@@ -95,7 +95,7 @@ def transform_components(
     Returns
     -------
     (m, n) ndarray
-        In the dtype of the vectors.
+        Array of the same dtype as the vectors.
 
     Notes
     -----

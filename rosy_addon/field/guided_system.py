@@ -32,10 +32,10 @@ from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
-#: Residual norm, relative to that of the right-hand side, at which a solution near some nodes stops.
+#: Residual norm at which a solution near some nodes stops, relative to the norm of the right-hand side.
 NEAR_TOLERANCE = 1e-4
 
-#: Guides of at least this firmness are followed exactly; less than 1, for rounding errors of stored ones.
+#: Guides of at least this firmness are followed exactly. It is less than 1 because stored guides are rounded.
 EXACT_FIRMNESS = 1 - 1e-4
 
 #: Added to the diagonal of the Laplacian, relative to it, so that the system is regular on connected
@@ -67,17 +67,17 @@ class NodeGuides:
 
 @dataclass(frozen=True, eq=False)
 class GuidedSystem:
-    """What the guides of a surface do not change.
+    """The linear system of the guided fields of a surface, without the guides.
 
     Attributes
     ----------
     surface : Surface
     degree : int
     averages : SurfaceAverages
-        With `face_frames` of the surface.
+        Averages in `face_frames` of the surface.
     laplacian : (n, n) CSRMatrix
     levels : list of Level
-        Of `laplacian`. Empty until a first solution.
+        Multigrid levels of `laplacian`; empty until a first solution.
     """
 
     surface: Surface
@@ -242,7 +242,7 @@ class GuidedSystem:
         Returns
         -------
         (k,) intp ndarray
-            In ascending order.
+            Nodes in ascending order.
         """
         is_near = mask(len(self.laplacian), node)
         total, ring = len(node), node
@@ -265,7 +265,7 @@ def firmness_weights(
     Parameters
     ----------
     firmness : (F,) ndarray
-        From 0 to 1.
+        Firmness of the guide of each face, from 0 to 1.
     edge_length : float
         Mean length of the edges.
     reach : float
@@ -302,7 +302,9 @@ def guided_field(
     hard: np.ndarray | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
 ) -> RosyField:
-    """Compute the smooth field that follows guides, on components without a guide the smoothest field.
+    """Compute the smooth field that follows guides.
+
+    Connected components without a guide get the smoothest field.
 
     Parameters
     ----------
@@ -322,7 +324,7 @@ def guided_field(
     Returns
     -------
     RosyField
-        Of magnitude 1; zero on faces without area.
+        A field of magnitude 1; zero on faces without area.
 
     Raises
     ------

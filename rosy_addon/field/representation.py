@@ -17,7 +17,7 @@ from .surface import Surface
 
 
 def power(base: np.ndarray, degree: int) -> np.ndarray:
-    """`base` ** `degree` by repeated squaring, which is fast for arrays; `degree` is at least 1."""
+    """Return `base` ** `degree` by repeated squaring, which is fast for arrays; `degree` is at least 1."""
     result = None
     while True:
         if degree & 1:
@@ -29,9 +29,9 @@ def power(base: np.ndarray, degree: int) -> np.ndarray:
 
 
 def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
-    """`base` ** `exponent` for numbers of modulus 1 or 0 and any integer exponent.
+    """Return `base` ** `exponent` for numbers of modulus 1 or 0 and any integer exponent.
 
-    Negative powers are conjugates of the positive ones, so those of 0 are 0.
+    Negative powers are conjugates of positive ones, so negative powers of 0 are 0.
     """
     if exponent == 0:
         return 1
@@ -125,7 +125,7 @@ def edge_unfolding(
     """Return (I,) complex128 factors of modulus 1, from the frame of the first face at each edge to the second.
 
     A direction in the first face, as a complex number, times the factor is the same direction in the second
-    one if the faces are unfolded into one plane. The parameters are those of `matching_angles`.
+    one if the faces are unfolded into one plane. The parameters are the same as in `matching_angles`.
     """
     source_face, target_face = surface.corner_face[a], surface.corner_face[b]
     edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]

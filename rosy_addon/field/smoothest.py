@@ -37,7 +37,7 @@ SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the field of least Dirichlet energy among those of equal L2 norm, made unit.
+    """Compute the field of least Dirichlet energy for its L2 norm, then normalize it.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     Returns
     -------
     RosyField
-        Of magnitude 1; 0 on faces without area. The energy does not determine the rotation of the
-        whole field, so it is chosen to align the field with the edges of the mesh.
+        A field of magnitude 1; 0 on faces without area. A rotation of the whole field does not change its
+        energy, so the field is rotated to align with the edges of the mesh.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Sparse Hermitian matrices in numpy, and algebraic multigrid for connection Laplacians.
 
-Matrices are complex or, if all their entries are, real; so is all that is made from them.
+Matrices are complex or real. Products, levels and solutions have the same type.
 
 The smooth vectors of a connection Laplacian are parallel, not constant: between neighboring
 unknowns their phase changes by the phase of the matrix entry. So each aggregate stores the phases
@@ -178,7 +178,7 @@ def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
 def _product_terms(
     a: CSRMatrix, b: CSRMatrix, block: slice
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows, columns and values of the terms that a block of entries of `a` adds to a b."""
+    """Return rows, columns and values of the terms that a block of entries of `a` adds to the product a b."""
     inner = a.indices[block]
     first = b.indptr.take(inner)
     count = b.indptr.take(inner + 1) - first
@@ -201,7 +201,7 @@ def _assemble_by_rows(
     matrix : CSRMatrix
         The result has the same number of rows.
     column_count : int
-        Of the result.
+        Number of columns of the result.
     entries : callable
         Takes a slice of the entries of `matrix` and returns the rows, columns and values of the
         result that come from them. Entries at the same position are summed.
@@ -263,7 +263,7 @@ def hierarchy(matrix: CSRMatrix) -> list[Level]:
     Returns
     -------
     list of Level
-        From the finest level to the coarsest.
+        Levels from the finest to the coarsest.
     """
     levels = []
     unknown_count = len(matrix)
@@ -357,7 +357,10 @@ def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
 
 
 def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
-    """Return (n,) diagonal without zeros: the eigenvalue of a component of tiny area is lost in rounding."""
+    """Return (n,) the diagonal, made positive.
+
+    Rounding errors can remove the diagonal of a component of tiny area.
+    """
     diagonal = matrix.diagonal
     return np.maximum(diagonal, SINGULAR_SHIFT * diagonal.max())
 

@@ -6,8 +6,8 @@ divided by the spacing. On a curved surface, no phase changes exactly so. `strip
 with the least squared error of exp(2 pi i phase). Where lines diverge too much, new lines begin, at triangles
 around which the phase changes by an integer.
 
-Energy, covering and interpolation are those of Knöppel, Crane, Pinkall and Schröder, "Stripe
-Patterns on Surfaces" (SIGGRAPH 2015). The energy is minimized over numbers of modulus 1
+Energy, covering and interpolation follow Knöppel, Crane, Pinkall and Schröder, "Stripe Patterns on
+Surfaces" (SIGGRAPH 2015). The energy is minimized over numbers of modulus 1
 (`angular_synchronization`) instead of eigenvectors: an eigenvector would be small on most parts of the
 surface, and take longer.
 
@@ -49,7 +49,7 @@ class CornerDirections:
         Angle of direction 0 in that frame, radians. Within a triangle direction 0 is the same
         branch at all corners.
     deviation : (T, 3, N) complex128 ndarray or None
-        Ratios of the directions to those of a RoSy, of modulus 1. None for a RoSy.
+        Ratios of the directions to the members of the nearest RoSy, of modulus 1. None for a RoSy.
     defined : (T,) bool ndarray
         Whether the field is defined in the triangle.
     """
@@ -110,12 +110,12 @@ class StripePattern:
         Returns
         -------
         (P,) float32 ndarray
-            In lines.
+            Phase in lines.
 
         Notes
         -----
-        In a triangle with an index, the phase is that of Knöppel et al. (section 4.3): linear along
-        the edges, and constant on rays from the center of the triangle apart from a linear part.
+        In a triangle with an index, the phase is the sum of a linear function and of a part that is linear
+        along the edges and constant on rays from the center (Knöppel et al., section 4.3).
         """
         entry = triangle * np.int32(self.index.shape[1]) + family
         corners = self.phase.reshape(-1, 3)

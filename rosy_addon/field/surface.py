@@ -141,7 +141,7 @@ class Surface:
 
     @cached_property
     def fans_share_normals(self) -> bool:
-        """Whether all corner normals equal that of their fan; custom normals may differ."""
+        """Whether all corner normals equal the normal of their fan; custom normals may differ."""
         normals = self.fan_normal
         return all(
             np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()

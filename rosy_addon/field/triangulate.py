@@ -68,7 +68,7 @@ def triangulate(
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`triangles` and `triangle_face` of fans; (F,) `apex` is the corner within each face."""
+    """Return `triangles` and `triangle_face` of fans around (F,) `apex`, a corner of each face, from 0."""
     size = np.diff(face_start)
     count = size - 2
     triangle_face = np.repeat(np.arange(len(size), dtype=np.int32), count)

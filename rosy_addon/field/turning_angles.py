@@ -1,13 +1,13 @@
-"""Angles by which a field turns from face to face, from its singularities.
+"""Compute the angles by which a field turns from face to face, from its singularities.
 
-A field on faces turns by some angle from each face to the next, beyond parallel transport. Around a
-vertex, these angles and the angle defect add up to the singularity index. So a field with given indices
-solves linear equations for the angles, one for each interior vertex; and on surfaces with handles, or with
-several borders, one for each loop that no vertex can contract.
+Beyond parallel transport, a field turns by some angle from each face to the next. Around a vertex, these angles
+and the angle defect add up to the singularity index. So the angles of a field with given indices satisfy a
+linear equation for each interior vertex. On surfaces with handles or with several borders, there is also an
+equation for each loop that cannot be contracted to a vertex.
 
-The angles of least squares are those of a potential at the vertices, which solves a Poisson equation on the
-triangles (`face_graph.TriangleGraph`); and those of one harmonic solution for each loop. Around a loop, the field may
-turn by any multiple of 2 pi / N; the multiples of least energy are chosen.
+The angles of least squares are the sum of the gradient of a potential at the vertices, which solves a Poisson
+equation on the triangles (`face_graph.TriangleGraph`), and of a harmonic part for each loop. Around a loop, the
+field may turn by any multiple of 2 pi / N. The multiples of least energy are chosen.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, trian
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
 from .surface import Surface
 
-#: Residual norm relative to that of the right-hand side at which the solver stops.
+#: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
 
 #: Attempts to keep the field from turning too fast between two faces, and the angle up to which edges
@@ -61,22 +61,22 @@ def turning_angles(
     ----------
     surface : Surface
     graph : FaceGraph
-        Of its faces.
+        Graph of its faces.
     degree : int
         N.
     required : (n,) ndarray
-        The sums around interior nodes, in radians; those at other nodes do not count.
+        Sums of the angles around interior nodes, in radians; values at other nodes are ignored.
     present : (I,) ndarray or float
         Angles of a field to which these are added.
 
     Returns
     -------
     angle : (I,) float64 ndarray
-        Of least squares. Around loops, the angles are added to those present and to the unfolding, and
-        have a sum that is a multiple of 2 pi / N. Where a field would turn by half of that or more between
-        two faces, they get smaller, if that is possible.
+        Angles of least squares. Around a loop, these angles, the present angles and the unfolding add up to
+        a multiple of 2 pi / N. Where a field would turn by pi / N or more between two faces, the angles are
+        reduced, if that is possible.
     direction : (F,) float64 ndarray
-        Of the field that turns by these angles, in radians in the frames of the faces.
+        Direction of the field that turns by these angles, in radians in the frames of the faces.
     """
     triangles = triangle_graph(surface, graph)
     present_between = triangles.on_triangles(present)
@@ -120,8 +120,8 @@ def _least_angles_near(
 ) -> np.ndarray | None:
     """Return (I,) angles of least squares near changed edges, where the other angles stay.
 
-    The result is None if the angles around loops would change, because the neighborhoods of the edges surround
-    a part of the surface.
+    The result is None if the angles around loops would change. That happens if the neighborhoods of the edges
+    surround a part of the surface.
     """
     is_near = np.zeros(graph.node_count, dtype=bool)
     is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
@@ -152,9 +152,9 @@ def _least_angles_near(
 
 
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
-    """Return (I,) factors by which edges should resist angles more that are added to those present.
+    """Return (I,) factors to multiply the resistance of edges with, where angles are too large.
 
-    They are 1 where the sum is clearly below the limit.
+    `angle` is added to the `present` angles. Factors are 1 where the sum is clearly below the limit.
     """
     room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2

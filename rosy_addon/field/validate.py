@@ -137,7 +137,7 @@ def validated_directions(
     directions : (n, N, 3) array_like
         In object space, in any order. Where one of them is zero, the field is undefined.
     source, nonfinite, domain
-        As for `validated_field`.
+        The same as in `validated_field`.
 
     Returns
     -------
@@ -147,7 +147,8 @@ def validated_directions(
     Raises
     ------
     RosyError
-        As for `validated_field`.
+        If the number of directions fits neither faces nor vertices, a direction is not finite, or more than
+        `MAX_OUTLIER_FRACTION` of them are off the tangent plane.
     """
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
@@ -249,7 +250,7 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
 def vertex_normals(surface: Surface) -> np.ndarray:
     """Average the face normals around each vertex, weighted by corner angle.
 
-    Sharp edges are ignored. The normals are those of `Surface.vertices`, the deformed shape.
+    Sharp edges are ignored. The normals belong to `Surface.vertices`, the deformed shape.
 
     Returns
     -------

@@ -50,18 +50,18 @@ def read_obj(path: Path) -> Polygons:
 def _resolved(
     rows: TextRows, label: str, defined_above: np.ndarray, count: int, message: str
 ) -> np.ndarray:
-    """Return the indices in rows, counted from 0, of things that the file numbers from 1.
+    """Return the indices in rows, counted from 0, of elements that the file numbers from 1.
 
     Parameters
     ----------
     rows : TextRows
-        Of indices. Negative ones are relative to the number of things above the line.
+        Rows of indices. Negative indices are relative to the number of elements above the line.
     label : str
         What the indices are, for messages.
     defined_above : (rows,) int ndarray
-        The number of things above each line.
+        The number of elements above each line.
     count : int
-        Of all things.
+        The number of all elements.
     message : str
         Begins the message about an index out of range, with a place for it.
     """
@@ -78,7 +78,7 @@ def _resolved(
 
 
 def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
-    """Return (rows,) bool, whether the first word of each row is that of a kind."""
+    """Return (rows,) bool, whether the first word of each row is the given one."""
     return np.array([words[0] == kind for words in rows.words], dtype=bool)
 
 

@@ -59,7 +59,7 @@ def _after_keyword(rows: TextRows) -> TextRows:
 
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """`corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
+    """Return `corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
     first_words = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers)
     sizes = first_words.ints("number of corners of a face")
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):

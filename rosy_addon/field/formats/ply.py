@@ -177,7 +177,7 @@ def _check_unique(
 
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
     """Return the values of all elements of a text file."""
-    # The header is included, so that line numbers are those of the file.
+    # The header is included, so that rows have the line numbers of the file.
     rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
     columns = {}

@@ -76,7 +76,7 @@ def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
 
 
 def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
-    """`check_degree`, with the file and the line of the word in its error."""
+    """Return `check_degree(degree)`, with the file and the line of the word in its error."""
     try:
         return check_degree(degree)
     except RosyError as reason:

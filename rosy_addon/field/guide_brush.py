@@ -259,25 +259,33 @@ class BrushStroke:
             mean = self._system.neighbor_means(self.guides, face)
             self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
             return
-        is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * brush.radius]
+        self._begin_passes(face, arc_length)
+        self._coverage[face] = np.maximum(self._coverage[face], effect)
+        if brush.effect == "erase":
+            self._store(face, (1 - self._coverage[face]) * self._base[face])
+        else:
+            self._comb(face, distance, direction[is_reached])
+
+    def _begin_passes(self, face: np.ndarray, arc_length: float) -> None:
+        """Begin a new pass over faces that the stroke left some arc length ago, or has never reached."""
+        is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * self._brush.radius]
         self._last_arc_length[face] = arc_length
         self._base[is_new] = self.guides[is_new]
         self._least_distance[is_new] = np.inf
         self._coverage[is_new] = 0
-        self._coverage[face] = np.maximum(self._coverage[face], effect)
-        if brush.effect == "erase":
-            self._store(face, (1 - self._coverage[face]) * self._base[face])
-            return
+
+    def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
+        """Turn guides to directions of the stroke, unless a nearer part of it has done so."""
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]
         self._least_distance[face] = distance[is_closest]
         target = to_representation(
-            normalize(direction[is_reached][is_closest]),
+            normalize(direction[is_closest]),
             self._system.averages.x[face],
             self._system.averages.y[face],
             self._system.degree,
         )
-        target *= (1.0 if brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
+        target *= (1.0 if self._brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
         coverage = self._coverage[face]
         self._store(face, (1 - coverage) * self._base[face] + coverage * target)
 

@@ -7,19 +7,16 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ..blocks import row_blocks
 from ..rosy_field import MAX_DEGREE
 from ..validate import as_float64
 from .polygons import RawField
-from .text_rows import ROWS_PER_BLOCK, format_blocks, read_rows
+from .text_rows import read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -94,18 +91,11 @@ def read_npy(path: Path) -> RawField:
     return _raw_field(values)
 
 
-def directions_text(directions: np.ndarray) -> Iterator[str]:
-    """Format (F, N, 3) directions as text, 3 N numbers per row, in blocks of lines."""
-    return format_blocks(directions.reshape(len(directions), -1))
-
-
-def npy_blocks(directions: np.ndarray) -> Iterator[bytes]:
-    """Return the contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N), in blocks."""
-    rows = np.ascontiguousarray(directions.reshape(len(directions), -1))
-    header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(rows))
-    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
-    return chain([header.getvalue()], (rows[block].tobytes() for block in blocks))
+def npy_bytes(directions: np.ndarray) -> bytes:
+    """Return the contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N)."""
+    file = io.BytesIO()
+    np.save(file, directions.reshape(len(directions), -1))
+    return file.getvalue()
 
 
 def _check_columns(source: str, columns: int) -> None:

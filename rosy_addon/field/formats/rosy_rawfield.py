@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +12,7 @@ import numpy as np
 from ...core.errors import RosyError, counted
 from ..rosy_field import RosyField, check_degree
 from .polygons import RawField
-from .text_rows import TextRows, abbreviate, format_blocks, read_rows
+from .text_rows import TextRows, abbreviate, format_lines, read_rows
 
 
 def read_rosy(path: Path) -> RawField:
@@ -48,15 +46,15 @@ def read_rawfield(path: Path) -> RawField:
     return RawField(table.reshape(-1, degree, 3), degree, count)
 
 
-def rosy_text(field: RosyField) -> Iterator[str]:
-    """Format the member vectors of a field as a `.rosy` file, in blocks of lines."""
-    return chain([f"{len(field.vectors)}\n{field.degree}\n"], format_blocks(field.vectors))
+def rosy_text(field: RosyField) -> str:
+    """Format the member vectors of a field as a `.rosy` file."""
+    return f"{len(field.vectors)}\n{field.degree}\n{format_lines(field.vectors)}"
 
 
-def rawfield_text(directions: np.ndarray) -> Iterator[str]:
-    """Format (F, N, 3) directions as a `.rawfield` file, in blocks of lines."""
+def rawfield_text(directions: np.ndarray) -> str:
+    """Format (F, N, 3) directions as a `.rawfield` file."""
     count, degree = directions.shape[:2]
-    return chain([f"{degree} {count}\n"], format_blocks(directions.reshape(count, -1)))
+    return f"{degree} {count}\n{format_lines(directions.reshape(count, -1))}"
 
 
 def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, chain, islice
 from pathlib import Path
@@ -11,7 +11,6 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
@@ -162,7 +161,6 @@ def format_rows(rows: np.ndarray) -> list[str]:
     return [" ".join(map(repr, row)) for row in rows.tolist()]
 
 
-def format_blocks(rows: np.ndarray, prefix: str = "") -> Iterator[str]:
-    """Format (n, k) numbers as lines of text with a prefix, in blocks of up to `ROWS_PER_BLOCK`."""
-    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
-    return ("".join([f"{prefix}{line}\n" for line in format_rows(rows[block])]) for block in blocks)
+def format_lines(rows: np.ndarray, prefix: str = "") -> str:
+    """Format (n, k) numbers as lines of text with a prefix; see `format_rows`."""
+    return "".join([f"{prefix}{line}\n" for line in format_rows(rows)])

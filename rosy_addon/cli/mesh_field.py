@@ -10,7 +10,7 @@ from ..api.surface import simulation_suffixes
 from ..core.errors import RosyError
 from ..core.settings import settings_of
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
-from ..field.formats.guide_strokes import read_guide_strokes
+from ..field.formats.plain import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings, options_of
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree

@@ -9,7 +9,6 @@ import numpy as np
 
 from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
-from ..core.progress import progress, report
 from .blocks import mask, row_blocks
 from .connectivity import build_edges, smooth_fans
 from .frames import dot, normalize
@@ -211,16 +210,12 @@ def build_surface(
     corner_vertex = np.ascontiguousarray(corner_vertex, dtype=np.int32).ravel()
     face_start = np.ascontiguousarray(face_start, dtype=np.int32).ravel()
     _check_polygons(name, vertices, corner_vertex, face_start)
-    report(0.1, "reading the mesh")
     if triangles is None:
-        with progress(0.1, 0.3):
-            triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
+        triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
     if corner_fan is None:
-        report(0.3, "finding smooth edges")
         corner_fan = smooth_fans(
             vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
         )
-    report(0.8, "computing normals")
     if corner_normal is None:
         corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return Surface(

@@ -138,13 +138,13 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lines = data.split(b"\n")
-    has_comments = comment is not None and comment in data
+    if comment is not None and comment in data:
+        lines = [line.partition(comment)[0] for line in lines]
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
     for number, line in enumerate(lines, 1):
-        text = line.partition(comment)[0] if has_comments else line
-        if line_words := tuple(text.split()):
+        if line_words := tuple(line.split()):
             words.append(line_words)
             line_numbers.append(number)
     return TextRows(path, words, line_numbers)

@@ -327,7 +327,7 @@ class BrushStroke:
         self._end = _Dab(point, pressure, start.arc_length + length)
 
     def _draw(self) -> np.ndarray:
-        """Draw the segments whose ends both have an earlier and a later dab. Return the faces near them."""
+        """Draw the segments whose ends both have an earlier and a later dab. Return the faces near the segments."""
         dabs = self._dabs
         if len(dabs) < 4 and not (len(dabs) == 3 and dabs[1] is dabs[2]):
             return np.empty(0, dtype=np.intp)

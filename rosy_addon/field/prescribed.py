@@ -285,7 +285,7 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
-    """Return (F,) factors that turn the representation z to a target as a whole, on each connected component."""
+    """Return (F,) factors that rotate z toward a target, the same factor on each connected component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
     return unit_complex(total, otherwise=1)[component]
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
+from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
@@ -163,4 +164,8 @@ def format_rows(rows: np.ndarray) -> list[str]:
 
 def format_lines(rows: np.ndarray, prefix: str = "") -> str:
     """Format (n, k) numbers as lines of text with a prefix; see `format_rows`."""
-    return "".join([f"{prefix}{line}\n" for line in format_rows(rows)])
+    # Strings of single rows take much more memory than the text, so they are joined block by block.
+    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
+    return "".join(
+        "".join([f"{prefix}{line}\n" for line in format_rows(rows[block])]) for block in blocks
+    )

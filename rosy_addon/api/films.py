@@ -19,10 +19,11 @@ from ..core.errors import RosyError, counted
 from ..field.carry import vectors_on_rest_shape
 from ..field.frames import normalize
 from ..field.interpolation import interpolate_fields
+from ..field.polygon_arrays import face_area_vectors
 from ..field.representation import face_representation
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface as PolygonMesh
-from ..field.surface import face_area_vectors, have_same_polygons
+from ..field.surface import have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance

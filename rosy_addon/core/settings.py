@@ -3,7 +3,8 @@
 A settings class is a frozen dataclass whose fields are made by `number`, `numbers`, `choice`,
 `switch` and `color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
 the stage of rendering that it affects and when it applies. Properties, panels, validation, command
-line options, tables of the documentation and cache keys are derived from these descriptions.
+line options, tables of the documentation and cache keys are derived from these descriptions. Other
+fields of the class, such as arrays, have no description.
 """
 
 from __future__ import annotations
@@ -102,7 +103,10 @@ class Number(Setting):
     low, high : float
         The range, both ends included.
     unit : str
-        "angle" (radians), "length" (Blender units), "pixels" or "spacings"; empty if it has none.
+        "angle" (radians), "length" (Blender units), "size" (fraction of the size of the mesh), "pixels" or
+        "spacings"; empty if it has none.
+    soft_high : float or None
+        Upper end of sliders, if lower than `high`.
     is_pixel_length : bool
         Whether the value is a length that depends on the resolution. Such lengths are multiplied
         when the frame has more pixels, as with supersampling.
@@ -112,6 +116,7 @@ class Number(Setting):
 
     low: float = 0.0
     high: float = 1.0
+    soft_high: float | None = None
     unit: str = ""
     is_pixel_length: bool = False
     preview_low: float = 0.0
@@ -255,7 +260,9 @@ def settings_of(cls: type) -> Mapping[str, Setting]:
     """Return the descriptions of a settings class by name, in the order of its fields."""
     settings = {}
     for entry in fields(cls):
-        setting: Setting = entry.metadata["setting"]
+        setting: Setting | None = entry.metadata.get("setting")
+        if setting is None:
+            continue
         label = setting.label or title(entry.name)
         settings[entry.name] = replace(setting, name=entry.name, label=label)
     return MappingProxyType(settings)

@@ -25,7 +25,7 @@ from ..core.errors import RosyError, counted
 from ..core.file_io import check_readable, open_file, read_bytes
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
-from ..field.surface import face_area_vectors, mean_per_face
+from ..field.polygon_arrays import face_area_vectors, mean_per_face
 
 #: Files that VTK reads, and among them those that may hold several steps of time.
 VTK_SUFFIXES = (".vtk", ".vtu", ".vtp", ".vts", ".vtr", ".vti", ".vtm", ".pvtu", ".pvtp")

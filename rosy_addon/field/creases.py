@@ -1,8 +1,8 @@
-"""Edges at which the form of a surface breaks, told from the noise of scans and coarse meshes.
+"""Find creases of a surface: chains of sharp edges that are not caused by noise or coarse faces.
 
-Creases are chains of sharp edges. They are judged with hysteresis and as chains, like the edges of an image by
-Canny, "A Computational Approach to Edge Detection", PAMI 1986. The result does not depend on the view, so creases
-do not flicker when something moves.
+As in the edge detector of Canny, "A Computational Approach to Edge Detection", PAMI 1986, a chain with enough
+strong edges may also contain weak ones (hysteresis). The result does not depend on the view, so creases do not
+flicker in animations.
 """
 
 from __future__ import annotations
@@ -11,20 +11,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import report
 from .blocks import mask
+from .connectivity import Edges, build_edges, connected_components
 from .frames import angle_between, dot, normalize
-from .surface import Edges, Surface, build_edges, connected_components, face_area_vectors
+from .polygon_arrays import face_area_vectors
+from .surface import Surface
 
 #: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
 FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35
 
-#: Edges with a larger angle than the second are salient, in radians. Between the two angles, an edge is
-#: salient if its angle is at least `MIN_RATIO` times those of the other edges of its two faces.
+#: Edges with an angle above the second one (radians) are salient. Between the two angles, an edge is salient
+#: if its angle is at least `MIN_RATIO` times the angle of each other edge of its two faces.
 MIN_ANGLE, SHARP_ANGLE = np.pi / 6, np.pi / 3
 MIN_RATIO = 2.0
 
-#: Both angles are at least this multiple of the angle by which noise turns the normals.
+#: Both angles are at least this multiple of the median angle by which noise rotates the normals.
 NOISE_MULTIPLE = 5.0
 
 #: Shortest line of salient edges, relative to `Surface.extent`.
@@ -37,14 +39,14 @@ WEAK_SHARE = 0.5
 #: At least this share of the length of a chain has the full crease angle.
 MIN_STRONG_SHARE = 0.25
 
-#: Smallest angle between filtered normals, relative to the angle between the normals.
+#: Smallest angle between the filtered normals of a crease, relative to the angle between its normals.
 MIN_FILTERED_SHARE = 0.1
 
 #: Shortest chain on a noisy mesh: its number of mean edges, for each radian of noise.
 MIN_EDGES_PER_NOISE = 100.0
 
-#: Mean edge, relative to `Surface.extent`, above which the filtered normals count less: the edges of a
-#: coarse mesh are meant.
+#: Mean edge length, relative to `Surface.extent`, above which the thresholds for noise are reduced: sharp edges
+#: of a coarse mesh are intended.
 NOISY_EDGE_LENGTH = 0.02
 
 #: Rings of faces around sharp edges in which normals are filtered.
@@ -52,9 +54,6 @@ FILTER_RINGS = 4
 
 #: Smallest crease angle in radians, below which normals differ by rounding only.
 MIN_CREASE_ANGLE = 1e-3
-
-#: Label of the progress.
-LABEL = "finding creases"
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
@@ -89,7 +88,6 @@ def filtered_normals(
     ----------
     Zheng, Fu, Au and Tai, "Bilateral Normal Filtering for Mesh Denoising", TVCG 2011.
     """
-    label = "filtering normals"
     face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
     corner_vertex, face_start = surface.corner_vertex, surface.face_start
     unfiltered = normals = surface.face_normal
@@ -103,13 +101,11 @@ def filtered_normals(
     vectors = face_area_vectors(surface.vertices, corner_vertex, face_start)
     area = np.sqrt(dot(vectors, vectors))
     area /= max(float(area.max(initial=0.0)), 1e-300)
-    for index in range(FILTER_ROUNDS):
-        report(index / FILTER_ROUNDS, label)
+    for _ in range(FILTER_ROUNDS):
         normal_a, normal_b = normals[face_a], normals[face_b]
         difference = normal_a - normal_b
         weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
         weight_a, weight_b = weight * area[face_b], weight * area[face_a]
-        report((index + 0.5) / FILTER_ROUNDS, label)
         total = normals * area[:, None]
         for axis in range(3):
             total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
@@ -136,7 +132,7 @@ def salient_edges(
     surface : Surface
     edges : Edges
     normals, noise_angle
-        From `filtered_normals`.
+        Results of `filtered_normals`.
 
     Returns
     -------
@@ -163,7 +159,7 @@ def salient_edges(
 
 
 def _largest_of_others(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
-    """(I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
+    """Return (I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
     all_angles = np.zeros(len(edges.ends))
     all_angles[edges.interior] = angle
     corner_angle = all_angles[edges.corner_edge]
@@ -213,7 +209,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
         Borders and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
-    report(0.0, LABEL)
+    report(0.0, "finding creases")
     edges = build_edges(surface.corner_vertex, surface.face_start)
     sides = surface.corner_face[edges.halfedges].T
     # Smaller angles have no effect.
@@ -222,8 +218,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     if angle.max(initial=0.0) < crease_angle:
         return none
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
-    with progress(0.4, 0.8, LABEL):
-        normals, noise_angle = filtered_normals(surface, edges, region)
+    normals, noise_angle = filtered_normals(surface, edges, region)
     ends = edges.ends[edges.interior]
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.sqrt(dot(vector, vector))
@@ -250,7 +245,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 
 
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:
-    """(I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
+    """Return (I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
     angle = np.zeros(sides.shape[1])
     a, b = sides
     is_large = sum(x[a] * x[b] for x in np.ascontiguousarray(normals.T)) < np.cos(least)
@@ -259,7 +254,7 @@ def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.nd
 
 
 def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
-    """(F,) bool: the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
+    """Return (F,) bool, the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
     is_near = mask(len(surface.vertices), ends)
     for _ in range(FILTER_RINGS):
         faces = np.logical_or.reduceat(is_near[surface.corner_vertex], surface.face_start[:-1])
@@ -268,7 +263,7 @@ def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
 
 
 def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether normals are not interpolated across edges, given as of `Edges.halfedges`."""
+    """Return (n,) bool, whether normals are discontinuous across edges, given as rows of `Edges.halfedges`."""
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T
     return (fan[a] != fan[following[b]]) | (fan[following[a]] != fan[b])

@@ -1,4 +1,4 @@
-"""The curvature of the features of a surface, and what the noise of its vertices does to it."""
+"""Measure the curvature of the features of a surface, and how noise of the vertices changes it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..core.progress import progress
 from .connection import build_connection
+from .connectivity import Edges, build_edges, smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
+from .polygon_arrays import face_area_vectors
 from .representation import face_frames
-from .surface import Edges, Surface, build_edges, face_area_vectors, smooth_fans
+from .surface import Surface
 from .surface_averages import SurfaceAverages
 
 #: Length over which curvature is averaged, relative to `Surface.extent`.
@@ -21,7 +22,6 @@ SCALE = 0.01
 #: Ratio of curvature and noise below which there is no feature.
 MIN_NOISE_RATIO = 2.0
 
-
 #: Seed of the sample of noise.
 SEED = 777
 
@@ -29,24 +29,23 @@ SEED = 777
 #: of the mean face area. It must be small.
 PROBE = 1e-3
 
-#: Label of the progress.
-LABEL = "measuring features"
-
 
 @dataclass(frozen=True, eq=False)
 class NoisyCurvature:
-    """The curvature of a surface between its salient edges, as of `curvature.face_curvature`.
+    """The curvature of a surface between its salient edges, and how much noise changes it.
+
+    See `curvature.face_curvature` for the mean and the deviator.
 
     Attributes
     ----------
     salient_ends : (E, 2) int32 ndarray
         The salient edges: pairs of vertices.
     averages : SurfaceAverages
-        With the frames of the faces.
+        Averages in the frames of the faces.
     mean : (F,) float64 ndarray
     deviator : (F,) complex128 ndarray
     mean_noise, deviator_noise : (F,) ndarray
-        By how much the mean and the deviator change if there is as much noise again.
+        Changes of the mean and of the deviator if as much noise is added again.
     """
 
     salient_ends: np.ndarray
@@ -69,25 +68,19 @@ def of_unit_extent(surface: Surface) -> Surface:
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
     """Measure the curvature of a surface, without and with a sample of its noise."""
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    with progress(0.1, 0.4):
-        normals, noise_angle = filtered_normals(surface, edges)
+    normals, noise_angle = filtered_normals(surface, edges)
     ends = salient_edges(surface, edges, normals, noise_angle)
     noise = noise_sample(surface, edges, noise_angle)
     fans = smooth_fans(
         surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
     )
     x, y = face_frames(surface)
-    with progress(0.6, 0.7, LABEL):
-        mean, deviator = _bounded_curvature(surface, fans, x, y)
+    mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = replace(surface, vertices=surface.vertices + noise)
     normal = noisy.face_normal
     x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
-    with progress(0.7, 0.8, LABEL):
-        mean_noisy, deviator_noisy = _bounded_curvature(
-            noisy, fans, x_noisy, np.cross(normal, x_noisy)
-        )
-    with progress(0.8, 1.0, LABEL):
-        averages = SurfaceAverages(surface, build_connection(surface), x, y)
+    mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, x_noisy, np.cross(normal, x_noisy))
+    averages = SurfaceAverages(surface, build_connection(surface), x, y)
     return NoisyCurvature(
         ends, averages, mean, deviator, mean_noisy - mean, deviator_noisy - deviator
     )
@@ -96,9 +89,9 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
 def _bounded_curvature(
     surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Curvature of each face, with normals that are smooth within the given fans of corners.
+    """Return the mean curvature and the deviator of each face; normals are smooth within the given fans.
 
-    A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
+    Curvature is limited to the inverse size of the face, because slivers cannot resolve more.
     """
     mean, deviator = face_curvature(with_smooth_normals(surface, corner_fan), x, y)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
@@ -109,19 +102,19 @@ def _bounded_curvature(
 
 
 def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
-    """Sample noise as strong as that of the vertices along their normals.
+    """Sample white noise as strong as the noise of the vertices along their normals.
 
-    Two properties are compared with those of white noise of unit amplitude: the angle by which it
-    turns the face normals, and its difference from the mean of the neighbors. The form of the surface
-    adds to both, to the first on coarse meshes and to the second at creases, so the smaller result
-    is used.
+    Two effects of the noise are compared with the effects of white noise of unit amplitude: the angle by
+    which it rotates the face normals, and the difference of vertices from the mean of their neighbors. The
+    form of the surface adds to the first effect on coarse meshes and to the second one at creases, so the
+    smaller result is used.
 
     Parameters
     ----------
     surface : Surface
     edges : Edges
     noise_angle : float
-        From `salient_edges.filtered_normals`.
+        Result of `creases.filtered_normals`.
 
     Returns
     -------
@@ -150,7 +143,7 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
 
 
 def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
+    """Return (V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
     tail, head = ends.T
     degree = np.maximum(np.bincount(ends.ravel(), minlength=len(points)), 1)
 
@@ -177,34 +170,28 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     Returns
     -------
     (T, 3) float32 ndarray
-        In 1 / Blender unit of object space. 0 is flat.
+        Units of 1 / length in object space. 0 is flat.
     """
     if surface.rest_vertices is not None:
-        with progress(0.0, 0.05):
-            surface = with_smooth_normals(surface.in_rest_shape())
+        surface = with_smooth_normals(surface.in_rest_shape())
     if not surface.face_normal.any():
         return np.zeros((len(surface.triangles), 3), dtype=np.float32)
     extent, surface = surface.extent, of_unit_extent(surface)
-    with progress(0.05, 0.75):
-        measured = noisy_curvature(surface)
+    measured = noisy_curvature(surface)
     averages = measured.averages
     scalar, line = averages.laplacian(0), averages.laplacian(2)
     area = SCALE**2
-    results = []
-    for matrix, values, order in (
-        (scalar, measured.mean, 0),
-        (line, measured.deviator, 2),
-        (scalar, measured.mean_noise, 0),
-        (line, measured.deviator_noise, 2),
-    ):
-        sums, start = averages.node_sums(values, order), 0.8 + 0.04 * len(results)
-        with progress(start, start + 0.04):
-            results.append(averages.smooth(matrix, area, sums))
-    mean, deviator, mean_noise, deviator_noise = map(np.abs, results)
+    mean, mean_noise = (
+        np.abs(averages.smooth(scalar, area, averages.node_sums(values, 0)))
+        for values in (measured.mean, measured.mean_noise)
+    )
+    deviator, deviator_noise = (
+        np.abs(averages.smooth(line, area, averages.node_sums(values, 2)))
+        for values in (measured.deviator, measured.deviator_noise)
+    )
     curvature = mean + deviator
     power = averages.mass * (mean_noise + deviator_noise) ** 2
-    with progress(0.96, 1.0):
-        power = averages.smooth(scalar, 16 * area, power)
+    power = averages.smooth(scalar, 16 * area, power)
     signal = curvature**2 - MIN_NOISE_RATIO**2 * np.maximum(power, 0.0)
     curvature = np.sqrt(np.maximum(signal, 0.0)) / extent
     return curvature.astype(np.float32)[averages.connection.corner_node].reshape(-1, 3)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from ..core.errors import RosyError, counted
-from ..core.file_io import check_parsing_memory, check_writable, write_blocks
+from ..core.file_io import check_parsing_memory, write_bytes
 from ..core.progress import progress, report
+from .blocks import row_blocks
+from .closest_point import closest_triangles
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
-from .formats.plain import directions_text, npy_blocks, read_npy, read_text
+from .formats.plain import npy_bytes, read_npy, read_text
 from .formats.polygons import RawField
 from .formats.rosy_rawfield import (
     rawfield_text,
@@ -21,19 +25,27 @@ from .formats.rosy_rawfield import (
     rosy_text,
 )
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
-from .formats.text_rows import ROWS_PER_BLOCK
+from .formats.text_rows import format_lines
+from .frames import dot, normalize, transport
 from .mesh_io import READERS as MESH_READERS
 from .mesh_io import SHARP_ANGLE, read_mesh
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
-from .transfer import transfer_field
 from .validate import (
     apply_nonfinite_policy,
     infer_domain,
     validated_directions,
     validated_field,
 )
+
+#: Limits for a target face to get the field of the closest source face: the distance relative to
+#: `Surface.extent` of the source, and the angle between the normals in radians.
+MAX_DISTANCE, MAX_NORMAL_ANGLE = 0.02, np.radians(60)
+
+#: Largest fraction of the target faces that may exceed these limits. The field is undefined on
+#: them.
+MAX_UNMATCHED_FRACTION = 0.05
 
 #: The reader of each file name extension.
 _READERS: dict[str, Callable[[Path], RawField]] = {
@@ -92,8 +104,8 @@ def load_field(
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     mesh : path-like, optional
-        The mesh file that the rows refer to, if its faces differ from those of `surface`, for
-        example because one of them was triangulated or reordered. The field is then transferred by
+        The mesh file that the rows refer to, if its faces differ from the faces of `surface`, for
+        example because one of the meshes was triangulated or reordered. The field is then transferred by
         position. If not given, and the counts differ, a mesh file of the same name in the same
         folder is used.
 
@@ -149,7 +161,7 @@ def field_from_raw(
     raw : RawField
     surface : Surface
     degree : int or None
-        Of rows with one member that state no degree; `DEFAULT_DEGREE` if None.
+        Degree of rows with one member that state none; `DEFAULT_DEGREE` if None.
     source : str
         Name of the file, for messages.
     nonfinite : {"error", "zero"}
@@ -157,7 +169,7 @@ def field_from_raw(
     Raises
     ------
     RosyError
-        As of `load_field`.
+        If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
     _check_count(raw, surface, source)
     values = raw.values
@@ -198,7 +210,7 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
 def _source_surface(
     path: Path, raw: RawField, surface: Surface, mesh: str | os.PathLike[str] | None
 ) -> Surface | None:
-    """The surface that the rows of a file refer to, if it is not `surface`; None if it is."""
+    """Return the surface that the rows of a file refer to, if it is not `surface`; None if it is."""
     if mesh is not None:
         return read_mesh(mesh)
     count = len(raw.values)
@@ -240,14 +252,7 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     --------
     load_field : The formats.
     """
-    path = Path(path)
-    _check_storable(path, field)
-    check_writable(path)
-    report(0.0, "writing the file")
-    with progress(0.0, 0.4):
-        blocks = _contents(path.suffix.lower(), field, surface)
-    with progress(0.4, 1.0):
-        write_blocks(path, blocks, _step_count(path, surface))
+    write_bytes(path, field_file(path, field, surface))
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
@@ -256,24 +261,12 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     Raises
     ------
     RosyError
-        As `write_field`, but nothing is written.
+        If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
     path = Path(path)
     _check_storable(path, field)
     report(0.0, "writing the file")
-    with progress(0.0, 0.4):
-        blocks = _contents(path.suffix.lower(), field, surface)
-    step_count, contents = _step_count(path, surface), bytearray()
-    for index, block in enumerate(blocks):
-        report(0.4 + 0.6 * min(index / step_count, 1.0), "writing the file")
-        contents += block
-    return bytes(contents)
-
-
-def _step_count(path: Path, surface: Surface) -> float:
-    """Return about how many blocks the file of a field has."""
-    vertex_rows = 3 * len(surface.vertices) if path.suffix.lower() == ".obj" else 0
-    return 1 + (surface.face_count + vertex_rows) / ROWS_PER_BLOCK
+    return _contents(path.suffix.lower(), field, surface)
 
 
 def _check_storable(path: Path, field: RosyField) -> None:
@@ -290,24 +283,92 @@ def _check_storable(path: Path, field: RosyField) -> None:
         )
 
 
-def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes]:
-    """The contents of a field file, as blocks that are formatted one by one."""
+def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
+    """Return the contents of a field file."""
     if suffix == ".rosy":
-        text = rosy_text(field)
-    elif suffix == ".obj":
-        text = fieldgen_text(surface, field)
-    elif suffix in SINGULARITY_SUFFIXES:
-        text = sings_text(field.degree, *find_singularities(surface, field))
-    else:
-        rows = field.source_directions
-        if rows is None:
-            rows = field_directions(surface, field)
-        if suffix == ".npy":
-            return npy_blocks(rows)
-        text = rawfield_text(rows) if suffix == ".rawfield" else directions_text(rows)
-    return (block.encode("ascii") for block in text)
+        return rosy_text(field).encode("ascii")
+    if suffix == ".obj":
+        return fieldgen_text(surface, field).encode("ascii")
+    if suffix in SINGULARITY_SUFFIXES:
+        return sings_text(field.degree, *find_singularities(surface, field)).encode("ascii")
+    rows = field.source_directions
+    if rows is None:
+        rows = field_directions(surface, field)
+    if suffix == ".npy":
+        return npy_bytes(rows)
+    text = (
+        rawfield_text(rows) if suffix == ".rawfield" else format_lines(rows.reshape(len(rows), -1))
+    )
+    return text.encode("ascii")
 
 
 def _join_names(names: tuple[str, ...]) -> str:
     """Join names as in "a, b or c"."""
     return f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def transfer_field(
+    source: Surface, field: RosyField, target: Surface, field_name: str
+) -> RosyField:
+    """Transfer a field to another mesh: each face takes the value of the closest source face.
+
+    Parameters
+    ----------
+    source : Surface
+    field : RosyField
+        The field on the faces of `source`.
+    target : Surface
+        The same shape in the same space with different faces, for example triangulated or
+        reordered.
+    field_name : str
+        Name of the field in messages.
+
+    Returns
+    -------
+    RosyField
+        On the faces of `target`; zero on faces beyond `MAX_DISTANCE` or `MAX_NORMAL_ANGLE`, and on
+        faces without area.
+
+    Raises
+    ------
+    RosyError
+        If more than `MAX_UNMATCHED_FRACTION` of the faces exceed these limits.
+    """
+    points = _face_points(target)
+    with progress(0.1, 0.9):
+        triangle, distance = closest_triangles(source, points)
+    report(0.9, "transferring the field")
+    face = source.triangle_face[triangle]
+    extent = max(source.extent, 1e-300)
+    normal = target.face_normal
+    normal_cosine = dot(normal, source.face_normal[face])
+    undefined = (distance > MAX_DISTANCE * extent) | (normal_cosine < np.cos(MAX_NORMAL_ANGLE))
+    undefined |= ~normal.any(axis=1)
+    unmatched = undefined & normal.any(axis=1)
+    if unmatched.sum() > MAX_UNMATCHED_FRACTION * len(undefined):
+        raise RosyError(
+            f"{field_name}: {unmatched.sum()} of {len(undefined)} faces of {target.name} do not lie on "
+            f"{source.name} (distances up to {distance.max():.3g}): the two meshes must have the same "
+            "shape and position"
+        )
+    vectors = field.vectors[face]
+    length = np.sqrt(dot(vectors, vectors))[:, None]
+    vectors = normalize(transport(vectors, source.face_normal[face], normal)) * length
+    vectors[undefined] = 0
+    direction_ratios = None if field.direction_ratios is None else field.direction_ratios[face]
+    return RosyField(field.degree, vectors, direction_ratios, field.family_count)
+
+
+def _face_points(surface: Surface) -> np.ndarray:
+    """Return (F, 3) a point on each face: the centroid of its largest triangle."""
+    points = np.empty((surface.face_count, 3))
+    for faces in row_blocks(surface.face_count):
+        limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])
+        triangles = slice(*limits)
+        face = surface.triangle_face[triangles]
+        corners = surface.vertices[surface.triangle_vertex[triangles]]
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        order = np.lexsort((dot(cross, cross), face))
+        last = np.searchsorted(face[order], np.arange(faces.start, faces.stop), "right") - 1
+        points[faces] = corners[order[last]].mean(axis=1)
+    return points

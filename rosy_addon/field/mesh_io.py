@@ -52,7 +52,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Surface:
     Raises
     ------
     RosyError
-        As of `read_polygons`, or if the file is not a mesh with faces.
+        If the file has another extension, cannot be read or is malformed, or is not a mesh with faces.
     """
     with progress(0.0, 0.5):
         polygons = read_polygons(path)

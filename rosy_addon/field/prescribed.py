@@ -1,20 +1,29 @@
 """Fields with given singularities (Crane, Desbrun and Schröder, *Trivial Connections*, 2010).
 
-The angles by which a field turns from face to face follow from its singularities (`turning_angles`). Those
-of the least squares belong to the field of the least Dirichlet energy, but for terms of fourth order. The
-singularities of a field are changed by adding the angles that belong to the change.
+The singularities of a field determine the angles by which it turns from face to face (`turning_angles`). The
+angles of least squares give the field of least Dirichlet energy, up to terms of fourth order. To change the
+singularities of a field, the angles of the change are added to its angles.
+
+A field is rotated toward guides without changing its singularities: by an angle that is continuous over the
+surface. If the field has the least squared turning angles, its Dirichlet energy grows by the Dirichlet energy of
+this angle. So the angle solves a linear equation, once the multiple of 2 pi / N is known that takes the field to
+each guide. The first multiples come from a linear equation for the representation, which may have other
+singularities. They are improved until they are the nearest ones.
 """
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 
 from ..core.errors import RosyError
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress, report
+from .conjugate_gradient import conjugate_gradient
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
-from .guided_rotation import guided_rotation
+from .polygon_arrays import face_area_vectors
 from .representation import (
     complex_bincount,
     face_frames,
@@ -23,8 +32,22 @@ from .representation import (
     unit_complex,
 )
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, face_area_vectors
-from .turning_angles import turning_angles
+from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
+from .surface import Surface
+from .turning_angles import added_resistance, turning_angles
+
+#: Residual norm at which the solver stops, relative to the norm of the right-hand side.
+TOLERANCE = 1e-8
+
+#: Number of times that the field is kept from turning too fast between two faces.
+MAX_ATTEMPTS = 8
+
+#: Number of times that the multiples of the guides are improved.
+MAX_ROUNDS = 12
+
+#: Penalty of the nodes without a guide, relative to the stiffness of their edges, so that all angles are
+#: defined.
+REGULARIZATION = 1e-9
 
 
 class TurningError(RosyError):
@@ -33,7 +56,7 @@ class TurningError(RosyError):
     Attributes
     ----------
     vertices : (n,) intp ndarray
-        Those of the edges between such faces.
+        Vertices of the edges between such faces.
     """
 
     def __init__(self, vertices: np.ndarray, message: str) -> None:
@@ -70,7 +93,7 @@ def prescribed_field(
     Returns
     -------
     RosyField
-        Of magnitude 1; zero on faces without area.
+        A field of magnitude 1; zero on faces without area.
 
     Raises
     ------
@@ -108,14 +131,14 @@ def change_singularities(
         A RoSy.
     vertex : (K,) int ndarray
     change : (K,) int ndarray
-        What is added to the index of each vertex, in units of 1 / N.
+        Amount that is added to the index of each vertex, in units of 1 / N.
     reach : float
         Distance over which the change of direction falls off, in object space.
 
     Returns
     -------
     RosyField
-        With the magnitude of the field.
+        A field of the same magnitude.
 
     Raises
     ------
@@ -152,7 +175,10 @@ def _turning(
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The results of `turning_angles` that give vertices their indices, where nodes have (n,) defects."""
+    """Return the angles and directions of a field with given indices; see `turning_angles`.
+
+    `defect` is (n,) angle defects of the vertex nodes. `present` is the angles of a field that are changed.
+    """
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
@@ -172,7 +198,7 @@ def _bent(
     target: np.ndarray,
     reach: float,
 ) -> np.ndarray:
-    """(F,) the representation z, turned to a target where there is one, with the same singularities."""
+    """Return (F,) the representation z, rotated toward a target without changing singularities."""
     area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     penalty = np.linalg.norm(area, axis=1) / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
@@ -183,7 +209,7 @@ def _bent(
 def index_at_nodes(
     surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
 ) -> np.ndarray:
-    """(n,) int64 indices of the vertex nodes. That of a vertex is at its first node."""
+    """Return (n,) int64 indices of the vertex nodes. The index of a vertex is given to its first node."""
     vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
@@ -259,6 +285,110 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
-    """(F,) factors that turn the representation z to a target as a whole, on each connected component."""
+    """Return (F,) factors that rotate z toward a target, the same factor on each connected component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
     return unit_complex(total, otherwise=1)[component]
+
+
+def guided_rotation(
+    graph: FaceGraph,
+    degree: int,
+    turning: np.ndarray,
+    z: np.ndarray,
+    target: np.ndarray,
+    penalty: np.ndarray,
+) -> np.ndarray:
+    """Compute the angle by which a field turns to follow guides.
+
+    Parameters
+    ----------
+    graph : FaceGraph
+    degree : int
+        N.
+    turning : (I,) ndarray
+        Angles by which the field turns at the edges; see `turning_angles`.
+    z : (F,) complex ndarray
+        Representation of the field, of modulus 1 or 0.
+    target : (F,) complex ndarray
+        Representation of the guides, 0 where there is none.
+    penalty : (F,) ndarray
+        Weight of the squared difference from the guide. Squared angles at edges of conductance 1 have the
+        weight 1.
+
+    Returns
+    -------
+    (F,) float64 ndarray
+        Angle in radians. It turns no edge by half the angle between two members or more, unless the guides
+        require that.
+    """
+    offset = target * z.conj()
+    is_guide = (offset != 0) & (penalty > 0)
+    if not is_guide.any():
+        return np.zeros(len(z))
+    penalty = np.where(is_guide, penalty, 0.0)
+    stiffness = 1 / graph.conductance
+    wanted = np.angle(offset) / degree
+    sector, limit = 2 * np.pi / degree, np.pi / degree
+    angle = None
+    for attempt in range(MAX_ATTEMPTS):
+        rest = 0.5**attempt
+        matrix = _system(graph, stiffness, penalty)
+        with progress(1 - rest, 1 - 0.9 * rest):
+            levels = hierarchy(matrix)
+        if angle is None:
+            with progress(1 - 0.9 * rest, 1 - 0.7 * rest):
+                angle = _initial_angle(graph, stiffness, matrix, levels, offset, penalty)
+            angle /= degree
+        for index in range(MAX_ROUNDS):
+            multiple = np.rint((angle - wanted) / sector)
+            rhs = penalty * (wanted + sector * multiple)
+            shares = (0.5 + 0.2 * 0.5**step for step in (index, index + 1))
+            with progress(*(1 - share * rest for share in shares)):
+                angle = _solve(matrix, rhs, levels)
+            if np.array_equal(multiple[is_guide], np.rint((angle - wanted) / sector)[is_guide]):
+                break
+        added = angle[graph.target] - angle[graph.source]
+        if np.abs(turning + added).max(initial=0.0) < limit:
+            break
+        stiffness = stiffness * added_resistance(added, turning, limit)
+    return angle
+
+
+def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
+    """Return the Laplacian of the faces, with the penalty on its diagonal."""
+    ends = np.concatenate([graph.source, graph.target])
+    diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
+    diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
+    return from_edges(graph.source, graph.target, -stiffness, diagonal)
+
+
+def _initial_angle(
+    graph: FaceGraph,
+    stiffness: np.ndarray,
+    matrix: CSRMatrix,
+    levels: list[Level],
+    offset: np.ndarray,
+    penalty: np.ndarray,
+) -> np.ndarray:
+    """Return (F,) N times an angle near the guides: the least-squares unwrapping of their smoothed phases."""
+    unit = unit_complex(offset)
+    with progress(0.0, 0.3):
+        mean = _solve(matrix, penalty * unit, levels)
+    difference = np.angle(mean[graph.target] * mean[graph.source].conj())
+    count = len(offset)
+    divergence = np.bincount(graph.target, stiffness * difference, count)
+    divergence -= np.bincount(graph.source, stiffness * difference, count)
+    laplacian = _system(graph, stiffness, np.zeros(count))
+    with progress(0.3, 1.0):
+        angle = _solve(laplacian, divergence, None)
+    rest = penalty * unit * np.exp(-1j * angle)
+    parts = int(graph.component.max(initial=-1)) + 1
+    return angle + np.angle(complex_bincount(graph.component, rest, parts))[graph.component]
+
+
+def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
+    """Solve a system; see `conjugate_gradient`."""
+    precondition = None if levels is None else partial(w_cycle, levels)
+    return conjugate_gradient(
+        matrix, rhs, TOLERANCE, precondition, "turning the field to the guides"
+    )

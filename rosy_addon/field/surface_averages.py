@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core.progress import report
 from .connection import BLOCK_TRIANGLES, Connection, laplacian
 from .frames import dot
 from .representation import complex_bincount
@@ -102,7 +101,7 @@ class SurfaceAverages:
         return complex_bincount(node, terms * to_node, count)
 
     def face_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(F,) complex128: (n,) node values at the corners of triangles times the areas, added up."""
+        """Return (F,) complex128, the sum of (n,) node values at triangle corners, weighted by triangle areas."""
         area = self.connection.area
         weighted = np.empty((len(area), 3), dtype=np.complex128)
         node, frame_angle = (
@@ -119,7 +118,7 @@ class SurfaceAverages:
         return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
 
     def face_means(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(F,) complex128: mean of the node values of a degree on each face."""
+        """Return (F,) complex128, mean of the node values of a degree on each face."""
         total, surface = self.face_sums(values, degree), self.surface
         area = np.bincount(surface.triangle_face, 3 * self.connection.area, surface.face_count)
         return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
@@ -143,14 +142,14 @@ class SurfaceAverages:
         area : float
             The square of the length of the average.
         sums : (n,) ndarray
-            From `node_sums`.
+            Result of `node_sums`.
         start : (n,) ndarray, optional
             An estimate of the solution.
 
         Returns
         -------
         (n,) ndarray
-            Of the precision of `sums`.
+            Solution in the precision of `sums`.
         """
         dtype = matrix.data.dtype
         scale = float(np.abs(sums).max())
@@ -170,8 +169,7 @@ class SurfaceAverages:
         residual = right - apply(solution)
         limit = AVERAGE_TOLERANCE**2 * np.vdot(right, right / diagonal).real
         direction, previous = np.zeros_like(right), np.float32(1.0)
-        for step in range(MAX_STEPS):
-            report(1 - 0.95**step, "averaging curvature")
+        for _ in range(MAX_STEPS):
             preconditioned = residual / diagonal
             current = np.vdot(residual, preconditioned).real
             if current <= limit:

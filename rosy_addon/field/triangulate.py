@@ -6,16 +6,11 @@ import heapq
 
 import numpy as np
 
-from ..core.progress import report
-
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
 
 #: Corners that are compared with a triangle at once.
 CHUNK_SIZE = 512
-
-#: Label of the progress.
-LABEL = "triangulating the mesh"
 
 #: Faces whose corners are compared at once.
 FACES_PER_BLOCK = 1 << 14
@@ -54,12 +49,9 @@ def triangulate(
     apex = np.zeros(len(size), dtype=np.int32)
     faces = np.flatnonzero(size > 3)
     apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
-    ear_faces = faces[needs_ears]
-    report(0.7, LABEL)
     triangles, triangle_face = _triangle_fans(face_start, apex)
     first_triangle = np.cumsum(size - 2) - (size - 2)
-    for rank, face in enumerate(ear_faces):
-        report(0.8 + 0.2 * rank / len(ear_faces), LABEL)
+    for face in faces[needs_ears]:
         corners = np.arange(face_start[face], face_start[face + 1])
         ears = _ear_clip(_project_to_plane(vertices[corner_vertex[corners]]))
         first = first_triangle[face]
@@ -68,7 +60,7 @@ def triangulate(
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`triangles` and `triangle_face` of fans; (F,) `apex` is the corner within each face."""
+    """Return `triangles` and `triangle_face` of fans around (F,) `apex`, a corner of each face, from 0."""
     size = np.diff(face_start)
     count = size - 2
     triangle_face = np.repeat(np.arange(len(size), dtype=np.int32), count)
@@ -118,7 +110,7 @@ def _fan_apexes(
 
 
 def _corner_sines(points: np.ndarray) -> np.ndarray:
-    """(F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
+    """Return (F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
     edge = np.roll(points, -1, axis=1) - points
     previous_edge = np.roll(edge, 1, axis=1)
     relative = points - points[:, :1]
@@ -130,7 +122,7 @@ def _corner_sines(points: np.ndarray) -> np.ndarray:
 
 
 def _project_to_plane(points: np.ndarray) -> np.ndarray:
-    """(k, 2) corners of a polygon projected along its normal, in counter-clockwise order."""
+    """Return (k, 2) corners of a polygon projected along its normal, in counter-clockwise order."""
     relative = points - points[0]
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = np.zeros(3)
@@ -256,12 +248,12 @@ class _RemainingCorners:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(...) z components of the cross products of (..., 2) vectors."""
+    """Return (...) z components of the cross products of (..., 2) vectors."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """(k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
+    """Return (k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
     area = _cross(b - a, c - a)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)

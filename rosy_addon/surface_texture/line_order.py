@@ -32,9 +32,10 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
+from ..field.connectivity import connected_components
 from ..field.representation import power
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface, build_surface, connected_components
+from ..field.surface import Surface, build_surface
 from ..field.surface_averages import SurfaceAverages
 from ..line_drawing.tangent_mesh import (
     TangentMesh,

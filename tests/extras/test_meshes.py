@@ -10,7 +10,8 @@ from extras.rotations import rotation
 
 from rosy_addon.external.simulation_files import SimulationMesh, read_simulation
 from rosy_addon.field.mesh_io import SHARP_ANGLE
-from rosy_addon.field.surface import Surface, build_surface, face_area_vectors
+from rosy_addon.field.polygon_arrays import face_area_vectors
+from rosy_addon.field.surface import Surface, build_surface
 
 
 def surface_of(mesh: SimulationMesh) -> Surface:

@@ -11,7 +11,7 @@ from numpy.random import Generator
 
 from rosy_addon.cli.parser import _build_parser
 from rosy_addon.compositor.look import Look
-from rosy_addon.core.settings import Choice, Color, Setting, Switch, settings_of
+from rosy_addon.core.settings import Choice, Color, Numbers, Setting, Switch, settings_of
 from rosy_addon.preset_files.store import preset_keys
 
 from .damage import random_word
@@ -86,7 +86,8 @@ def _value(rng: Generator, action: argparse.Action) -> str:
     if action.dest == "set":
         settings = list(settings_of(Look).values())
         setting = settings[rng.integers(len(settings))]
-        return f"{setting.name}={setting_value(rng, setting)}"
+        value = setting_value(rng, setting)
+        return f"{setting.name}={','.join(map(str, value)) if isinstance(value, list) else value}"
     values = list(action.choices or (preset_keys() if action.dest == "preset" else ()))
     values = values or [text for text in CANDIDATES if _accepts(action, text)]
     return str(values[rng.integers(len(values))])
@@ -108,6 +109,8 @@ def setting_value(rng: Generator, setting: Setting) -> Any:
         return list(setting.options)[rng.integers(len(setting.options))]
     if isinstance(setting, Color):
         return f"#{rng.integers(1 << 24):06x}"
+    if isinstance(setting, Numbers):
+        return [float(rng.uniform(low, high)) for low, high in setting.parts.values()]
     low, high, default = setting.low, setting.high, setting.default
     near = min(max(default * 10.0 ** rng.uniform(-1, 1), low), high)
     value = (low, high, rng.uniform(low, high), near, near, near)[rng.integers(6)]

@@ -15,6 +15,7 @@ Angles are in radians, except those of a view, which are in degrees.
 The names that are imported here are public; `rosy_addon.__all__` lists them.
 """
 
+from ..compositor.picture import Picture as Picture
 from ..core.errors import RosyError as RosyError
 from ..core.errors import RosyWarning as RosyWarning
 from .comparison import Comparison as Comparison
@@ -42,7 +43,6 @@ from .generators import form as form
 from .generators import guided as guided
 from .generators import prescribed as prescribed
 from .generators import smoothest as smoothest
-from .pictures import Picture as Picture
 from .pictures import ambient_occlusion as ambient_occlusion
 from .pictures import list_presets as list_presets
 from .pictures import render as render

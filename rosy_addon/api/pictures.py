@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..compositor.look import Look
+from ..compositor.picture import Picture
 from ..core.cache import Cache
 from ..core.color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..core.errors import RosyError
-from ..image_io.png import png_bytes, read_png, to_srgb_uint8, write_png
+from ..image_io.png import read_png
 from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
@@ -44,61 +45,6 @@ SUPERSAMPLING = 2
 
 #: The tone attribute that is the luminance of the vertex colors, as Blender calls it.
 VERTEX_COLOR = "Color"
-
-
-class Picture:
-    """A picture. A notebook shows it, and `numpy.asarray` makes it an array.
-
-    The array is (H, W, 4) uint8, sRGB with straight alpha, the top row first, as
-    ``matplotlib.pyplot.imshow`` and ``PIL.Image.fromarray`` take it.
-
-    Parameters
-    ----------
-    rgba : (H, W, 4) float32 ndarray
-
-    Attributes
-    ----------
-    rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied, the bottom row first.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import rosyfields as rf
-    >>> picture = rf.render(rf.Surface("torus.obj"), size=(64, 48))
-    >>> np.asarray(picture).shape
-    (48, 64, 4)
-    >>> picture.save("torus.png")
-    """
-
-    def __init__(self, rgba: NDArray[np.float32]) -> None:
-        self.rgba = rgba
-
-    def __repr__(self) -> str:
-        return f"<Picture: {self.rgba.shape[1]} x {self.rgba.shape[0]} pixels>"
-
-    def __array__(
-        self, dtype: np.dtype[Any] | None = None, copy: bool | None = None
-    ) -> NDArray[Any]:
-        if copy is False:
-            raise ValueError("a Picture has no array of display values that could be shared")
-        array = to_srgb_uint8(self.rgba[::-1])
-        return array if dtype is None else array.astype(dtype)
-
-    def _repr_png_(self) -> bytes:
-        return png_bytes(self.rgba)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an 8-bit ``.png`` file.
-
-        Raises
-        ------
-        RosyError
-            If the name does not end in ``.png``, or the file cannot be written.
-        """
-        if Path(path).suffix.lower() != ".png":
-            raise RosyError(f"{path}: the name of the file must end in .png")
-        write_png(path, self.rgba)
 
 
 def list_presets() -> dict[str, str]:
@@ -231,8 +177,7 @@ def render(
         reference_luminance=reference,
         reference_name=name,
     )
-    # Only the pixels are kept, not the layers of the picture.
-    return Picture(draw_picture(picture_view, workers=workers).rgba)
+    return draw_picture(picture_view, workers=workers)
 
 
 def turntable(

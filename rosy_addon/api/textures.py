@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..compositor.look import Look, is_hatched
+from ..compositor.picture import Picture
 from ..compositor.shading import Light
 from ..core.color import to_linear
 from ..core.errors import RosyError
@@ -26,7 +27,7 @@ from ..surface_texture.draw import (
 )
 from .field import Field, warn
 from .generators import uv_map
-from .pictures import Picture, corner_numbers, upright_instance
+from .pictures import corner_numbers, upright_instance
 from .surface import Surface
 
 #: What stands for the number of the tile in the name of a file, as in Blender.

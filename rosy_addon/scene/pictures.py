@@ -22,7 +22,7 @@ import numpy as np
 from ..compositor.picture import Picture
 from ..core.errors import RosyError
 from ..core.file_io import check_folder
-from ..image_io.image_data import ImageData
+from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from .bake_records import (
     DrawnFrom,
@@ -257,7 +257,7 @@ def apply_picture(
         )
         matrices = _object_to_clip_matrices(scene_data, camera)
         node_groups = _new_groups(material, matrices, created)
-    store_record(scene, camera.name, image, material, drawn_from, size=image_data[:2])
+    store_record(scene, camera.name, image, material, drawn_from, size=image_size(image_data))
     _show_on_objects(node_groups)
     warnings = (*scene_data.warnings, *_display_warnings(scene))
     return BakeResult(camera.name, image, material, tuple(matrices), picture, warnings)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.errors import RosyError
-from ..image_io.image_data import ImageData
+from ..image_io.image_data import ImageData, image_size
 from ..projection.gbuffer import MeshInstance
 from .bake_records import DrawnFrom, recorded_materials, store_record
 from .blender_images import new_image, new_tiled_image
@@ -144,7 +144,7 @@ def apply_texture(
         node_group = new_group(name, material, None)
         created.append(node_group)
     drawn_from = DrawnFrom(obj, {None: state}, "cpu", is_texture=True)
-    store_record(scene, obj.name, image, material, drawn_from, size=(first.width, first.height))
+    store_record(scene, obj.name, image, material, drawn_from, size=image_size(first))
     # The object keeps its pictures, but no other texture.
     set_picture_modifier(obj, node_group, recorded_materials(textures=False))
     delete_unused()

@@ -17,12 +17,12 @@ PACKAGE = ROOT / "rosy_addon"
 #: What each room may import besides `core` and itself.
 MAY_IMPORT = {
     "core": set(),
+    "image_io": set(),
     "field": set(),
     "projection": {"field"},
     "annotation": {"field", "projection"},
-    "compositor": {"field", "projection", "annotation"},
+    "compositor": {"field", "projection", "annotation", "image_io"},
     "line_drawing": {"field", "projection", "annotation"},
-    "image_io": set(),
     "surface_texture": {"field", "projection", "compositor", "line_drawing", "image_io"},
     "worker": {"field", "projection", "compositor"},
     "rendering": {"field", "projection", "annotation", "compositor", "worker", "image_io"},

@@ -18,13 +18,14 @@ The names that are imported here are public; `rosy_addon.__all__` lists them.
 from ..compositor.picture import Picture as Picture
 from ..core.errors import RosyError as RosyError
 from ..core.errors import RosyWarning as RosyWarning
+from ..field.field import Difference as Difference
+from ..field.field import Field as Field
+from ..field.field import Singularities as Singularities
+from ..field.surface import Surface as Surface
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .drawings import Drawing as Drawing
 from .drawings import strokes as strokes
-from .field import Difference as Difference
-from .field import Field as Field
-from .field import Singularities as Singularities
 from .field import from_angles as from_angles
 from .field import from_array as from_array
 from .field import from_directions as from_directions
@@ -47,6 +48,5 @@ from .pictures import ambient_occlusion as ambient_occlusion
 from .pictures import list_presets as list_presets
 from .pictures import render as render
 from .pictures import turntable as turntable
-from .surface import Surface as Surface
 from .textures import Texture as Texture
 from .textures import texture as texture

@@ -17,7 +17,7 @@ from ..field.analysis import (
     format_degrees,
     match_on_surface,
 )
-from .field import Difference, Field
+from ..field.field import Difference, Field
 
 #: Characters that LaTeX would interpret, and what prints them.
 _LATEX = {
@@ -110,7 +110,7 @@ class Comparison:
             return row
         difference, matching = self.differences[title], self.matchings[title]
         has_worst = difference.worst_face >= 0
-        center = field.surface.mesh.face_center
+        center = field.surface.face_center
         row |= {
             name: float(np.degrees(getattr(difference, name)))
             for name in ("mean", "rms", "p95", "max")
@@ -207,11 +207,11 @@ def compare(
     differences: dict[str, Difference] = {}
     matchings: dict[str, SingularityMatching] = {}
     for title, field in list(titled.items())[1:]:
-        if field.degree != reference.degree or field.surface.mesh is not reference.surface.mesh:
+        if field.degree != reference.degree or field.surface is not reference.surface:
             continue
         differences[title] = reference.difference(field)
         pair = reference.singularities, field.singularities
-        matchings[title] = match_on_surface(field.surface.mesh, *pair, reach)
+        matchings[title] = match_on_surface(field.surface, *pair, reach)
     return Comparison(titled, differences, matchings)
 
 

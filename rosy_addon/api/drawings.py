@@ -15,16 +15,16 @@ from ..compositor.shading import lights_of
 from ..core.errors import RosyError
 from ..core.file_io import write_bytes
 from ..core.settings import settings_of
+from ..field.field import Field
+from ..field.surface import Surface
+from ..field.up_axis import UP_AXIS_MATRIX
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
 from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
 from ..projection.camera import Camera, check_size, orbit_camera
-from ..projection.up_axis import UP_AXIS_MATRIX
 from ..rendering.mesh_view import check_light
-from .field import Field
 from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, upright_instance
-from .surface import Surface
 
 
 class Drawing:
@@ -36,7 +36,7 @@ class Drawing:
     camera : rosyfields.projection.camera.Camera
     pen : rosyfields.line_drawing.svg.Pen
     up : {"y", "z"}
-        The upward axis of the mesh.
+        The axis of the mesh that points up.
 
     Examples
     --------

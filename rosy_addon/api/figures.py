@@ -24,6 +24,7 @@ from ..core.color import color_stops, map_colors
 from ..core.errors import RosyError, counted
 from ..core.file_io import write_bytes
 from ..field.analysis import DEFAULT_REACH, format_degrees
+from ..field.field import Field
 from ..image_io.png import to_srgb_uint8
 from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance
@@ -31,7 +32,6 @@ from ..projection.visible_vertices import project_vertices
 from ..rendering.draw import draw_picture
 from ..rendering.view_input import ViewInput
 from .comparison import Comparison, compare, titled_fields
-from .field import Field
 from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
 
 if TYPE_CHECKING:

@@ -17,18 +17,18 @@ from ..compositor.look import Look
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..field.carry import vectors_on_rest_shape
+from ..field.field import Field
 from ..field.frames import normalize
 from ..field.interpolation import interpolate_fields
 from ..field.representation import face_representation
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface as PolygonMesh
-from ..field.surface import face_area_vectors, have_same_polygons
+from ..field.surface import Surface, face_area_vectors, have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.turntable import Encoder, turntable
 from ..rendering.view_input import ViewInput
-from .field import Field, warn
+from .field import warn
 from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, default_encoder, picture_look
 
 #: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
@@ -239,29 +239,29 @@ class Film:
         self.advice = _advice(survey.turn, self._between, look)
         camera = orbit_camera(survey.points, *self._framing, perspective=self.perspective)
         loop_frames = self.picture_count if self.loop else 0
-        for number, (surface, field, up) in enumerate(self._moments()):
+        for number, (surface, field) in enumerate(self._moments()):
             if rest is not None:
                 vectors = vectors_on_rest_shape(surface, rest, field.vectors)
                 field = replace(field, vectors=vectors, source_directions=None)
-                surface = replace(surface, rest_vertices=rest)
+                surface = surface.with_parts(rest_vertices=rest)
             frame_look = flow_at(look, number, loop_frames)
-            yield ViewInput((mesh_instance(surface, field, up),), camera, frame_look)
+            yield ViewInput((mesh_instance(surface, field),), camera, frame_look)
 
-    def _moments(self) -> Iterator[tuple[PolygonMesh, RosyField, str]]:
-        """Yield the meshes and fields of the pictures, with their upward axes."""
+    def _moments(self) -> Iterator[tuple[Surface, RosyField]]:
+        """Yield the meshes and fields of the pictures."""
         count, stop = len(self.fields), self._between + 1
         previous = self.fields[0]
         for number in range(1, count + self.loop):
             field = self.fields[number % count]
-            start = previous.surface.mesh, previous.rosy
-            yield *start, previous.surface.up
+            start = previous.surface, previous
+            yield start
             for index in range(1, stop):
-                share, end = index / stop, (field.surface.mesh, field.rosy)
+                share, end = index / stop, (field.surface, field)
                 mesh = _mesh_between(start[0], end[0], share)
-                yield mesh, interpolate_fields(start, end, share, mesh), previous.surface.up
+                yield mesh, interpolate_fields(start, end, share, mesh)
             previous = field
         if not self.loop:
-            yield previous.surface.mesh, previous.rosy, previous.surface.up
+            yield previous.surface, previous
 
     @cached_property
     def _survey(self) -> _Survey:
@@ -273,20 +273,20 @@ class Film:
             field = previous if number == 0 else self.fields[number]
             has_same = self._check(number, field, previous)
             keeps_polygons &= has_same
-            mesh = field.surface.mesh
-            if keeps_polygons and mesh is not first.surface.mesh:
-                moves |= not np.array_equal(mesh.vertices, first.surface.mesh.vertices)
+            mesh = field.surface
+            if keeps_polygons and mesh is not first.surface:
+                moves |= not np.array_equal(mesh.vertices, first.surface.vertices)
             if has_same:
                 turn = max(turn, _mean_turn(previous, field))
             largest = max(largest, float(field.magnitude.max()))
-            if number == 0 or mesh is not previous.surface.mesh:
-                instance = mesh_instance(mesh, field.rosy, field.surface.up)
+            if number == 0 or mesh is not previous.surface:
+                instance = mesh_instance(mesh, field)
                 points = np.concatenate([points, instance.face_points()])
                 points = framing_points(points, *self._framing, perspective=self.perspective)
             previous = field
         if self.loop and self._check(0, first, previous):
             turn = max(turn, _mean_turn(previous, first))
-        rest = first.surface.mesh.vertices if keeps_polygons and moves else None
+        rest = first.surface.vertices if keeps_polygons and moves else None
         return _Survey(points, largest, turn, keeps_polygons, rest)
 
     def _check(self, number: int, field: Field, previous: Field) -> bool:
@@ -302,7 +302,7 @@ class Film:
             raise RosyError(
                 f"{name} has degree {field.degree}, but the one before it {previous.degree}"
             )
-        mesh, other = field.surface.mesh, previous.surface.mesh
+        mesh, other = field.surface, previous.surface
         has_same = mesh is other or have_same_polygons(mesh, other)
         if self.between and not has_same:
             raise RosyError(
@@ -312,19 +312,19 @@ class Film:
         return has_same
 
 
-def _mesh_between(first: PolygonMesh, second: PolygonMesh, share: float) -> PolygonMesh:
+def _mesh_between(first: Surface, second: Surface, share: float) -> Surface:
     """Return a mesh between two with the same polygons. Fans and triangles are those of the first."""
     if first is second:
         return first
     vertices = (1 - share) * first.vertices + share * second.vertices
     normal = normalize((1 - share) * first.corner_normal + share * second.corner_normal)
-    return replace(first, vertices=vertices, corner_normal=normal)
+    return first.with_parts(vertices=vertices, corner_normal=normal)
 
 
 def _mean_turn(first: Field, second: Field) -> float:
     """Return the mean angle in radians between two fields on the same polygons, weighted by area."""
-    mesh = second.surface.mesh
-    z, other = (face_representation(field.surface.mesh, field.rosy) for field in (first, second))
+    mesh = second.surface
+    z, other = (face_representation(field.surface, field) for field in (first, second))
     vectors = face_area_vectors(mesh.vertices, mesh.corner_vertex, mesh.face_start)
     weight = np.linalg.norm(vectors, axis=1) * ((z != 0) & (other != 0))
     angle = np.abs(np.angle(z * other.conj())) / first.degree

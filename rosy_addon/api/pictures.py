@@ -18,6 +18,8 @@ from ..compositor.picture import Picture
 from ..core.cache import Cache
 from ..core.color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..core.errors import RosyError
+from ..field.field import Field, check_same_surface
+from ..field.surface import Surface
 from ..image_io.png import read_png
 from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..projection.ambient_occlusion import DIRECTION_COUNT
@@ -29,9 +31,7 @@ from ..rendering import turntable as turntable_video
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.turntable import Encoder
-from .field import Field, check_same_surface
 from .generators import form, uv_map
-from .surface import Surface
 
 #: Azimuth and elevation in degrees: from the front left, looking slightly down.
 DEFAULT_VIEW = (-25.0, 20.0)
@@ -90,7 +90,7 @@ def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> ND
     >>> rf.ambient_occlusion(square, directions=16)
     array([1., 1., 1., 1.], dtype=float32)
     """
-    return corner_occlusion([mesh_instance(surface.mesh, None, surface.up)], 0, directions)
+    return corner_occlusion([mesh_instance(surface)], 0, directions)
 
 
 def render(
@@ -330,7 +330,7 @@ def upright_instance(
     """Return a surface with its field in world space, upright."""
     field = form(surface) if field is None else field
     check_same_surface(surface, field)
-    return mesh_instance(surface.mesh, field.rosy, surface.up, tone, color_values)
+    return mesh_instance(surface, field, tone, color_values)
 
 
 def corner_numbers(
@@ -355,7 +355,6 @@ def corner_numbers(
     """
     if color_values is None:
         return None
-    mesh = surface.mesh
     if isinstance(color_values, str):
         # Faces are listed first, and count if vertices have an array of the same name.
         data = {**surface.face_data, **surface.vertex_data, **surface.face_data}
@@ -366,7 +365,7 @@ def corner_numbers(
         array = np.asarray(color_values, dtype=np.float64)
     except (TypeError, ValueError):
         raise RosyError(f"{surface.name}: color_values must be numbers") from None
-    counts = surface.face_count, len(surface.vertices), len(mesh.corner_vertex)
+    counts = surface.face_count, len(surface.vertices), len(surface.corner_vertex)
     if array.ndim != 1 or len(array) not in counts:
         raise RosyError(
             f"{surface.name}: color_values must be {counts[0]:,} numbers, one for each face, "
@@ -374,9 +373,9 @@ def corner_numbers(
             f"shape {array.shape}"
         )
     if len(array) == counts[0]:
-        array = array[mesh.corner_face]
+        array = array[surface.corner_face]
     elif len(array) == counts[1]:
-        array = array[mesh.corner_vertex]
+        array = array[surface.corner_vertex]
     numbers: NDArray[np.float32] = array.astype(np.float32)
     numbers[~np.isfinite(numbers)] = np.nan
     return numbers
@@ -404,7 +403,7 @@ def _surface_tone(
         if isinstance(values, str):
             values = _named_tone(surface, values)
         array = np.asarray(values, dtype=np.float64)
-        counts = len(surface.vertices), len(surface.mesh.corner_vertex)
+        counts = len(surface.vertices), len(surface.corner_vertex)
         if array.ndim != 1 or len(array) not in counts:
             raise RosyError(
                 f"{surface.name}: tone_values must be {counts[0]:,} numbers, one for each vertex, or "
@@ -413,7 +412,7 @@ def _surface_tone(
         if not np.isfinite(array).all():
             raise RosyError(f"{surface.name}: tone_values has values that are not finite")
         if len(array) == counts[0]:
-            array = array[surface.mesh.corner_vertex]
+            array = array[surface.corner_vertex]
         return SurfaceTone(array[:, None].astype(np.float32))
     if image is not None:
         return SurfaceTone(uv_map(surface).astype(np.float32), _image_luminance(image))

@@ -15,7 +15,9 @@ from ..compositor.picture import Picture
 from ..compositor.shading import Light
 from ..core.color import to_linear
 from ..core.errors import RosyError
+from ..field.field import Field
 from ..field.frames import unit_direction
+from ..field.surface import Surface
 from ..preset_files.store import default_user_folder, load_preset
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
@@ -25,10 +27,9 @@ from ..surface_texture.draw import (
     check_texture_size,
     draw_texture,
 )
-from .field import Field, warn
+from .field import warn
 from .generators import uv_map
 from .pictures import corner_numbers, upright_instance
-from .surface import Surface
 
 #: What stands for the number of the tile in the name of a file, as in Blender.
 UDIM_TOKEN = "<UDIM>"

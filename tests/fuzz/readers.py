@@ -22,8 +22,8 @@ with atheris.instrument_imports(include=["rosy_addon"]):
     from rosy_addon.field.field_io import READ_SUFFIXES, load_field
     from rosy_addon.field.formats.guide_strokes import read_guide_strokes
     from rosy_addon.field.formats.sings import read_sings
-    from rosy_addon.field.mesh_io import READERS, read_mesh
-    from rosy_addon.field.surface import build_surface
+    from rosy_addon.field.mesh_io import READERS
+    from rosy_addon.field.surface import Surface, build_surface
     from rosy_addon.image_io.png import read_png
     from rosy_addon.preset_files.store import read_preset
 
@@ -71,7 +71,7 @@ def main() -> None:
 def _reader(kind: str) -> Callable[[Path], Any]:
     """Return the function that reads files of a kind: an extension, or "guides.txt"."""
     if kind in READERS:
-        return read_mesh
+        return Surface
     if kind in READ_SUFFIXES:
         return lambda path: load_field(path, PYRAMID)
     return {

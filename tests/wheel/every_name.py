@@ -20,7 +20,7 @@ def surfaces() -> rf.Surface:
     cube = rf.Surface(vertices, faces, name="cube", up="z", uv=vertices[:, :2], sharp_angle=0.5)
     counts: tuple[int, int] = cube.face_count, cube.euler_characteristic
     axes: tuple[NDArray[np.float64], NDArray[np.float64]] = cube.face_frames
-    arrays: list[NDArray[np.float64]] = [cube.vertices, cube.face_normals, *axes]
+    arrays: list[NDArray[np.float64]] = [cube.vertices, cube.face_normal, *axes]
     corners: NDArray[np.int32] | list[NDArray[np.int32]] = cube.faces
     uv: NDArray[np.float64] | None = cube.uv
     data: list[Mapping[str, NDArray[Any]]] = [cube.vertex_data, cube.face_data]

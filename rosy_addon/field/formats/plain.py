@@ -16,9 +16,8 @@ import numpy as np
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
 from ...core.progress import progress
-from ..blocks import row_blocks
+from ..blocks import as_float64, row_blocks
 from ..rosy_field import MAX_DEGREE
-from ..validate import as_float64
 from .polygons import RawField
 from .text_rows import ROWS_PER_BLOCK, format_blocks, read_rows
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 import io
-import pkgutil
-import sys
 
 import numpy as np
 import pytest
 from PIL import Image
-from public_signatures import public_names
 from shapes import icosphere, torus
 
 import rosy_addon as rf
-from rosy_addon import api
 from rosy_addon.api.pictures import corner_numbers
-from rosy_addon.api.surface import MeshArrays
 from rosy_addon.cli.parser import main
+from rosy_addon.compositor.look import Look
+from rosy_addon.core.settings import settings_of
+from rosy_addon.field import mesh_arrays
 from rosy_addon.field.formats.polygons import offsets_from_sizes
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
@@ -37,12 +36,10 @@ def field(sphere):
     return rf.smoothest(sphere)
 
 
-def test_public_names_are_no_modules():
-    """A submodule of the same name would replace a function when it is imported."""
-    modules = {module.name for module in pkgutil.iter_modules(rf.__path__)}
-    assert not modules & set(rf.__all__)
-    assert rf.__all__ == public_names(api)
-    assert all(getattr(rf, name) is getattr(api, name) for name in rf.__all__)
+@pytest.mark.parametrize("draw", [rf.render, rf.texture, rf.turntable])
+def test_parameters_do_not_hide_settings(draw):
+    """Functions that draw pictures take the settings of the look as keywords, too."""
+    assert not settings_of(Look).keys() & inspect.signature(draw).parameters.keys()
 
 
 @pytest.mark.parametrize(
@@ -56,7 +53,7 @@ def test_public_names_are_no_modules():
 )
 def test_faces_of_any_kind(faces, sizes):
     surface = rf.Surface([*SQUARE, [0.5, -1, 0]], faces)
-    assert np.array_equal(surface.mesh.face_start, offsets_from_sizes(sizes))
+    assert np.array_equal(surface.face_start, offsets_from_sizes(sizes))
     assert [list(face) for face in surface.faces] == [list(map(int, face)) for face in faces]
     assert [len(face) for face in surface.faces] == sizes
 
@@ -94,8 +91,8 @@ def test_meshes_that_are_refused(arguments, options, expected, error_of):
 
 
 def test_the_extension_reads_no_simulations(error_of, monkeypatch):
-    """The module that reads them is not in it."""
-    monkeypatch.setitem(sys.modules, "rosy_addon.external.simulation_files", None)
+    """The readers are not in it."""
+    monkeypatch.setattr(mesh_arrays, "SIMULATION_READERS", {})
     message = error_of(rf.Surface, "a.vtu")
     assert message == "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply or .stl"
 
@@ -154,10 +151,10 @@ def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
 
 def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
     """Vectors of faces give the same field; the array is found by its name, or as the only one."""
-    arrays = MeshArrays(
+    arrays = mesh_arrays.MeshArrays(
         sphere.vertices,
-        sphere.mesh.corner_vertex,
-        sphere.mesh.face_start,
+        sphere.corner_vertex,
+        sphere.face_start,
         vertex_data={"p": sphere.vertices[:, 2]},
         face_data={"U": field.vectors},
     )

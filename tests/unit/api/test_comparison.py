@@ -27,7 +27,7 @@ def sphere():
 def members(surface, vectors, degree):
     """The members of one face: a vector rotated about the normal."""
     angles = 2 * np.pi * np.arange(degree) / degree
-    for vector, normal in zip(vectors, surface.face_normals, strict=True):
+    for vector, normal in zip(vectors, surface.face_normal, strict=True):
         perpendicular = np.cross(normal, vector)
         yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * perpendicular
 
@@ -67,7 +67,7 @@ def test_the_face_of_the_largest_angle(sphere):
     turn = np.zeros(sphere.face_count)
     turn[:] = 0.1
     turn[7] = 0.4
-    x, y = one.vectors, np.cross(sphere.face_normals, one.vectors)
+    x, y = one.vectors, np.cross(sphere.face_normal, one.vectors)
     other = rf.from_vectors(sphere, np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * y, degree=1)
     row = rf.compare([one, other]).rows[1]
     assert row["worst_face"] == 7 and np.isclose(row["max"], np.degrees(0.4))

@@ -73,7 +73,7 @@ def test_streaks_drift_and_loops_close(square):
 def test_noise_moves_with_the_mesh(square):
     """The field is that of the deformed mesh, although the noise is in the first one's rest shape."""
     bent = square.vertices * (1, 0.8, 1) + np.outer(square.vertices[:, 0] ** 2, (0, 0, 0.5))
-    other = surface_of(square.mesh, bent)
+    other = surface_of(square, bent)
     fields = [rf.along_axis(each, (1, 0, 0), 4) for each in (square, other)]
     views = views_of(fields)
     assert {view.look.anchor for view in views} == {"surface"}
@@ -84,7 +84,7 @@ def test_noise_moves_with_the_mesh(square):
         face_values(mesh, np.eye(3), deformed, field, False)[0].channels[REPRESENTATION]
         for mesh, field in (
             (instance.surface, instance.field),
-            (other.mesh, fields[1].rosy),
+            (other, fields[1]),
         )
     )
     assert drawn == pytest.approx(expected, abs=1e-5)

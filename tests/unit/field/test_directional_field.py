@@ -25,9 +25,9 @@ from rosy_addon.field.directional_field import (
     tensor_field,
 )
 from rosy_addon.field.frames import dot, normalize
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import Surface
 from rosy_addon.field.validate import validated_directions
 from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -211,7 +211,7 @@ def test_streaks_run_along_free_directions(method, angles):
 @pytest.mark.slow
 @pytest.mark.parametrize("method", mainly(["sheets"], ["sheets", "members", "brute", "ibfv"]))
 def test_a_conjugate_field_of_another_library(method, shared_data):
-    surface = read_mesh(shared_data / "meshes" / "cheburashka.off")
+    surface = Surface(shared_data / "meshes" / "cheburashka.off")
     field = read_field(shared_data / "fields" / "cheburashka-cf.rawfield", surface)
     assert (
         field.degree == 4

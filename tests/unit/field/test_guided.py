@@ -17,10 +17,10 @@ from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guided_system import guided_field
 from rosy_addon.field.guides import feature_edges, guides_from_edges
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames, to_representation
-from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smoothest_field
+from rosy_addon.field.surface import Surface
 from rosy_addon.field.surface_averages import SurfaceAverages
 
 BUNNY = MESHES / "stanford-bunny.obj"
@@ -45,7 +45,7 @@ def test_hard_guides_are_met_exactly(degree):
         field = guided_field(surface, degree, guides, 0.0, hard)
         assert angle_differences(surface, field.vectors, guides, degree)[hard].max() < 1e-9
         np.testing.assert_allclose(np.linalg.norm(field.vectors, axis=1), 1, atol=1e-9)
-        assert find_singularities(surface, field)[1].sum() == degree * euler_characteristic(surface)
+        assert find_singularities(surface, field)[1].sum() == degree * surface.euler_characteristic
 
 
 @pytest.mark.parametrize("degree", [4, *long(1)])
@@ -98,7 +98,7 @@ def test_a_field_follows_strokes_within_two_degrees():
 @pytest.mark.skipif(not BUNNY.exists(), reason="needs ../shared/data")
 @pytest.mark.long
 def test_ten_strokes_on_the_bunny():
-    surface = read_mesh(BUNNY)
+    surface = Surface(BUNNY)
     center, size = surface.face_center, np.ptp(surface.vertices, axis=0).max()
     random = np.random.default_rng(0)
     guides = np.zeros((surface.face_count, 3))

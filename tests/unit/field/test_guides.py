@@ -12,10 +12,14 @@ from rosy_addon.field.closest_point import closest_triangles
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.guides import guides_from_axes, guides_from_strokes, guides_from_uv
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames, face_representation, to_representation
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import build_surface, count_inconsistent_edges, orientation_warning
+from rosy_addon.field.surface import (
+    Surface,
+    build_surface,
+    count_inconsistent_edges,
+    orientation_warning,
+)
 
 BALL = icosphere(4)
 
@@ -56,7 +60,7 @@ def test_strokes_on_a_sphere_are_followed(degree):
 
 @pytest.mark.parametrize("reach", long(0.0, 0.003))
 def test_ten_strokes_on_the_bunny(shared_data, reach):
-    bunny = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")
+    bunny = Surface(shared_data / "meshes" / "stanford-bunny.obj")
     random = np.random.default_rng(3)
     size = np.ptp(bunny.vertices, axis=0).max()
     strokes = []

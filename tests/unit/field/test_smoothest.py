@@ -17,8 +17,7 @@ from shapes import from_triangles, icosphere, plane, torus
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.frames import dot
-from rosy_addon.field.mesh_io import read_mesh
-from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.smoothest import smallest_eigenvectors, smoothest_field
 from rosy_addon.field.sparse_multigrid import (
     from_coo,
@@ -26,7 +25,7 @@ from rosy_addon.field.sparse_multigrid import (
     matrix_product,
     w_cycle,
 )
-from rosy_addon.field.surface import build_surface
+from rosy_addon.field.surface import Surface, build_surface
 
 
 def random_sphere(count, seed=1):
@@ -154,7 +153,7 @@ def simple_shapes():
 def shapes_of_other_programs():
     for name in ("spot.obj", "vase.off", "dome.off", "cheburashka.off", "stanford-bunny.obj"):
         if (MESHES / name).exists():
-            yield name, read_mesh(MESHES / name)
+            yield name, Surface(MESHES / name)
 
 
 @pytest.mark.slow
@@ -245,7 +244,7 @@ def test_the_field_matches_another_library(degree):
 def test_indices_sum_to_the_euler_characteristic(degree):
     for surface in (icosphere(3), torus(30, 16), bumpy(icosphere(3))):
         _, index = find_singularities(surface, smoothest_field(surface, degree))
-        assert index.sum() == degree * euler_characteristic(surface)
+        assert index.sum() == degree * surface.euler_characteristic
 
 
 @pytest.mark.parametrize("degree", range(1, 7))

@@ -21,10 +21,9 @@ from rosy_addon.cli.parser import main
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.frames import dot, normalize, transport, view_frame
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_frames
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.surface import build_surface
+from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.line_drawing.crossings import cut_intervals, find_crossings, with_crossing_gaps
 from rosy_addon.line_drawing.families import global_labels
 from rosy_addon.line_drawing.head_on_ends import head_on_ends
@@ -443,7 +442,7 @@ def test_circles_of_latitude_close():
 @pytest.mark.long
 @pytest.mark.parametrize("degree", [2, 4, 6])
 def test_spacing_on_the_bunny(shared_data, degree):
-    surface = read_mesh(shared_data / "meshes" / "stanford-bunny.obj")
+    surface = Surface(shared_data / "meshes" / "stanford-bunny.obj")
     instance = instance_of(surface, degree, kind="smoothest")
     mesh, strokes = build_tangent_mesh(instance), trace_strokes(instance, 0.012 * surface.extent)
     gaps = lateral_gaps(mesh, strokes)

@@ -24,6 +24,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
+from ..annotation.figure_parts import ColorBar, Panel, Row
 from ..annotation.index_labels import placed_labels
 from ..annotation.round_numbers import MINUS
 from ..annotation.singularity_marks import (
@@ -55,78 +56,6 @@ INK = "#141414"
 
 #: Marks are drawn over the lines between them, which have the order 2, and a cross over marks.
 MARK_ORDER = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """A picture with a title.
-
-    Attributes
-    ----------
-    title : str
-    picture : (H, W, 4) uint8 ndarray
-        sRGB, the top row first.
-    dots : SingularityMarks or None
-        Filled dots, in pixels of the picture.
-    rings : SingularityMarks or None
-        Open circles.
-    links : (n, 2, 2) float64 ndarray
-        Lines between the ends of pairs, in pixels from the lower left.
-    cross : (2,) float64 ndarray or None
-        A place that is marked with a cross, in pixels from the lower left.
-    note : str
-        Below the picture.
-    """
-
-    title: str
-    picture: np.ndarray
-    dots: SingularityMarks | None = None
-    rings: SingularityMarks | None = None
-    links: np.ndarray | None = None
-    cross: np.ndarray | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class ColorBar:
-    """The key of a color map.
-
-    Attributes
-    ----------
-    label : str
-    low, high : float
-        The numbers at its ends.
-    stops : (n, 3) float64 ndarray
-        Display values at even distances from the lower end.
-    """
-
-    label: str
-    low: float
-    high: float
-    stops: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """Panels with one key.
-
-    Attributes
-    ----------
-    panels : sequence of Panel or None
-        None leaves the place of a panel empty.
-    color_bar : ColorBar or None
-    legend : str
-        In the place of the first empty panel.
-    """
-
-    panels: Sequence[Panel | None]
-    color_bar: ColorBar | None = None
-    legend: str = ""
-
-    @property
-    def drawn(self) -> list[Panel]:
-        """The panels without the empty places."""
-        return [panel for panel in self.panels if panel is not None]
 
 
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:

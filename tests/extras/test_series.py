@@ -72,7 +72,7 @@ def test_series(write, tmp_path, sphere):
     times = [None] * 3 if write is write_numbered else TIMES
     steps = list_steps(paths)
     assert [step.time for step in steps] == times
-    for (step, mesh), time in zip(simulation_steps(paths), TIMES, strict=True):
+    for (_, mesh), time in zip(simulation_steps(paths), TIMES, strict=True):
         speed = mesh.vertex_data["rotation"] / (1 + time)
         assert speed == pytest.approx(rotation(mesh.vertices), abs=1e-5)
 

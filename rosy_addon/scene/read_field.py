@@ -8,13 +8,13 @@ import numpy as np
 from ..core.cache import Cache
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from ..field.blocks import as_float64
 from ..field.frames import normalize, tangent_frame
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
 from ..field.surface import Surface, mean_per_face
 from ..field.validate import (
     apply_nonfinite_policy,
-    as_float64,
     project_to_tangent,
     validated_directions,
     validated_field,

@@ -111,8 +111,9 @@ test-wheel: .venv-dist/ready .venv-types/ready $$(WHEEL_VENV)/ready
 	$(WHEEL_VENV)/$(BIN)/python -m pip uninstall --quiet --yes rosyfields
 	$(WHEEL_VENV)/$(BIN)/python -m pip install --quiet build/wheel/tree/*.whl
 	cd .. && $(abspath $(WHEEL_VENV))/$(BIN)/python -P -m pytest $(abspath tests/wheel)
+	cd build/wheel && $(abspath $(WHEEL_VENV))/$(BIN)/python -P $(abspath tests/wheel/examples.py) examples.py
 	.venv-types/$(BIN)/mypy --strict --config-file= --explicit-package-bases \
-		--python-executable $(WHEEL_VENV)/$(BIN)/python tests/wheel/every_name.py
+		--python-executable $(WHEEL_VENV)/$(BIN)/python build/wheel/examples.py
 test-python: $$(UNIT_VENV)/ready
 	$(UNIT_VENV)/$(BIN)/python $(PYTEST) -m "not slow and not long" tests/unit
 

@@ -133,7 +133,7 @@ def features(
     --------
     >>> import rosyfields as rf
     >>> torus = rf.Surface("torus.obj")
-    >>> rf.features(torus, edges=torus.faces[:24, :2]).degree
+    >>> rf.features(torus, edges=[[0, 1], [1, 2], [2, 3]]).degree
     4
     """
     settings = GeneratorSettings(

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 import rosyfields
-from conftest import ENVIRONMENT, write_sphere
+from conftest import ENVIRONMENT, write_torus
 
 from examples import BLOCK, PAGES
 
@@ -16,9 +16,9 @@ from examples import BLOCK, PAGES
     [("researchers", ["bunny.png", "bunny.rosy", "curvature.rosy"]), ("scripters", ["torus.png"])],
 )
 def test_a_page_runs_as_it_is_written(page, written, tmp_path, monkeypatch):
-    """Without the commands that install the package, and with a ball for the bunny."""
+    """Without the commands that install the package, and with a torus for the bunny."""
     monkeypatch.chdir(tmp_path)
-    write_sphere(tmp_path / "bunny.obj")
+    write_torus(tmp_path / "bunny.obj")
     rosyfields.smoothest(rosyfields.Surface("bunny.obj")).save("bunny.rawfield")
     for block in BLOCK.finditer((PAGES / f"{page}.md").read_text(encoding="utf-8")):
         if block["python"]:

@@ -147,12 +147,9 @@ LONG = {
     "convert": (convert, (SURFACE, FIELD, replace(CONVERSION, magnitude="curvature")), 0.9),
     "singularities": (find_singularities, (SURFACE, FIELD), 0.9),
     "project": (project, ([INSTANCE] * 2, CAMERA), 0.9),
-    "several samples": (project, ([INSTANCE], CAMERA, "smooth", None, 3), 0.9),
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
     "picture": (picture, (Look(),), 0.9),
-    "members": (picture, (Look(method="members"),), 0.9),
-    "strokes": (draw_instances, ([INSTANCE], CAMERA, StrokeStyle()), 0.9),
-    "all strokes": (
+    "strokes": (
         draw_instances,
         ([INSTANCE], CAMERA, StrokeStyle(arrows=30.0, overshoot=4.0, outline=True)),
         0.9,

@@ -27,44 +27,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+# ruff: noqa: F403, F405
 if TYPE_CHECKING:
-    from .api import (
-        Comparison,
-        Difference,
-        Drawing,
-        Field,
-        Picture,
-        RosyError,
-        RosyWarning,
-        Singularities,
-        Surface,
-        Texture,
-        along_axis,
-        along_uv,
-        ambient_occlusion,
-        compare,
-        curvature,
-        features,
-        figure,
-        film,
-        form,
-        from_angles,
-        from_array,
-        from_directions,
-        from_representation,
-        from_tensors,
-        from_vectors,
-        guided,
-        list_presets,
-        prescribed,
-        read_field,
-        render,
-        save_figures,
-        smoothest,
-        strokes,
-        texture,
-        turntable,
-    )
+    from .api import *
 
 __all__ = [
     "Comparison",

@@ -1,18 +1,18 @@
-"""The functions and classes for scripts and notebooks; the commands for mesh files use them as well.
+"""Functions and classes for scripts, notebooks and the commands for mesh files.
 
-Angles are in radians, except those of a view, which are in degrees.
+Angles are in radians, except for the angles of a view, which are in degrees.
 
-    surface      `Surface`: a mesh from arrays, a file or another library
-    field        `Field`: a field on a surface; fields from arrays and files
+    field        fields from arrays and files
     generators   fields that are computed
     pictures     pictures and turntables
     films        films of fields that change with time
     comparison   how fields differ
-    figures      fields side by side, with their keys
+    figures      fields side by side, with their keys; `figure_panels` draws the pictures
     drawings     strokes
     textures     textures
 
-The names that are imported here are public; `rosy_addon.__all__` lists them.
+`Surface` and `Field` are classes of the room `field`, `Picture` of the room `compositor`. The names
+that are imported here are public; `rosy_addon.__all__` lists them.
 """
 
 from ..compositor.picture import Picture as Picture

@@ -147,7 +147,7 @@ def from_directions(surface: Surface, directions: ArrayLike, *, nonfinite: str =
     Raises
     ------
     RosyError
-        As `from_vectors`.
+        For the same reasons as `from_vectors`.
 
     Examples
     --------
@@ -275,8 +275,8 @@ def read_field(
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     mesh : path-like, optional
-        The mesh file that the field belongs to, if its faces are not those of `surface`. The field is
-        then transferred by position.
+        The mesh file of the field, if it is another mesh than `surface`. The field is then transferred
+        by position.
 
     Warns
     -----

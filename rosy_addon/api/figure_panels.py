@@ -63,9 +63,9 @@ class Studio:
 
     @cached_property
     def _marks(self) -> dict[str, SingularityMarks | None]:
-        """The singularities of each field in its picture; None if the look shows none.
+        """Singularities of each field in its picture; None if the look shows none.
 
-        The dots of very many are smaller, so that they do not hide the lines.
+        If there are very many, their dots are smaller, so that they do not hide the lines.
         """
         if not shows_singularities(self.look):
             return dict.fromkeys(self.instances)
@@ -86,7 +86,7 @@ class Studio:
         return Row(panels, color_bar)
 
     def difference_row(self, lines: str, largest_angle: float) -> Row:
-        """Return the panels of the differences from the first field, below those of their fields."""
+        """Return the panels of the differences from the first field, in the same order as the fields."""
         reference, first = next(iter(self.comparison.fields.items()))
         top = largest_angle or 180.0 / first.degree
         panels = [
@@ -111,9 +111,9 @@ class Studio:
         ----------
         title : str
         lines : {"other", "first", "both"}
-            Whose lines are drawn.
+            The field whose lines are drawn.
         top : float
-            The angle at the top of the color map, in degrees.
+            Angle at the top of the color map, in degrees.
         """
         reference, first = next(iter(self.instances.items()))
         other, difference = self.instances[title], self.comparison.differences[title]

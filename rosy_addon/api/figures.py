@@ -82,8 +82,7 @@ def figure(
     Parameters
     ----------
     fields : Field, sequence of Field, mapping of str to Field, or Comparison
-        The keys of a mapping are the titles. Fields may be on different surfaces. A comparison that was made
-        before is not made again.
+        The keys of a mapping are the titles. Fields may be on different surfaces. A `Comparison` is used as it is.
     parts : sequence of {"fields", "differences", "table"}
         What to draw: the fields; the angle of each field to the first as a color, from 0 to 180/N
         degrees, with a cross at the largest, and the singularities of both; the table of `compare`.
@@ -95,14 +94,14 @@ def figure(
         Resolution of the pictures. Lines do not get thinner with it: lengths of the look are in
         pixels at 150 dpi.
     view, preset
-        As for `render`.
+        See `render`.
     orthographic : bool
         Whether the projection is orthographic; a scale bar needs it.
     color_values : str, or sequence of str or array_like, optional
-        Numbers that are shown as colors, as for `render`: for each field, or a name for all.
+        Numbers to show as colors (see `render`) for each field, or a name for all fields.
     color_label : str, optional
         What the color bar of the fields says: a quantity and its unit. By default the name of the numbers,
-        or "magnitude" if that is what is shown.
+        or "magnitude" if the colors show it.
     largest_angle : float
         Angle at the top of the color map of differences, in degrees; 0 for 180/N.
     lines : {"other", "first", "both"}
@@ -114,9 +113,9 @@ def figure(
     caption : str
         Below everything.
     workers
-        As for `render`.
+        See `render`.
     **settings
-        Settings of the look, as for `render`.
+        Settings of the look; see `render`.
 
     Returns
     -------
@@ -127,7 +126,8 @@ def figure(
     Raises
     ------
     RosyError
-        If matplotlib is not installed, there is no field or nothing to compare, or as `render`.
+        If matplotlib is not installed, there is no field or nothing to compare, or for the same reasons as
+        `render`.
 
     Examples
     --------
@@ -216,12 +216,12 @@ def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure
 
 
 def check_figure_path(path: Path, count: int = 1) -> None:
-    """Check that a file can hold a number of figures.
+    """Check that a file format can hold this many figures.
 
     Raises
     ------
     RosyError
-        If not.
+        If the suffix is unknown, or the format cannot hold them.
     """
     if path.suffix.lower() not in FIGURE_SUFFIXES:
         raise RosyError(f"{path}: the name of the file must end in {', '.join(FIGURE_SUFFIXES)}")
@@ -251,7 +251,7 @@ def load_drawing() -> ModuleType:
 
 
 def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> None:
-    """Check what a figure is to show.
+    """Check the parts of a figure and the lines over differences.
 
     Raises
     ------
@@ -277,7 +277,7 @@ def _check_numbers(name: str, **numbers: float) -> None:
     Raises
     ------
     RosyError
-        If one of them is outside; the name is that of a surface, for the message.
+        If a number is outside its limits. The message begins with `name`.
     """
     for key, value in numbers.items():
         low, high = LIMITS[key]
@@ -292,12 +292,12 @@ def _instances(
     fields: Mapping[str, Field],
     color_values: str | Sequence[str | ArrayLike] | None,
 ) -> dict[str, MeshInstance]:
-    """Return the fields in world space with the numbers that are shown as colors, as for `figure`.
+    """Return the fields in world space, with their `color_values`; see `figure`.
 
     Raises
     ------
     RosyError
-        If there is not one set of numbers for each field, or as `corner_numbers`.
+        If there is not one set of numbers for each field, or for the same reasons as `corner_numbers`.
     """
     if color_values is None or isinstance(color_values, str):
         values: Sequence[str | ArrayLike | None] = [color_values] * len(fields)
@@ -316,7 +316,7 @@ def _instances(
 def _figure_look(
     look: Look, fields: Mapping[str, Field], instances: Iterable[MeshInstance], scale: float
 ) -> Look:
-    """Return the look of all panels: its lengths in pixels, and common ranges of the color map."""
+    """Return the look of all panels, with lengths in pixels and common ranges of the color map."""
     look = scaled_look(look, scale)
     look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
     if look.magnitude != "none" and not look.magnitude_range:
@@ -339,7 +339,7 @@ def _panel_camera(
 
 
 def _color_bar(look: Look, label: str) -> ColorBar | None:
-    """Return the color bar of the fields; None if neither magnitudes nor numbers are shown as color."""
+    """Return the color bar of the fields; None if color shows neither magnitudes nor numbers."""
     if colors_magnitude(look):
         ends = 0.0, look.magnitude_range
     elif colors_values(look):

@@ -63,23 +63,23 @@ def film(
     Parameters
     ----------
     fields : sequence of Field
-        Two or more of the same degree, on one surface or on a surface each. The items are asked for twice:
-        for the camera and the range of magnitudes, and to be drawn. Two are kept at most, so the sequence may
-        read files.
+        Two or more of the same degree, on one surface or on a surface each. Each item is requested twice:
+        for the camera and the range of magnitudes, and to be drawn. At most two are kept, so the sequence
+        may read files.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
     between : int or None
         Pictures between two fields, for which the fields and the vertices are interpolated. The surfaces must
-        then have the same polygons. None: as many as keep streaks steady. Streaks flicker if the field turns by more than a half degree or so from
-        picture to picture.
+        then have the same polygons. None chooses a number that keeps streaks steady: they flicker if the
+        field turns by more than about half a degree from picture to picture.
     loop : bool
         The first field follows the last one again: the film, shown in a loop, has no seam.
     rate : float
         Pictures per second.
     view, size, orthographic, preset, workers, **settings
-        As for `render`.
+        See `render`.
     encode, on_picture
-        As for `turntable`.
+        See `turntable`.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def film(
     ------
     RosyError
         If there is one field only, they differ in their degrees or, with pictures between them, in their
-        polygons; or as of `turntable`.
+        polygons; or for the same reasons as `turntable`.
 
     Examples
     --------
@@ -129,19 +129,19 @@ def film(
 
 
 class _Survey(NamedTuple):
-    """What a film must know about all of its fields before the first picture.
+    """Properties of all fields of a film, which are needed before the first picture.
 
     Attributes
     ----------
     points : (n, 3) float64 ndarray
-        World space; they determine the camera.
+        Points in world space that the camera frames.
     largest_magnitude : float
     turn : float
         Largest mean angle between neighboring fields, in radians.
     keeps_polygons : bool
         Whether all fields have the polygons of the first one.
     rest_vertices : (V, 3) float64 ndarray or None
-        The vertices of the first surface, if the others have the same polygons and other vertices.
+        Vertices of the first surface if the mesh moves, but keeps its polygons.
     """
 
     points: NDArray[np.float64]
@@ -153,26 +153,26 @@ class _Survey(NamedTuple):
 
 @dataclass(eq=False)
 class Film:
-    """The views of the fields of a series, under one camera that frames all of them.
+    """Views of the fields of a series, under one camera that frames all of them.
 
     Parameters
     ----------
     fields : sequence of Field
         See `film`.
     look : Look
-        Of the first picture. If it shows magnitudes and has no range of its own, their range is that of all
-        fields.
+        Look of the first picture. If it shows magnitudes and sets no range, the range covers all fields.
     view_angles : (float, float)
         Azimuth and elevation in degrees, see `orbit_camera`.
     size : (int, int)
         Pixels.
     between : int or None
-        Pictures between two fields. None: as many as keep streaks steady, or 0 if the polygons change.
+        Pictures between two fields. None chooses a number that keeps streaks steady, or 0 if the polygons
+        change.
     loop : bool
         Whether the first field follows the last one.
     perspective : bool
     keeps_anchor : bool
-        Whether the noise is anchored as the look says, even if the mesh moves.
+        Use the anchor of the look even if the mesh moves.
     name : str
         For messages.
 
@@ -192,7 +192,7 @@ class Film:
     perspective: bool = True
     keeps_anchor: bool = False
     name: str = "film"
-    #: What the user should know about the motion after the first view; may be empty.
+    #: A warning about the motion, set before the first view; may be empty.
     advice: str = ""
 
     def __post_init__(self) -> None:
@@ -209,13 +209,13 @@ class Film:
 
     @property
     def picture_count(self) -> int:
-        """The number of views. If it depends on how fast the fields turn, they are looked at first."""
+        """Number of views. It may depend on how fast the fields turn, which needs a pass over all fields."""
         intervals = len(self.fields) - (not self.loop)
         return intervals * (self._between + 1) + (not self.loop)
 
     @property
     def _between(self) -> int:
-        """The number of pictures between two fields."""
+        """Number of pictures between two fields."""
         if self.between is not None:
             return self.between
         survey = self._survey
@@ -227,7 +227,7 @@ class Film:
         Raises
         ------
         RosyError
-            As of `film`. What is wrong with a field is found before the first view.
+            For the same reasons as `film`. All fields are checked before the first view.
         """
         survey, look = self._survey, self.look
         if look.magnitude != "none" and not look.magnitude_range:
@@ -265,7 +265,7 @@ class Film:
 
     @cached_property
     def _survey(self) -> _Survey:
-        """What all fields have in common. They are looked at once."""
+        """Properties of all fields, computed once."""
         points, largest, turn = np.zeros((0, 3)), 0.0, 0.0
         first = previous = self.fields[0]
         keeps_polygons, moves = True, False
@@ -313,7 +313,7 @@ class Film:
 
 
 def _mesh_between(first: Surface, second: Surface, share: float) -> Surface:
-    """Return a mesh between two with the same polygons. Fans and triangles are those of the first."""
+    """Interpolate two meshes with the same polygons. The result has the fans and triangles of the first."""
     if first is second:
         return first
     vertices = (1 - share) * first.vertices + share * second.vertices

@@ -39,8 +39,7 @@ DEFAULT_VIEW = (-25.0, 20.0)
 #: Width and height in pixels of pictures, and of the pictures of a turntable.
 DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
 
-#: Samples per pixel along each axis, unless the preset has more: nothing smooths the edges of the
-#: picture later.
+#: Samples per pixel along each axis, unless the preset has more. No renderer smooths the edges later.
 SUPERSAMPLING = 2
 
 #: The tone attribute that is the luminance of the vertex colors, as Blender calls it.
@@ -48,7 +47,7 @@ VERTEX_COLOR = "Color"
 
 
 def list_presets() -> dict[str, str]:
-    """Return the names of all presets with their descriptions: those of RoSy and your own.
+    """Return the descriptions of all presets by name: the presets of RoSy and your own.
 
     Examples
     --------
@@ -70,7 +69,7 @@ def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> ND
     ----------
     surface : Surface
     directions : int
-        Number of directions of light, spread evenly over the sphere.
+        Number of light directions, spread evenly over the sphere.
 
     Returns
     -------
@@ -205,7 +204,7 @@ def turntable(
     Parameters
     ----------
     surface, field, size, orthographic, preset, color_values, tone_values, tone_image, workers, **settings
-        As for `render`.
+        See `render`.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
     pictures : int
@@ -213,11 +212,11 @@ def turntable(
     rate : float
         Pictures per second.
     still : bool
-        Whether the camera stays at the first view. The look then needs `flow`, so that streaks drift.
+        Keep the camera at the first view. The look then needs `flow`, so that streaks drift.
     view : (float, float)
         Azimuth of the first picture, and elevation, in degrees.
     encode : function, optional
-        Encodes an ``.mp4``: see `rendering.turntable.Encoder`. By default ffmpeg, where it is installed.
+        Encodes an ``.mp4``: see `rendering.turntable.Encoder`. By default ffmpeg, if it is installed.
     on_picture : function, optional
         Called with the number of each picture, from 1, before it is drawn.
 
@@ -229,7 +228,7 @@ def turntable(
     Raises
     ------
     RosyError
-        As `render`, or if the video cannot be written.
+        For the same reasons as `render`, or if the video cannot be written.
 
     Examples
     --------
@@ -272,7 +271,7 @@ def picture_look(
     Parameters
     ----------
     name : str
-        Of the surface, for messages.
+        Name of the surface, for messages.
     preset : str or path-like or None
         Name of a preset, or a file.
     settings : mapping
@@ -306,7 +305,7 @@ def default_encoder(path: Path, encode: Encoder | None) -> Encoder | None:
     Raises
     ------
     RosyError
-        If the name of the file is not that of a video.
+        If the file name has no suffix of a video.
     """
     turntable_video.check_video_path(path)
     return find_ffmpeg() if encode is None and path.suffix.lower() == ".mp4" else encode
@@ -342,7 +341,7 @@ def corner_numbers(
     ----------
     surface : Surface
     color_values : str or (F,), (V,) or (C,) array_like or None
-        As for `render`.
+        See `render`.
 
     Returns
     -------
@@ -356,7 +355,7 @@ def corner_numbers(
     if color_values is None:
         return None
     if isinstance(color_values, str):
-        # Faces are listed first, and count if vertices have an array of the same name.
+        # An array of faces takes precedence over an array of vertices with the same name.
         data = {**surface.face_data, **surface.vertex_data, **surface.face_data}
         color_values = _named_array(
             surface, color_values, data, "attribute", "attributes of faces or vertices"
@@ -384,7 +383,7 @@ def corner_numbers(
 def _named_array(
     surface: Surface, name: str, data: Mapping[str, NDArray[Any]], kind: str, kinds: str
 ) -> NDArray[Any]:
-    """Return an array of a surface; `kind` and `kinds` say what there is, for the errors."""
+    """Return an array of a surface by name. `kind` and `kinds` name such arrays in errors."""
     if name in data:
         return data[name]
     if not data:
@@ -398,7 +397,7 @@ def _surface_tone(
     values: str | ArrayLike | None,
     image: str | os.PathLike[str] | ArrayLike | Picture | None,
 ) -> SurfaceTone | None:
-    """Return the tone of the vertices, or of an image on the UV map, or None."""
+    """Return the tone from values at vertices or corners, or from an image on the UV map; None without."""
     if values is not None:
         if isinstance(values, str):
             values = _named_tone(surface, values)

@@ -99,7 +99,7 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     Parameters
     ----------
     width : float
-        Of the figure, inches.
+        Width of the figure, inches.
     columns : int
     has_key : bool
         Whether there is a column of keys.
@@ -120,7 +120,7 @@ class NotebookFigure(Figure):
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """What a figure shows, from top to bottom. Places are in inches from its upper left corner.
+    """Contents of a figure, from top to bottom. Positions are in inches from its upper left corner.
 
     Attributes
     ----------
@@ -132,9 +132,9 @@ class Page:
     scale_bar : (float, str) or None
         Its length in pixels, and its text.
     width : float
-        Inches. The height follows from the contents.
+        Width in inches. The height follows from the contents.
     columns : int
-        Of the grid of panels.
+        Number of columns of the grid of panels.
     dpi : int
         Pixels of pictures in an inch.
     """
@@ -149,7 +149,7 @@ class Page:
 
     @cached_property
     def _figure(self) -> Figure:
-        """The figure that is drawn."""
+        """The matplotlib figure."""
         size = self.width, max(self._height, 0.1)
         return NotebookFigure(figsize=size, dpi=self.dpi)
 
@@ -373,7 +373,7 @@ def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.nd
     Parameters
     ----------
     diameter : ndarray
-        Of dots without their outlines, in points.
+        Diameters of dots without their outlines, in points.
     is_open : bool
         Whether they are circles around dots.
     """

@@ -65,7 +65,7 @@ class Step:
 
     @property
     def name(self) -> str:
-        """The name of the step for messages, such as "flow.xdmf, step 3"."""
+        """Name of the step for messages, such as "flow.xdmf, step 3"."""
         name = str(self.paths[0])
         return name if self.index is None else f"{name}, step {self.index + 1}"
 
@@ -99,8 +99,8 @@ def read_simulation(path: str | os.PathLike[str], step: int | None = None) -> Me
 
     If a file has surface cells, the mesh consists of these. Otherwise it is the boundary of the
     volume cells; a face then has the values of the cell behind it. Cells of second and higher order
-    are reduced to their corners, triangle strips are split. Of a file with several blocks, the arrays
-    that all blocks have are kept. VTK's normals and texture coordinates are not read as arrays.
+    are reduced to their corners, triangle strips are split. If a file has several blocks, only the
+    arrays that all blocks have are kept. VTK's normals and texture coordinates are not read as arrays.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def list_steps(paths: Sequence[str | os.PathLike[str]]) -> list[Step]:
     Raises
     ------
     RosyError
-        As of `read_simulation`, or if a list of files is empty.
+        For the same reasons as `read_simulation`, or if a list of files is empty.
     """
     steps = [step for path in in_order([Path(path) for path in paths]) for step in _steps_of(path)]
     for step in steps:
@@ -169,7 +169,7 @@ def simulation_steps(
 ) -> Iterator[tuple[Step, MeshArrays]]:
     """Iterate over the steps of a series with their meshes.
 
-    A mesh is read when it is asked for, and is not kept.
+    Each mesh is read when the iterator reaches it, and is not kept.
 
     Examples
     --------
@@ -227,7 +227,7 @@ def _listed_steps(path: Path) -> list[Step]:
 
 
 def _time_reader(path: Path) -> Any:
-    """Return VTK's reader of a file with steps of time, after it has read what there is."""
+    """Return VTK's reader of a file with time steps, after it has read the metadata."""
     if path.suffix.lower() in XDMF_SUFFIXES:
         from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 

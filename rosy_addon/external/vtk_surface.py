@@ -1,4 +1,4 @@
-"""The polygons and arrays of the surface of VTK's datasets, as pyvista wraps them."""
+"""`surface_arrays`: the surface of VTK datasets, as polygons with arrays."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def surface_arrays(
     datasets : list of pyvista.DataSet or pyvista.MultiBlock
         Several are parts of one mesh.
     name : str
-        Of the step, for messages.
+        Name of the step, for messages.
     has_parts : bool
         Whether a dataset repeats the points along the cuts between its parts.
     repeats_blocks : bool
@@ -195,7 +195,7 @@ def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the boundary of the volume cells of a grid, in the form of `_surface_cells`."""
+    """Return the boundary of the volume cells of a grid; the result is as in `_surface_cells`."""
     import pyvista
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
@@ -235,7 +235,7 @@ def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _ranks(start: np.ndarray) -> np.ndarray:
-    """Return the number of each element in its run from 0, given the first elements of the runs, and the end."""
+    """Return the position of each element in its run, given the start of each run and the end of the last."""
     return np.arange(start[-1]) - np.repeat(start[:-1], np.diff(start))
 
 

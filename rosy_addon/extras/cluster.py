@@ -66,7 +66,7 @@ def run_on_cluster(arguments: Sequence[str], frames: Sequence[int], address: str
 def _run_tasks(
     client: Any, arguments: Sequence[str], tasks: Sequence[tuple[int, ...]]
 ) -> Generator[str, None, dict[tuple[int, ...], str]]:
-    """Run a command for the frames of each task. Yield its output, and return the errors of those that failed."""
+    """Run a command for the frames of each task, yield its output, and return the errors of failed tasks."""
     from distributed import as_completed
 
     commands = [

@@ -139,14 +139,14 @@ def requested_fields(options: Options) -> SimulationFields | FieldFiles:
 
 @dataclass(eq=False)
 class FieldFiles(Sequence[api.Field]):
-    """The fields of files, on one surface. A file is read each time that its field is asked for.
+    """Fields of files on one surface. An item is read from its file at each access.
 
     Parameters
     ----------
     paths : sequence of Path
     surface : Surface
     degree, nonfinite
-        See `api.read_field`. By default the degree is that of the first field.
+        See `api.read_field`. By default all fields must have the degree of the first one.
     """
 
     paths: Sequence[Path]
@@ -176,7 +176,7 @@ class FieldFiles(Sequence[api.Field]):
 
 @dataclass(eq=False)
 class SimulationFields(Sequence[api.Field]):
-    """The fields of the steps of a simulation. A step is read each time that its field is asked for.
+    """Fields of the steps of a simulation. An item is read from its file at each access.
 
     Parameters
     ----------

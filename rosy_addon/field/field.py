@@ -1,4 +1,4 @@
-"""`Field`: an N-RoSy field with its surface, and what can be asked of it and done with it."""
+"""`Field`: an N-RoSy field with its surface, for scripts and notebooks."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Difference:
         From a member to the nearest member of the other field, in radians, 0 to pi/N. NaN where
         either field is undefined.
     mean, rms : float
-        Of the angle in radians, weighted by area.
+        Mean and root mean square of the angle in radians, weighted by area.
     p95 : float
         The largest angle on 95 % of the area, radians.
     max : float
@@ -81,7 +81,7 @@ class Field(RosyField):
     vectors : (F, 3) float64 ndarray
         One member vector for each face; zero where the field is undefined.
     direction_ratios, family_count, source_directions
-        As for `RosyField`.
+        See `RosyField`.
     surface : Surface
         On whose faces the field is.
 
@@ -180,8 +180,8 @@ class Field(RosyField):
     def without_pairs(self, reach: float) -> Field:
         """Return the field without pairs of singularities that are near to each other.
 
-        The two of a pair have opposite indices, and no other singularity changes. Far from the pairs, neither
-        do directions. Pairs stay where the field would otherwise turn too fast for the size of the faces.
+        The singularities of a pair have opposite indices. Other singularities and directions far from the pairs
+        do not change. A pair stays if the field would turn too fast for the size of the faces without it.
 
         Parameters
         ----------
@@ -206,15 +206,15 @@ class Field(RosyField):
     ) -> Field:
         """Return the field with a singularity at another vertex; all others stay.
 
-        On another singularity, its index is added to that one: opposite ones vanish. From a vertex that
-        is not singular, a pair is made; of a part of an index, the rest stays.
+        If the target is singular, the indices are added: opposite ones cancel. If the source is not
+        singular, a pair is created. If only a part of an index moves, the rest stays at the source.
 
         Parameters
         ----------
         source, target : int
-            Vertices. -1 stands for none: the singularity comes or leaves over a border.
+            Vertices. -1 stands for none: the singularity enters or leaves over a border.
         index : int
-            What is moved, in units of 1/N; 0 for the whole index of `source`.
+            Index to move, in units of 1/N; 0 for the whole index of `source`.
         reach : float
             Distance over which directions change, as a fraction of the longest side of the mesh. They
             change at least as far as the singularity moves.

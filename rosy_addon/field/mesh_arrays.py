@@ -1,4 +1,4 @@
-"""`MeshArrays`: what a surface is made of, from arrays, a file, or the mesh of another library.
+"""`MeshArrays`: the arrays of a mesh, from a file or from an object of another library.
 
 None of these libraries is imported.
 """
@@ -47,7 +47,7 @@ class MeshArrays:
         Arrays of V and of F rows. None if the mesh file may have some, which are read when they are
         asked for.
     note : str
-        What the user should know about how the mesh was read; may be empty.
+        A warning about how the mesh was read; may be empty.
     """
 
     vertices: Any
@@ -60,7 +60,7 @@ class MeshArrays:
 
     @property
     def polygons(self) -> Polygons:
-        """The vertices and the faces."""
+        """Vertices and faces."""
         return Polygons(self.vertices, self.corner_vertex, self.face_start)
 
 
@@ -111,7 +111,7 @@ def mesh_arrays(
 def _corner_uv(
     uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
 ) -> NDArray[np.float64]:
-    """Return texture coordinates of the corners, given those of the vertices or of the corners."""
+    """Return (C, 2) texture coordinates of corners, from coordinates of vertices or corners."""
     array = np.asarray(uv, dtype=np.float64)
     if (
         array.ndim != 2
@@ -151,7 +151,7 @@ def _flat_faces(
 
 
 def _positions(vertices: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Return (V, 3) positions; those of a flat mesh, (V, 2), get z = 0."""
+    """Return (V, 3) positions; the (V, 2) positions of a flat mesh get z = 0."""
     try:
         array = np.asarray(vertices, dtype=np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The contents of an image of Blender: a PNG file, or pixels in single precision."""
+"""`ImageData`: the contents of an image of Blender, a PNG file or pixels in single precision."""
 
 from __future__ import annotations
 

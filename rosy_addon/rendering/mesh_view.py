@@ -1,4 +1,4 @@
-"""The input of a renderer for a mesh that is not part of a scene, such as one from a file."""
+"""The input of a renderer for a mesh that is not in a scene, such as a mesh from a file."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def mesh_view(
         Pixels.
     perspective : bool
     reference_luminance : (H, W) ndarray, optional
-        Of a picture from the same view, for the tone "picture".
+        Luminance of a picture from the same view, for the tone "picture".
     reference_name : str
-        Of that picture, for messages.
+        Name of this picture, for messages.
 
     Raises
     ------
@@ -74,14 +74,14 @@ def mesh_view(
 
 
 def check_light(light: str, name: str) -> None:
-    """Check that a light is not that of a scene, for a mesh that is not in one.
+    """Check that a look does not use the lights of a scene, for a mesh that is not in a scene.
 
     Parameters
     ----------
     light : str
         `Look.light` or `StrokeStyle.light`.
     name : str
-        Of the mesh, for the message.
+        Name of the mesh, for the message.
 
     Raises
     ------

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import partial
-from math import pi
 from typing import Any
 
 import bpy
 import numpy as np
 
 from ..rosy_addon.core.errors import NoFeaturesError, RosyError, counted
-from ..rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate
+from ..rosy_addon.field.generate import GeneratorSettings, generate
 from ..rosy_addon.field.guides import feature_edges
 from ..rosy_addon.field.rosy_field import MAX_DEGREE
 from ..rosy_addon.field.singularities import description
@@ -24,6 +23,7 @@ from ..rosy_addon.scene.guides import (
     guide_strokes_and_empties,
     guide_vectors,
 )
+from ..rosy_addon.scene.look_properties import read_settings
 from ..rosy_addon.scene.meshes import EDGE_MARKS, marked_edges, mesh_surface
 from ..rosy_addon.scene.singularity_points import (
     INDEX_ATTRIBUTE,
@@ -31,20 +31,26 @@ from ..rosy_addon.scene.singularity_points import (
     read_singularity_points,
 )
 from ..rosy_addon.ui.operator_settings import draw_generator_settings, draw_settings
+from ..rosy_addon.ui.properties import setting_properties
 from ..rosy_addon.worker.job import Call, Steps
-from .base import EDITABLE, FRACTION, selected_mesh_objects
+from .base import EDITABLE, selected_mesh_objects
 from .modal_job import ModalJobMixin
-
-#: Labels of generators that are not the capitalized key.
-KIND_LABELS = {"uv": "UV Map"}
 
 #: Generators that take less time than singularities take to be counted, and the number of faces up
 #: to which they are counted nevertheless.
 FAST_KINDS, MAX_FAST_FACES = ("axis", "uv"), 50_000
 
-# Not inside the annotation: up to Python 3.11, a comprehension there cannot see module names.
-KIND_ITEMS = [
-    (kind, KIND_LABELS.get(kind, kind.capitalize()), text) for kind, text in GENERATORS.items()
+
+GUIDE_ITEMS = [
+    ("OBJECTS", "Objects", "Grease Pencil, curves and empties"),
+    ("ANNOTATIONS", "Annotations", "Annotations of the scene that are drawn on the surface"),
+    ("EDGES", "Edges", "Borders and sharp edges, or marked ones"),
+    ("UV", "UV Map", "The axes of a UV map"),
+    ("ATTRIBUTE", "Vectors", "A vector attribute, where it is not zero"),
+]
+EDGE_ITEMS = [
+    ("FEATURES", "By Angle", "Borders and sharp edges"),
+    *((mark, name, text) for mark, (_, name, text) in EDGE_MARKS.items()),
 ]
 
 
@@ -79,99 +85,54 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     conditions = EDITABLE
 
-    kind: bpy.props.EnumProperty(
-        name="From",
-        description="Method that generates the field",
-        items=KIND_ITEMS,
-        default="form",
-    )
-    degree: bpy.props.IntProperty(
-        name="Degree",
-        description="Number of directions at each point: 2 for lines, 4 for crosses, 6 for triangles "
-        "and hexagons",
-        min=1,
-        max=MAX_DEGREE,
-        default=4,
-    )
-    reach: bpy.props.FloatProperty(
-        name="Reach",
-        description="Distance by which curvature extends into flat parts, or by which guides are "
-        "smoothed, as a fraction of the size of the mesh. 0: do not smooth",
-        soft_max=0.2,
-        default=0.0,
-        **FRACTION,
-    )
-    edges: bpy.props.EnumProperty(
-        name="Edges",
-        description="Edges that the field follows",
-        items=[
-            ("FEATURES", "By Angle", "Borders and sharp edges"),
-            *((mark, name, text) for mark, (_, name, text) in EDGE_MARKS.items()),
-        ],
-    )
-    sharp_angle: bpy.props.FloatProperty(
-        name="Sharp Angle",
-        description="Smallest angle between the faces of a sharp edge",
-        subtype="ANGLE",
-        min=0.0,
-        max=pi,
-        default=pi / 6,
-    )
-    guides: bpy.props.EnumProperty(
-        name="Follow",
-        description="Kinds of guides that the field follows",
-        options={"ENUM_FLAG"},
-        items=[
-            ("OBJECTS", "Objects", "Grease Pencil, curves and empties"),
-            (
-                "ANNOTATIONS",
-                "Annotations",
-                "Annotations of the scene that are drawn on the surface",
-            ),
-            ("EDGES", "Edges", "Borders and sharp edges, or marked ones"),
-            ("UV", "UV Map", "The axes of a UV map"),
-            ("ATTRIBUTE", "Vectors", "A vector attribute, where it is not zero"),
-        ],
-        default={"OBJECTS"},
-    )
-    guide: bpy.props.StringProperty(
-        name="Object",
-        description="Grease Pencil, curve or empty that the field follows. Empty: all that are "
-        "selected. An empty guides along its z axis, within its display size",
-        search=_search_guides,
-    )
-    uv_map: bpy.props.StringProperty(
-        name="UV Map",
-        description="UV map that the field follows. Empty: the active one",
-        search=_search_uv_maps,
-    )
-    vectors: bpy.props.StringProperty(
-        name="Vectors",
-        description="Vector attribute on faces, points or corners that the field follows. Empty: for Guided, the "
-        "guides that you have combed; for Prescribed, none",
-        search=_search_attributes,
-    )
-    axis: bpy.props.FloatVectorProperty(
-        name="Axis",
-        description="Direction in object space that is projected to the surface",
-        subtype="XYZ",
-        default=(0.0, 0.0, 1.0),
-    )
-    singularities: bpy.props.StringProperty(
-        name="Points",
-        description="Object whose points are the singularities, with an integer attribute 'index'. Empty: the "
-        "points that Singularities has made for the mesh, wherever you have moved them",
-        search=_search_points,
-    )
-    add_missing: bpy.props.BoolProperty(
-        name="Add Missing",
-        description="Add the further singularities that the field needs, where it is smoothest",
-    )
-    attribute: bpy.props.StringProperty(
-        name="Attribute",
-        description="Name of the mesh attribute that stores the field. An existing field is replaced",
-        default="rosy",
-    )
+    __annotations__ = setting_properties(GeneratorSettings) | {
+        "degree": bpy.props.IntProperty(
+            name="Degree",
+            description="Number of directions at each point: 2 for lines, 4 for crosses, 6 for triangles "
+            "and hexagons",
+            min=1,
+            max=MAX_DEGREE,
+            default=4,
+        ),
+        "guides": bpy.props.EnumProperty(
+            name="Follow",
+            description="Kinds of guides that the field follows",
+            options={"ENUM_FLAG"},
+            items=GUIDE_ITEMS,
+            default={"OBJECTS"},
+        ),
+        "guide": bpy.props.StringProperty(
+            name="Object",
+            description="Grease Pencil, curve or empty that the field follows. Empty: all that are "
+            "selected. An object of type Empty guides along its z axis, within its display size",
+            search=_search_guides,
+        ),
+        "edges": bpy.props.EnumProperty(
+            name="Edges", description="Edges that the field follows", items=EDGE_ITEMS
+        ),
+        "uv_map": bpy.props.StringProperty(
+            name="UV Map",
+            description="UV map that the field follows. Empty: the active one",
+            search=_search_uv_maps,
+        ),
+        "vectors": bpy.props.StringProperty(
+            name="Vectors",
+            description="Vector attribute on faces, points or corners that the field follows. Empty: for "
+            "Guided, the guides that you have combed; for Prescribed, none",
+            search=_search_attributes,
+        ),
+        "singularities": bpy.props.StringProperty(
+            name="Points",
+            description="Object whose points are the singularities, with an integer attribute 'index'. "
+            "Empty: the points that Singularities has made for the mesh, wherever you have moved them",
+            search=_search_points,
+        ),
+        "attribute": bpy.props.StringProperty(
+            name="Attribute",
+            description="Name of the mesh attribute that stores the field. An existing field is replaced",
+            default="rosy",
+        ),
+    }
 
     def begin(self, context: bpy.types.Context) -> Steps[str]:
         """Generate all fields, then store them. Return what was made, for a message.
@@ -219,7 +180,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
 
     def _no_direction_error(self, surface: Surface) -> RosyError:
         """Return the error of a mesh on which this kind of field is undefined everywhere."""
-        kind = KIND_LABELS.get(self.kind, self.kind.capitalize())
+        kind = self.properties.bl_rna.properties["kind"].enum_items[self.kind].name
         return RosyError(
             f"{surface.name}: {kind} gives no direction on any face: choose another kind, such as "
             "Form"
@@ -232,7 +193,7 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
         owner = next(obj for obj in selected_mesh_objects(context) if obj.data == mesh)
         kind_guides = {"features": {"EDGES"}, "uv": {"UV"}, "guided": self.guides}
         guides = kind_guides.get(self.kind, ())
-        values: dict[str, Any] = {}
+        values = read_settings(self, GeneratorSettings)
         if "EDGES" in guides and self.edges != "FEATURES":
             values["edges"] = marked_edges(mesh, self.edges)
         elif "EDGES" in guides and self.kind == "guided":
@@ -253,13 +214,11 @@ class ROSY_OT_field_generate(ModalJobMixin, bpy.types.Operator):
             values["singularities"] = read_singularity_points(
                 context.scene, owner, self.degree, self.singularities
             )
-            values["add_missing"] = self.add_missing
             vectors = guide_vectors(mesh, self.vectors, surface) if self.vectors else None
             if self.vectors == GUIDE_ATTRIBUTE:
                 vectors[np.linalg.norm(vectors, axis=1) < STROKE_FIRMNESS] = 0
             values["vectors"] = vectors
-        axis, reach, angle = tuple(self.axis), self.reach, self.sharp_angle
-        return GeneratorSettings(self.kind, axis, reach, angle, **values)
+        return GeneratorSettings(**values)
 
     def _guide_objects(self, context: bpy.types.Context) -> list[bpy.types.Object]:
         """Return the guide objects: the named one, or by default the selected ones."""

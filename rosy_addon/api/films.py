@@ -20,9 +20,10 @@ from ..field.carry import vectors_on_rest_shape
 from ..field.field import Field
 from ..field.frames import normalize
 from ..field.interpolation import interpolate_fields
+from ..field.polygon_arrays import face_area_vectors
 from ..field.representation import face_representation
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface, face_area_vectors, have_same_polygons
+from ..field.surface import Surface, have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +102,7 @@ def curvature(surface: Surface, degree: int = 4, *, reach: float = 0.0) -> Field
     >>> field.degree
     2
     """
-    return generated(surface, GeneratorSettings("curvature", smoothing_length=reach), degree)
+    return generated(surface, GeneratorSettings("curvature", reach=float(reach)), degree)
 
 
 def features(
@@ -137,7 +137,9 @@ def features(
     4
     """
     settings = GeneratorSettings(
-        "features", sharp_angle=sharp_angle, edges=None if edges is None else np.asarray(edges)
+        "features",
+        sharp_angle=float(sharp_angle),
+        edges=None if edges is None else np.asarray(edges),
     )
     return generated(surface, settings, degree)
 
@@ -193,7 +195,7 @@ def guided(
     """
     settings = GeneratorSettings(
         "guided",
-        smoothing_length=reach,
+        reach=float(reach),
         edges=None if edges is None else np.asarray(edges),
         strokes=[np.asarray(stroke, dtype=np.float64) for stroke in strokes],
         uv=uv_map(surface) if uv else None,
@@ -283,7 +285,7 @@ def prescribed(
         "prescribed",
         singularities=(vertex, index),
         vectors=_guide_vectors(surface, vectors, degree),
-        smoothing_length=reach,
+        reach=float(reach),
         add_missing=add_missing,
     )
     return generated(surface, settings, degree)
@@ -335,6 +337,19 @@ def along_uv(surface: Surface, degree: int = 4) -> Field:
     4
     """
     return generated(surface, GeneratorSettings("uv", uv=uv_map(surface)), degree)
+
+
+#: The function of each kind of field.
+GENERATOR_FUNCTIONS: dict[str, Callable[..., Field]] = {
+    "form": form,
+    "smoothest": smoothest,
+    "curvature": curvature,
+    "features": features,
+    "guided": guided,
+    "prescribed": prescribed,
+    "axis": along_axis,
+    "uv": along_uv,
+}
 
 
 def uv_map(surface: Surface) -> np.ndarray:

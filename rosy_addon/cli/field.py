@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import api
 from ..api.figures import LINES, check_figure_path, load_drawing
+from ..api.generators import GENERATOR_FUNCTIONS
 from ..api.pictures import picture_look
 from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
@@ -24,13 +25,7 @@ from .options import Options, add_subcommand, float_between, int_between
 from .streams import print_line
 
 #: Generators that need nothing but the mesh and a degree.
-GENERATORS = {
-    "form": api.form,
-    "smoothest": api.smoothest,
-    "curvature": api.curvature,
-    "features": api.features,
-    "uv": api.along_uv,
-}
+GENERATORS = ("form", "smoothest", "curvature", "features", "uv")
 
 
 def add_field_command(subparsers: Any) -> None:
@@ -313,7 +308,7 @@ def _load_fields(options: Options) -> dict[str, api.Field]:
     # Files come first, because the first of them sets the degree of the generated fields.
     for title, source in sorted(sources.items(), key=lambda item: item[1] in GENERATORS):
         if source in GENERATORS:
-            fields[title] = GENERATORS[source](surface, degree or DEFAULT_DEGREE)
+            fields[title] = GENERATOR_FUNCTIONS[source](surface, degree or DEFAULT_DEGREE)
         else:
             field = fields[title] = read_field(options, Path(source), surface, None)
             degree = degree or field.degree

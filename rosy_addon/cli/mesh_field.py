@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from .. import api
-from ..api.generators import generated, uv_map
+from ..api.generators import GENERATOR_FUNCTIONS
 from ..core.errors import RosyError
+from ..core.settings import settings_of
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.guide_strokes import read_guide_strokes
-from ..field.generate import GENERATORS, GeneratorSettings
+from ..field.generate import GENERATORS, GeneratorSettings, options_of
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
-from .options import CommandParser, Options, float_between, float_tuple, int_between
+from .options import CommandParser, Options, int_between
 
 
 def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> None:
@@ -53,29 +51,10 @@ def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> Non
         help="generate a field instead of reading one; by default guided if there are guides, "
         "prescribed if there are singularities, otherwise form",
     )
-    parser.add_argument(
-        "--axis",
-        type=float_tuple(3, "X,Y,Z"),
-        default=(0.0, 0.0, 1.0),
-        metavar="X,Y,Z",
-        help="direction of the field, for --generate axis (0,0,1)",
-    )
-    parser.add_argument(
-        "--reach",
-        type=float_between(0.0, 10.0),
-        default=0.0,
-        metavar="SHARE",
-        help="distance as a fraction of the size of the mesh: how far curvature extends into flat "
-        "parts, how far guides are smoothed (at 0 the field meets them exactly), or how far a field with "
-        "prescribed singularities bends to guides",
-    )
-    parser.add_argument(
-        "--sharp-angle",
-        type=float_between(0.0, 180.0),
-        default=30.0,
-        metavar="DEGREES",
-        help="smallest angle between the faces of a sharp edge, for --generate features (%(default)g)",
-    )
+    for name, setting in settings_of(GeneratorSettings).items():
+        kinds = [kind for kind in GENERATORS if name in options_of(kind)]
+        if kinds:
+            parser.add_setting_option(setting, f"; for --generate {', '.join(kinds)}")
     parser.add_argument(
         "--strokes",
         type=Path,
@@ -101,11 +80,6 @@ def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> Non
         type=Path,
         metavar="FILE.sings",
         help="singular vertices and their indices, for --generate prescribed",
-    )
-    parser.add_argument(
-        "--add-missing",
-        action="store_true",
-        help="give a prescribed field the further singularities that it needs, where it is smoothest",
     )
     parser.add_argument(
         "--uv", action="store_true", help="make a guided field follow the UV map of an .obj file"
@@ -187,17 +161,12 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
     kind = options.generate or ("guided" if has_guides else "form")
     if options.singularities is not None and options.generate is None:
         kind = "prescribed"
+    given = {name: value for name, value in vars(options).items() if name in options_of(kind)}
     if kind == "prescribed":
         if options.singularities is None:
             raise RosyError(f"{options.mesh}: give the singularities: --singularities FILE.sings")
-        return api.prescribed(
-            surface,
-            options.singularities,
-            options.degree,
-            vectors=_guides(options, surface, options.degree),
-            reach=options.reach,
-            add_missing=options.add_missing,
-        )
+        guides, file = _guides(options, surface, options.degree), options.singularities
+        return api.prescribed(surface, file, options.degree, vectors=guides, **given)
     if kind == "guided":
         return api.guided(
             surface,
@@ -205,13 +174,10 @@ def _generate_field(options: Options, surface: api.Surface) -> api.Field:
             strokes=[] if options.strokes is None else read_guide_strokes(options.strokes),
             vectors=_guides(options, surface, degree),
             uv=options.uv,
-            reach=options.reach,
             vectors_have_firmness=options.firmness,
+            **given,
         )
-    settings = GeneratorSettings(kind, options.axis, options.reach, np.radians(options.sharp_angle))
-    if kind == "uv":
-        settings = replace(settings, uv=uv_map(surface))
-    return generated(surface, settings, degree)
+    return GENERATOR_FUNCTIONS[kind](surface, degree=degree, **given)
 
 
 def _guides(options: Options, surface: api.Surface, degree: int | None) -> api.Field | None:

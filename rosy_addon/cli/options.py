@@ -8,6 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -17,11 +18,21 @@ from ..api.pictures import DEFAULT_VIEW, VERTEX_COLOR, picture_look
 from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..core.file_io import check_writable
-from ..core.settings import settings_of
+from ..core.settings import Choice, Number, Setting, Switch, Vector, settings_of
 from ..field.up_axis import UP_AXIS_MATRIX
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
 from .streams import print_line
+
+#: Placeholders of numbers in the help, by their units.
+METAVARS = {
+    "pixels": "PX",
+    "length": "UNITS",
+    "spacings": "SPACINGS",
+    "size": "SHARE",
+    "angle": "DEGREES",
+    "": "AMOUNT",
+}
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -36,6 +47,32 @@ class CommandParser(argparse.ArgumentParser):
     def add_object_option(self, help_text: str) -> None:
         """Add --object with one name or more. It may be repeated; ``--object=-x`` is the name -x."""
         self.add_argument("--object", nargs="+", action="extend", metavar="NAME", help=help_text)
+
+    def add_setting_option(self, setting: Setting, note: str = "") -> None:
+        """Add the option of a setting, with its range or choices, help text and default.
+
+        An option that is not given is not set. Angles are in degrees on the command line, and then in radians.
+        `note` is added to the help text.
+        """
+        text = setting.text[0].lower() + setting.text[1:] + note
+        option, default = f"--{setting.name.replace('_', '-')}", setting.default
+        add = partial(self.add_argument, option, default=argparse.SUPPRESS)
+        match setting:
+            case Switch():
+                add(action=argparse.BooleanOptionalAction, help=text)
+            case Choice(options=options):
+                add(choices=tuple(options), help=f"{text} ({default})")
+            case Vector():
+                help_text = f"{text} ({','.join(f'{value:g}' for value in default)})"
+                add(type=float_tuple(3, "X,Y,Z"), metavar="X,Y,Z", help=help_text)
+            case Number(low=low, high=high, unit="angle"):
+                help_text = f"{text} ({np.degrees(default):g})"
+                add(type=degrees_between(low, high), metavar=METAVARS["angle"], help=help_text)
+            case Number(low=low, high=high, unit=unit):
+                help_text = f"{text} ({default:g})"
+                add(type=float_between(low, high), metavar=METAVARS[unit], help=help_text)
+            case _:
+                raise TypeError(f"setting '{setting.name}' has no option")
 
     def add_workers_option(self) -> None:
         """Add --workers."""
@@ -267,6 +304,12 @@ def float_between(low: float, high: float) -> Callable[[str], float]:
         return value
 
     return parse
+
+
+def degrees_between(low: float, high: float) -> Callable[[str], float]:
+    """Return a parser for an angle in degrees that returns radians. The interval is in radians."""
+    parse = float_between(np.degrees(low), np.degrees(high))
+    return lambda text: float(np.radians(parse(text)))
 
 
 def int_between(low: int, high: int) -> Callable[[str], int]:

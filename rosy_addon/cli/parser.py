@@ -19,9 +19,6 @@ from .presets import add_presets_command
 from .streams import discard_output, output_stream, print_error, printed_warnings
 from .strokes import add_strokes_command
 
-#: Options whose values may begin with a minus sign.
-NEGATIVE_VALUE_OPTIONS = ("--view", "--axis", "--light-direction", "--frames")
-
 #: Commands that may need Blender.
 BLENDER_VERBS = {"bake", "strokes", "turntable", "film"}
 
@@ -144,11 +141,11 @@ def _build_parser(prog: str, extras: Extras = NO_EXTRAS) -> CommandParser:
 def _join_negative_values(arguments: Sequence[str]) -> list[str]:
     """Return the arguments with `--view -30,20` as `--view=-30,20`.
 
-    Otherwise argparse reads the negative number as an option.
+    Otherwise argparse reads the negative number as an option. No option begins with a digit.
     """
     joined: list[str] = []
     for argument in arguments:
-        if joined and joined[-1] in NEGATIVE_VALUE_OPTIONS and re.match(r"-[\d.]", argument):
+        if joined and re.fullmatch("--[a-z-]+", joined[-1]) and re.match(r"-[\d.]", argument):
             joined[-1] += f"={argument}"
         else:
             joined.append(argument)

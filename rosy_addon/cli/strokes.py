@@ -14,7 +14,8 @@ from typing import Any
 from ..api.drawings import draw_strokes
 from ..api.pictures import DEFAULT_SIZE, DEFAULT_VIEW
 from ..core.errors import RosyError
-from ..core.settings import Choice, Number, Setting, Switch, settings_of
+from ..core.settings import settings_of
+from ..field.generate import GeneratorSettings
 from ..line_drawing.polyline_files import check_drawing_suffix
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen
@@ -29,8 +30,8 @@ from .streams import print_line
 #: Default values of the options that are only for mesh files, and only for .blend files.
 MESH_ONLY_DEFAULTS = {
     **dict.fromkeys(("field", "degree", "generate", "strokes", "guides", "field_mesh", "up")),
-    **dict.fromkeys(("array", "step", "singularities")),
-    **dict.fromkeys(("uv", "undefined", "orthographic"), False),
+    **dict.fromkeys(("array", "step", "singularities", *settings_of(GeneratorSettings))),
+    **dict.fromkeys(("uv", "firmness", "undefined", "orthographic"), False),
     "view": DEFAULT_VIEW,
 }
 #: The same of the options that are only for pictures.
@@ -171,10 +172,6 @@ def _reject_options(
             raise RosyError(f"{file}: {option} applies only to {file_kind}")
 
 
-#: Placeholders of numbers in the help, by their units.
-METAVARS = {"pixels": "PX", "length": "UNITS", "spacings": "SPACINGS", "": "AMOUNT"}
-
-
 def add_style_options(parser: CommandParser) -> None:
     """Add an option for each setting of `StrokeStyle` except the unit. Those not given are not set.
 
@@ -182,24 +179,7 @@ def add_style_options(parser: CommandParser) -> None:
     """
     for name, setting in settings_of(StrokeStyle).items():
         if name != "unit":
-            _add_setting_option(parser, setting)
-
-
-def _add_setting_option(parser: CommandParser, setting: Setting) -> None:
-    """Add the option of a setting, with its range or choices, help text and default."""
-    option = f"--{setting.name.replace('_', '-')}"
-    add = partial(parser.add_argument, option, default=argparse.SUPPRESS)
-    text = setting.text[0].lower() + setting.text[1:]
-    match setting:
-        case Switch():
-            add(action=argparse.BooleanOptionalAction, help=text)
-        case Choice(options=options, default=default):
-            add(choices=tuple(options), help=f"{text} ({default})")
-        case Number(low=low, high=high, unit=unit, default=default):
-            help_text = f"{text} ({default:g})"
-            add(type=float_between(low, high), metavar=METAVARS[unit], help=help_text)
-        case _:
-            raise TypeError(f"setting '{setting.name}' has no option")
+            parser.add_setting_option(setting)
 
 
 def stroke_style_of(options: Options, base: StrokeStyle) -> StrokeStyle:

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress, report
+from ..field.connectivity import connected_components
 from ..field.frames import dot
-from ..field.surface import connected_components
 from ..projection.crease_pixels import crease_pixels
 from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh

@@ -9,14 +9,13 @@ import secrets
 import stat
 import time
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
 from .errors import RosyError
 from .memory import check_memory, format_bytes
-from .progress import report
 
 #: Bytes at the beginning of a file that show whether it is binary.
 HEAD_BYTES = 4096
@@ -142,29 +141,6 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
     """
     with replacing(path) as temporary, open(temporary, "xb") as file:
         file.write(data)
-
-
-def write_blocks(path: str | os.PathLike[str], blocks: Iterable[bytes], block_count: float) -> None:
-    """Write a file atomically, block by block; see `replacing`.
-
-    If the work is cancelled, an existing file stays unchanged.
-
-    Parameters
-    ----------
-    path : path-like
-    blocks : iterable of bytes
-    block_count : float
-        About how many there are, for the progress.
-
-    Raises
-    ------
-    RosyError
-        If the folder is missing, or the file cannot be written. An existing file stays unchanged.
-    """
-    with replacing(path) as temporary, open(temporary, "xb") as file:
-        for number, block in enumerate(blocks, 1):
-            file.write(block)
-            report(min(number / block_count, 1.0), "writing the file")
 
 
 @contextmanager

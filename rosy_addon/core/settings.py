@@ -1,9 +1,10 @@
 """Declarative settings: dataclass fields with a range, a label and a help text.
 
-A settings class is a frozen dataclass whose fields are made by `number`, `choice`, `switch` and
-`color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
+A settings class is a frozen dataclass whose fields are made by `number`, `vector`, `choice`, `switch`
+and `color`. Each field has a `Setting`: its default, range, label, help text, place in the panels,
 the stage of rendering that it affects and when it applies. Properties, panels, validation, command
-line options, tables of the documentation and cache keys are derived from these descriptions.
+line options, tables of the documentation and cache keys are derived from these descriptions. Other
+fields of the class, such as arrays, have no description.
 """
 
 from __future__ import annotations
@@ -102,7 +103,10 @@ class Number(Setting):
     low, high : float
         The range, both ends included.
     unit : str
-        "angle" (radians), "length" (Blender units), "pixels" or "spacings"; empty if it has none.
+        "angle" (radians), "length" (Blender units), "size" (fraction of the size of the mesh), "pixels" or
+        "spacings"; empty if it has none.
+    soft_high : float or None
+        Upper end of sliders, if lower than `high`.
     is_pixel_length : bool
         Whether the value is a length that depends on the resolution. Such lengths are multiplied
         when the frame has more pixels, as with supersampling.
@@ -112,6 +116,7 @@ class Number(Setting):
 
     low: float = 0.0
     high: float = 1.0
+    soft_high: float | None = None
     unit: str = ""
     is_pixel_length: bool = False
     preview_low: float = 0.0
@@ -132,6 +137,16 @@ class Number(Setting):
     def parse(self, text: str) -> Any:
         """Convert a text to a number."""
         return type(self.default)(text)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vector(Setting):
+    """A vector of 3 numbers, in object space."""
+
+    def check(self, value: Any) -> None:
+        """Raise a `RosyError` if a value does not have 3 components."""
+        if len(value) != 3:
+            self._refuse(value, "3 numbers")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,6 +199,11 @@ def number(default: float, low: float, high: float, text: str, **description: An
     return _field(Number(default=default, low=low, high=high, text=text, **description))
 
 
+def vector(default: tuple[float, float, float], text: str, **description: Any) -> Any:
+    """Return a dataclass field for a `Vector`."""
+    return _field(Vector(default=default, text=text, **description))
+
+
 def choice(default: str, text: str, options: Mapping[str, str], **description: Any) -> Any:
     """Return a dataclass field for a `Choice`."""
     return _field(Choice(default=default, text=text, options=options, **description))
@@ -208,7 +228,9 @@ def settings_of(cls: type) -> Mapping[str, Setting]:
     """Return the descriptions of a settings class by name, in the order of its fields."""
     settings = {}
     for entry in fields(cls):
-        setting: Setting = entry.metadata["setting"]
+        setting: Setting | None = entry.metadata.get("setting")
+        if setting is None:
+            continue
         label = setting.label or title(entry.name)
         settings[entry.name] = replace(setting, name=entry.name, label=label)
     return MappingProxyType(settings)

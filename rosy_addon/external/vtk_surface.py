@@ -10,7 +10,7 @@ from ..core.errors import RosyError, counted
 from ..field.formats.polygons import Polygons, offsets_from_sizes
 from ..field.frames import dot
 from ..field.mesh_arrays import MeshArrays
-from ..field.surface import face_area_vectors, mean_per_face
+from ..field.polygon_arrays import face_area_vectors, mean_per_face
 
 #: VTK's cell types. Surface cells have this number of corners, or None: all points are corners.
 _STRIP, _PIXEL, _QUADRATIC_POLYGON = 6, 8, 36

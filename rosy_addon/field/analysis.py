@@ -9,6 +9,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import row_blocks
+from .connectivity import build_edges
 from .directional_field import field_directions
 from .frames import coordinates, dot, normalize
 from .representation import (
@@ -20,7 +21,7 @@ from .representation import (
 )
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
-from .surface import Surface, build_edges
+from .surface import Surface
 
 #: Singularities match if they are nearer than this fraction of the longest side of the mesh.
 DEFAULT_REACH = 0.05
@@ -78,13 +79,13 @@ class FieldComparison(NamedTuple):
     Attributes
     ----------
     angles : (F,) float64 ndarray
-        Of `angle_errors`, in radians.
+        Angle between the fields on each face, in radians; see `angle_errors`.
     statistics : ErrorStatistics
-        Of the angles.
+        Statistics of the angles.
     singularity_count, other_count : int
-        Singularities of each field.
+        Number of singularities of each field.
     matched_count : int
-        Those that have the same index in both, at nearly the same place.
+        Number of singularities that have the same index in both fields, at nearly the same place.
     """
 
     angles: np.ndarray
@@ -155,10 +156,9 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians from a member to the nearest member of the other field, 0 to pi / N. If the
-        directions of one of them are not rotationally symmetric: the mean angle between the directions
-        of the matching, of the N that keep their order, for which it is least. NaN on faces where
-        either field is undefined.
+        Angle in radians from a member to the nearest member of the other field, 0 to pi / N. If one of the
+        fields is not a RoSy, it is the mean angle between matched directions. N matchings keep the order of
+        the directions; the one with the least mean is used. NaN on faces where either field is undefined.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
 
 
 def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
-    """(F,) mean angles between the directions of two fields, for the best of their N matchings."""
+    """Return (F,) mean angles between the directions of two fields, for the best of their N matchings."""
     frames = face_frames(surface)
     z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
@@ -223,7 +223,7 @@ def format_degrees(degrees: float) -> str:
 
 
 def _triangle_areas(surface: Surface) -> np.ndarray:
-    """(T,) float64 areas of the triangles, in square Blender units."""
+    """Return (T,) float64 areas of the triangles, in square Blender units."""
     corner = surface.vertices[surface.triangle_vertex]
     cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return np.sqrt(dot(cross, cross)) / 2
@@ -241,14 +241,14 @@ def match_on_surface(
     ----------
     surface : Surface
     singularities, other : (vertex, index)
-        Of two fields of the same degree, as `singularities.find_singularities` returns them.
+        The singularities of two fields of the same degree; see `singularities.find_singularities`.
     reach : float
         Largest distance of a pair, a straight line, as a fraction of the longest side of the mesh.
 
     Returns
     -------
     SingularityMatching
-        In the order of `first`.
+        Pairs in ascending order of `first`.
     """
     (vertex, index), (other_vertex, other_index) = singularities, other
     points, other_points = surface.vertices[vertex], surface.vertices[other_vertex]

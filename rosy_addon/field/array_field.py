@@ -14,9 +14,10 @@ from .blocks import as_float64
 from .field_io import field_from_raw
 from .formats.polygons import RawField
 from .frames import dot
+from .polygon_arrays import mean_per_face
 from .representation import face_frames, from_representation, to_representation
 from .rosy_field import MAX_DEGREE, RosyField, check_degree
-from .surface import Surface, mean_per_face
+from .surface import Surface
 from .validate import (
     MAX_OUTLIER_FRACTION,
     TOLERANCE_DEG,
@@ -185,7 +186,7 @@ def array_field(
     12 ...   3 N numbers: all N directions
     =======  ====================================================================================
 
-    Vectors that are tangent to the surface are treated as those of a field file, see
+    Vectors that are tangent to the surface are treated like vectors of a field file; see
     `field.validate.validated_field`. Other vectors, such as velocities at the boundary of a volume,
     are replaced by their tangential components. Those at points are projected to each face at the
     point, and then averaged over the corners of the face as RoSys. Tensors are restricted to the
@@ -270,7 +271,7 @@ def _raw_field(array: FieldArray, source: str) -> RawField:
 def _tangential_on_faces(
     surface: Surface, vectors: np.ndarray, domain: str, degree: int
 ) -> np.ndarray | None:
-    """The (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
+    """Return the (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
     normal = tangent_normals(surface, domain)
     length = np.sqrt(dot(vectors, vectors))
     is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length

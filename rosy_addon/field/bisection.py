@@ -1,4 +1,9 @@
-"""Conforming refinement of triangles by bisection, with a binary tree that finds the small ones."""
+"""Refine triangles by bisection, and find the refined triangle that contains a point.
+
+Edges that are too long are bisected in both of their triangles, so that neighbors keep sharing their edges.
+Each bisected triangle becomes the parent of two others in a binary tree, which finds the triangle of a
+point from its barycentric coordinates.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +19,14 @@ LENGTH_STEP = 1.15
 
 @dataclass(frozen=True, eq=False)
 class BisectionTree:
-    """Triangles that are bisected again and again. The T roots are the given triangles.
+    """A forest of triangles: T roots, the given triangles, and the two halves of each bisected triangle.
 
-    n is the number of nodes of the tree, L of its leaves.
+    n is the number of all triangles, the nodes, and L is the number of leaves, which are not bisected.
 
     Attributes
     ----------
     first_child : (n,) int32 ndarray
-        Index of the first of the two children of a node, which follow each other. -1 for a leaf.
+        Node of the first half of a triangle; the second half is the next node. -1 for a leaf.
     split_edge : (n,) int8 ndarray
         The corner k at which the bisected edge starts; it ends at the next corner.
     leaf : (n,) int32 ndarray
@@ -29,9 +34,9 @@ class BisectionTree:
     leaf_root : (L,) int32 ndarray
         The root that contains each leaf.
     leaf_vertex : (L, 3) int32 ndarray
-        Vertices of the leaves. Those beyond the given ones are midpoints of edges.
+        Vertices of the leaves. Midpoints of edges are numbered after the given vertices.
     leaf_weights : (L, 3, 3) float32 ndarray
-        Barycentric coordinates in the root of the corners of each leaf. They are exact.
+        Barycentric coordinates of the corners of each leaf in its root. They are exact.
     vertices : (V, 3) float64 ndarray
         Positions of all vertices.
     """
@@ -98,76 +103,123 @@ def bisect(
     -------
     BisectionTree
     """
-    root_count = len(triangle_vertex)
-    leaf_vertex = np.array(triangle_vertex, dtype=np.int32)
-    leaf_weights = np.broadcast_to(np.eye(3, dtype=np.float32), (root_count, 3, 3)).copy()
-    leaf_root = np.arange(root_count, dtype=np.int32)
-    leaf_node = leaf_root.copy()
-    first_child = np.full(root_count, -1, dtype=np.int32)
-    split_edge = np.zeros(root_count, dtype=np.int8)
+    leaves = _Leaves(vertices, triangle_vertex)
     while True:
-        lengths = _edge_lengths(vertices, leaf_vertex)
-        long = lengths > max_length
-        while len(leaf_vertex) + np.count_nonzero(long) > max_triangles and long.any():
+        lengths = _edge_lengths(leaves.vertices, leaves.vertex)
+        is_long = lengths > max_length
+        # Each half of a long edge gets a triangle on either side.
+        while is_long.any() and len(lengths) + np.count_nonzero(is_long) > max_triangles:
             max_length *= LENGTH_STEP
-            long = lengths > max_length
-        if not long.any():
-            break
-        # The new vertices, and the one on each marked edge of each triangle.
-        tail = leaf_vertex.astype(np.int64)
+            is_long = lengths > max_length
+        if not is_long.any():
+            return leaves.tree()
+        midpoint = leaves.add_midpoints(is_long)
+        while (midpoint >= 0).any():
+            midpoint = leaves.split_longest(midpoint)
+
+
+class _Leaves:
+    """The leaves of a growing `BisectionTree`, with the arrays of the tree.
+
+    A node is a leaf until it is split. `node` is (L,) int32, the node of each leaf.
+    """
+
+    def __init__(self, vertices: np.ndarray, triangle_vertex: np.ndarray) -> None:
+        count = len(triangle_vertex)
+        self.vertices = vertices
+        self.vertex = np.array(triangle_vertex, dtype=np.int32)
+        self.weights = np.broadcast_to(np.eye(3, dtype=np.float32), (count, 3, 3)).copy()
+        self.root = np.arange(count, dtype=np.int32)
+        self.node = self.root.copy()
+        self.first_child = np.full(count, -1, dtype=np.int32)
+        self.split_edge = np.zeros(count, dtype=np.int8)
+
+    def add_midpoints(self, is_marked: np.ndarray) -> np.ndarray:
+        """Add a vertex in the middle of each marked edge.
+
+        Parameters
+        ----------
+        is_marked : (L, 3) bool ndarray
+            Edges from each corner to the next. Both triangles of an edge must mark it.
+
+        Returns
+        -------
+        (L, 3) int32 ndarray
+            The new vertex on each edge; -1 on edges that are not marked.
+        """
+        count = len(self.vertices)
+        tail = self.vertex.astype(np.int64)
         head = np.roll(tail, -1, axis=1)
-        key = np.minimum(tail, head) * len(vertices) + np.maximum(tail, head)
-        unique_key, inverse = np.unique(key[long], return_inverse=True)
-        midpoint = np.full(leaf_vertex.shape, -1, dtype=np.int32)
-        midpoint[long] = len(vertices) + inverse.reshape(-1)
-        low, high = np.divmod(unique_key, len(vertices))
-        vertices = np.concatenate([vertices, 0.5 * (vertices[low] + vertices[high])])
-        while len(parent := np.flatnonzero((midpoint >= 0).any(axis=1))):
-            # The longest of the marked edges; halved edges are not marked.
-            lengths = _edge_lengths(vertices, leaf_vertex[parent])
-            edge = np.where(midpoint[parent] >= 0, lengths, -1.0).argmax(axis=1)
-            order = (edge[:, None] + np.arange(3)) % 3
-            corner = np.take_along_axis(leaf_vertex[parent], order, 1)
-            mid, mid_bc, mid_ca = np.take_along_axis(midpoint[parent], order, 1).T
-            none = np.full_like(mid, -1)
-            weights = np.take_along_axis(leaf_weights[parent], order[:, :, None], 1)
-            children = len(first_child) + np.arange(2 * len(parent), dtype=np.int32)
-            first_child[leaf_node[parent]] = children[::2]
-            first_child = np.concatenate([first_child, np.full_like(children, -1)])
-            split_edge[leaf_node[parent]] = edge
-            split_edge = np.concatenate([split_edge, np.zeros(len(children), dtype=np.int8)])
-            leaf_node = _split(leaf_node, parent, children[::2], children[1::2])
-            leaf_root = _split(leaf_root, parent, leaf_root[parent], leaf_root[parent])
-            leaf_vertex = _split(leaf_vertex, parent, *_halves(corner, mid))
-            leaf_weights = _split(
-                leaf_weights, parent, *_halves(weights, 0.5 * (weights[:, 0] + weights[:, 1]))
-            )
-            first_midpoint = np.stack([none, none, mid_ca], axis=1)
-            second_midpoint = np.stack([none, mid_bc, none], axis=1)
-            midpoint = _split(midpoint, parent, first_midpoint, second_midpoint)
-    leaf = np.full(len(first_child), -1, dtype=np.int32)
-    leaf[leaf_node] = np.arange(len(leaf_node), dtype=np.int32)
-    return BisectionTree(
-        first_child, split_edge, leaf, leaf_root, leaf_vertex, leaf_weights, vertices
-    )
+        key = np.minimum(tail, head) * count + np.maximum(tail, head)
+        edge_key, edge = np.unique(key[is_marked], return_inverse=True)
+        midpoint = np.full(self.vertex.shape, -1, dtype=np.int32)
+        midpoint[is_marked] = count + edge.reshape(-1)
+        low, high = np.divmod(edge_key, count)
+        middle = 0.5 * (self.vertices[low] + self.vertices[high])
+        self.vertices = np.concatenate([self.vertices, middle])
+        return midpoint
+
+    def split_longest(self, midpoint: np.ndarray) -> np.ndarray:
+        """Split each leaf with midpoints on its edges, at the longest of these edges.
+
+        `midpoint` is from `add_midpoints`, or the result of the last call: the midpoints on the edges of the
+        new leaves. The halves of split edges have none.
+        """
+        parent = np.flatnonzero((midpoint >= 0).any(axis=1))
+        lengths = _edge_lengths(self.vertices, self.vertex[parent])
+        edge = np.where(midpoint[parent] >= 0, lengths, -1.0).argmax(axis=1)
+        # The split edge runs from corner a to b, and c is opposite.
+        order = (edge[:, None] + np.arange(3)) % 3
+        middle, on_bc, on_ca = np.take_along_axis(midpoint[parent], order, 1).T
+        weights = np.take_along_axis(self.weights[parent], order[:, :, None], 1)
+        halves = _halves(np.take_along_axis(self.vertex[parent], order, 1), middle)
+        weight_halves = _halves(weights, 0.5 * (weights[:, 0] + weights[:, 1]))
+        children = len(self.first_child) + np.arange(2 * len(parent), dtype=np.int32)
+        self.first_child[self.node[parent]] = children[::2]
+        self.first_child = np.concatenate([self.first_child, np.full_like(children, -1)])
+        self.split_edge[self.node[parent]] = edge
+        self.split_edge = np.concatenate([self.split_edge, np.zeros(len(children), dtype=np.int8)])
+        self.node = _replaced(self.node, parent, children[::2], children[1::2])
+        self.root = _replaced(self.root, parent, self.root[parent], self.root[parent])
+        self.vertex = _replaced(self.vertex, parent, *halves)
+        self.weights = _replaced(self.weights, parent, *weight_halves)
+        none = np.full_like(middle, -1)
+        first, second = (
+            np.stack(rows, axis=1) for rows in ((none, none, on_ca), (none, on_bc, none))
+        )
+        return _replaced(midpoint, parent, first, second)
+
+    def tree(self) -> BisectionTree:
+        """Return the tree with these leaves."""
+        leaf = np.full(len(self.first_child), -1, dtype=np.int32)
+        leaf[self.node] = np.arange(len(self.node), dtype=np.int32)
+        return BisectionTree(
+            first_child=self.first_child,
+            split_edge=self.split_edge,
+            leaf=leaf,
+            leaf_root=self.root,
+            leaf_vertex=self.vertex,
+            leaf_weights=self.weights,
+            vertices=self.vertices,
+        )
 
 
 def _halves(corner: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values of (n, 3, ...) corners of both triangles, from those of the middle of the first edge."""
+    """Return the corners (a, middle, c) and (middle, b, c), given (n, 3, ...) corners a, b, c."""
     a, b, c = np.moveaxis(corner, 1, 0)
     return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
 
 
-def _split(
+def _replaced(
     leaves: np.ndarray, parent: np.ndarray, first: np.ndarray, second: np.ndarray
 ) -> np.ndarray:
-    """Replace parents in a list of leaves by their first children, and append the second ones."""
+    """Return values of the leaves where parents have become their first children, and the second ones follow."""
     leaves[parent] = first
     return np.concatenate([leaves, second])
 
 
 def _edge_lengths(vertices: np.ndarray, triangle_vertex: np.ndarray) -> np.ndarray:
-    """(T, 3) lengths of the edges from each corner to the next. Equal in both triangles."""
+    """Return (T, 3) lengths of the edges from each corner to the next, equal in both triangles."""
     points = vertices.take(triangle_vertex, axis=0)
     edges = np.roll(points, -1, axis=1) - points
     return np.sqrt(dot(edges, edges))

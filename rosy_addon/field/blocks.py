@@ -1,12 +1,10 @@
-"""Rows of arrays in blocks, which bound memory and report progress, and in ranges."""
+"""Rows of arrays in blocks, which bound memory, and in ranges."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-
-from ..core.progress import report
 
 #: Rows of an array (faces, corners, edges) in a block. One takes hundredths of a second.
 ROWS_PER_BLOCK = 1 << 16
@@ -35,7 +33,6 @@ def blocks_by_count(count: np.ndarray, limit: int) -> list[slice]:
 def by_rows(
     function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
     *arrays: np.ndarray,
-    label: str | None = None,
 ) -> np.ndarray | tuple[np.ndarray, ...]:
     """Apply a function of arrays to blocks of their rows, and join the results.
 
@@ -45,22 +42,16 @@ def by_rows(
         Takes a block of each array and returns one array, or a tuple of arrays, with as many rows.
         A row of the result depends on the same rows of the arrays alone.
     arrays : (n, ...) ndarray
-    label : str, optional
-        Of the progress. Without one, none is reported.
     """
-    count = len(arrays[0])
-    parts = []
-    for block in row_blocks(count):
-        if label is not None:
-            report(block.start / max(count, 1), label)
-        parts.append(function(*(array[block] for array in arrays)))
+    blocks = row_blocks(len(arrays[0]))
+    parts = [function(*(array[block] for array in arrays)) for block in blocks]
     if isinstance(parts[0], tuple):
         return tuple(np.concatenate(columns) for columns in zip(*parts, strict=True))
     return np.concatenate(parts)
 
 
 def mask(count: int, index: np.ndarray) -> np.ndarray:
-    """(count,) bool: True at the indices."""
+    """Return (count,) bool, True at the indices."""
     result = np.zeros(count, dtype=bool)
     result[index] = True
     return result

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .frames import dot, normalize, tangent_frame
+from .polygon_arrays import mean_per_face
 from .representation import complex_bincount, unit_complex
-from .surface import Surface, mean_per_face
+from .surface import Surface
 
 #: Largest sine of the angle between a vector and the plane of its face before the motion. Steeper
 #: vectors are not tangent to the face and stay as they are.
@@ -85,7 +86,7 @@ def vectors_on_rest_shape(
     Returns
     -------
     (F, 3) float64 ndarray
-        Of the same lengths. Zero on faces without area in one of the shapes.
+        The lengths stay. Vectors are zero on faces without area in one of the shapes.
 
     See Also
     --------
@@ -105,7 +106,7 @@ def vectors_on_rest_shape(
 
 
 def _planar_corners(surface: Surface) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """The tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
+    """Return the tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
     x, y = tangent_frame(surface.face_normal)
     face = surface.corner_face
     points = surface.vertices[surface.corner_vertex]

@@ -1,9 +1,9 @@
-"""The singularities that a field needs besides given ones, where they cost least.
+"""Add the singularities that a field needs besides given ones, where they add the least energy.
 
-A connection that turns around the given singularities takes their part of the curvature. The smoothest field of
-what is left (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013) has the other ones. They then go from vertex
-to vertex to where the energy of all angles is least (`turning_angles`): a singularity is a charge in the
-potential of the others and of the curvature. Those with opposite indices vanish where they meet.
+First, a connection with the given singularities is computed. The smoothest field of this connection (Knöppel,
+Crane, Pinkall and Schröder, SIGGRAPH 2013) has the missing singularities. These are then moved from vertex to
+vertex, as long as the energy of all angles decreases (`turning_angles`). In this energy, singularities are
+charges: each lies in the potential of all others and of the curvature. Opposite ones vanish where they meet.
 """
 
 from __future__ import annotations
@@ -14,23 +14,24 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import neighbors_of_nodes
 from .face_graph import LABEL, FaceGraph, face_graph
+from .polygon_arrays import face_area_vectors
 from .prescribed import index_at_nodes
 from .representation import face_frames, from_representation, unit_complex
 from .rosy_field import RosyField, check_degree
 from .singularities import find_singularities
 from .smoothest import eigenproblem, spectral_shift
 from .sparse_multigrid import CSRMatrix, from_edges
-from .surface import Surface, face_area_vectors
+from .surface import Surface
 from .turning_angles import least_angles, potential_solver
 
 #: Largest number of steps to neighboring vertices.
 MAX_STEPS = 60
 
-#: Residual norm of the potential relative to that of the right-hand side.
+#: Residual norm of the potential, relative to the norm of the right-hand side.
 TOLERANCE = 1e-8
 
-#: Resistance between two neighbors in a triangulation, relative to that of the edge alone. It is the mean, by
-#: Foster's theorem.
+#: Effective resistance between two neighbors in a triangulation, relative to the resistance of their edge
+#: alone: the mean over all edges, by Foster's theorem.
 EDGE_RESISTANCE = 1 / 3
 
 #: Least share of the singularities that are moved at once.
@@ -40,7 +41,7 @@ MIN_SHARE = 0.05
 def cheapest_singularities(
     surface: Surface, degree: int, vertex: np.ndarray, index: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the singularities that are missing where a field with all of them is smooth.
+    """Find the missing singularities at vertices where the field stays as smooth as possible.
 
     Parameters
     ----------
@@ -53,8 +54,8 @@ def cheapest_singularities(
     Returns
     -------
     vertex, index : (K + L,) int64 ndarray
-        The given ones, and those that were found, at other vertices. On a closed surface, the indices have
-        the sum that it needs.
+        The given singularities, then the added ones, at other vertices. On a closed surface, all indices add
+        up to N times the Euler characteristic.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def cheapest_singularities(
 
 
 def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """(n,) parts of the given indices on each closed component, spread over its nodes by area."""
+    """Return (n,) parts of the given indices on each closed component, spread over its nodes by area."""
     corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
     node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
     component = graph.node_component
@@ -102,7 +103,7 @@ def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndar
 
 
 def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
-    """(n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
+    """Return (n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
     if not added.any():
         return added
     with progress(0.0, 0.2):
@@ -170,7 +171,7 @@ class _Neighbors:
 
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
-    """The matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
+    """Return the matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))
     ends = np.concatenate([source, target])

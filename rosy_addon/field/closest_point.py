@@ -115,21 +115,21 @@ class _ClosestSearch:
         self.key, self.cell_triangle = cell_key[order], owner[order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) int64 cells of points; the nearest cell for points outside of the grid."""
+        """Return (n, 3) int64 cells of points; the nearest cell for points outside of the grid."""
         return np.clip(np.floor(self._in_cells(points)), 0, self.shape - 1).astype(np.int64)
 
     def _in_cells(self, points: np.ndarray) -> np.ndarray:
-        """(n, 3) positions of points in cells; those far outside of the grid are moved beside it."""
+        """Return (n, 3) positions of points in cells; those far outside of the grid are moved beside it."""
         margin = self.cell_size
         points = np.clip(points, self.origin - margin, self.top + margin)
         return (points - self.origin) / self.cell_size
 
     def _keys_of(self, cell: np.ndarray) -> np.ndarray:
-        """(n,) int64: (n, 3) cells as single numbers, to sort by."""
+        """Return (n,) int64, (n, 3) cells as single numbers, to sort by."""
         return (cell[:, 0] * self.shape[1] + cell[:, 1]) * self.shape[2] + cell[:, 2]
 
     def distance_to_cell_border(self, selection: np.ndarray) -> np.ndarray:
-        """(k,) distances of (k,) points from the border of their cell; 0 outside of the grid."""
+        """Return (k,) distances of (k,) points from the border of their cell; 0 outside of the grid."""
         points = self.points[selection]
         fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
@@ -162,7 +162,7 @@ class _ClosestSearch:
     def _cell_distances(
         self, selection: np.ndarray, own_cell: np.ndarray, offset: np.ndarray
     ) -> np.ndarray:
-        """(k c,) distances of (k,) points from the c cells at the given offsets from their own."""
+        """Return (k c,) distances of (k,) points from the c cells at the given offsets from their own."""
         size = self.cell_size
         position = (self.points[selection] - self.origin - own_cell * size)[:, None]
         gap = np.maximum(np.maximum(offset * size - position, position - (offset + 1) * size), 0)
@@ -185,7 +185,7 @@ class _ClosestSearch:
 
 
 def point_triangle_distances(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """(n,) distances of (n, 3) points from (n, 3, 3) triangles."""
+    """Return (n,) distances of (n, 3) points from (n, 3, 3) triangles."""
     a, b, c = (corners[:, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     size = np.sqrt(dot(normal, normal))

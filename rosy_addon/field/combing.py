@@ -29,7 +29,7 @@ MIN_REACH_EDGES = 2.0
 
 
 class Combing:
-    """A field and its guides; made by `start_combing`.
+    """A field and the guides that it follows; made by `start_combing`.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Combing:
     guides : (F,) complex128 ndarray
         Representations of the guides, whose moduli are their firmness. Call `follow` after a change.
     magnitude : (F,) float64 ndarray
-        Of the field.
+        Magnitude of the field.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ def start_combing(
     Parameters
     ----------
     system : GuidedSystem
-        Of the surface and the degree of the field.
+        The system of the surface, for the degree of the field.
     field : RosyField
         A RoSy.
     guide_vectors : (F, 3) ndarray

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.progress import progress, report
 from .sparse_multigrid import CSRMatrix, hierarchy, w_cycle
 
-#: Residual norm relative to that of the right-hand side at which the iteration stops, by default.
+#: Residual norm at which the iteration stops by default, relative to the norm of the right-hand side.
 RELATIVE_TOLERANCE = 1e-9
 MAX_ITERATIONS = 400
 #: The least residual norm relative to the first one.
@@ -35,13 +35,13 @@ def conjugate_gradient(
         (n, n), Hermitian and positive definite.
     rhs : (n,) complex or float ndarray
     tolerance : float
-        Residual norm relative to that of `rhs` at which the iteration stops, unless rounding errors stop it
-        before.
+        Residual norm at which the iteration stops, relative to the norm of `rhs`. Rounding errors may stop
+        it before.
     precondition : callable, optional
         Applies an approximate inverse of the matrix, Hermitian and positive definite, to a vector. A W-cycle
         of multigrid by default.
     label : str
-        Of the progress.
+        Label of the progress.
     start : (n,) complex or float ndarray, optional
         First approximation; 0 by default.
     is_fixed : (n,) bool ndarray, optional
@@ -94,7 +94,7 @@ def conjugate_gradient(
 
 
 def _largest_part(*vectors: np.ndarray | None) -> float:
-    """The largest absolute value of a real or an imaginary part."""
+    """Return the largest absolute value of a real or an imaginary part."""
     return max(
         float(np.abs(part).max(initial=0))
         for vector in vectors
@@ -104,11 +104,11 @@ def _largest_part(*vectors: np.ndarray | None) -> float:
 
 
 def _norm(vector: np.ndarray) -> float:
-    """The Euclidean norm."""
+    """Return the Euclidean norm."""
     return float(np.sqrt(_real_inner_product(vector, vector)))
 
 
 def _real_inner_product(a: np.ndarray, b: np.ndarray) -> float:
-    """The real part of the inner product a* b."""
+    """Return the real part of the inner product a* b."""
     product = np.sum(a.real * b.real)
     return float(product + np.sum(a.imag * b.imag) if np.iscomplexobj(a) else product)

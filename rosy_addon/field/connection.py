@@ -8,8 +8,8 @@ Tangent vectors at a node are complex numbers in a polar map of its umbrella. Ar
 vertices the angles of this map are scaled to add up to 2 pi. Transport along an edge keeps the
 angle between the vector and the edge.
 
-The method is that of Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields",
-SIGGRAPH 2013, section 6, but with cotangent weights and lumped masses.
+Reference: Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields", SIGGRAPH 2013,
+section 6. Here, weights are cotangents and masses are lumped.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ from functools import cached_property
 import numpy as np
 
 from ..core.progress import report
+from .connectivity import build_edges, connected_components
 from .frames import dot
+from .polygon_arrays import next_corners
 from .sparse_multigrid import CSRMatrix, from_edges
-from .surface import Surface, build_edges, connected_components, next_corners
+from .surface import Surface
 
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
 MAX_COTANGENT = 1e3
@@ -114,8 +116,8 @@ def build_connection(surface: Surface) -> Connection:
     # Each edge once: from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
-    # The direction of the reversed edge at its head: that of the twin halfedge or, at a boundary,
-    # that of the second side of the corner at the head.
+    # The direction of the reversed edge at its head is the direction of the twin halfedge or, at a
+    # boundary, of the second side of the corner at the head.
     twin_of_tail = twin[tail_corner]
     reverse_direction = np.where(
         twin_of_tail >= 0,
@@ -143,7 +145,7 @@ def build_connection(surface: Surface) -> Connection:
 
 
 def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMatrix:
-    """The matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
+    """Return the matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
 
     Parameters
     ----------
@@ -173,7 +175,7 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
 def _corner_geometry(
     vertices: np.ndarray, triangles: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
+    """Return (3 T,) angles (radians) and cotangents at the corners of triangles, and (T,) areas."""
     corner_angle, cotangent = np.empty(triangles.shape), np.empty(triangles.shape)
     area = np.empty(len(triangles))
     for first in range(0, len(triangles), BLOCK_TRIANGLES):
@@ -232,9 +234,10 @@ def sums_in_umbrellas(previous: np.ndarray, value: np.ndarray) -> tuple[np.ndarr
     Parameters
     ----------
     previous : (C,) int ndarray
-        From `umbrella_order`.
+        Result of `umbrella_order`.
     value : (C,) ndarray
-        What each corner adds to the sum of the previous one. Those of first corners do not count.
+        Amount that each corner adds to the sum of the previous corner. The values of first corners are
+        ignored.
 
     Returns
     -------

@@ -6,8 +6,9 @@ import numpy as np
 
 from .blocks import by_rows
 from .frames import angle_between, dot, tangent_frame, transport
+from .polygon_arrays import face_blocks, next_corners
 from .representation import complex_bincount, power, unit_complex
-from .surface import Surface, face_blocks, next_corners
+from .surface import Surface
 
 
 def corner_rotations(
@@ -16,7 +17,7 @@ def corner_rotations(
     corner_face: np.ndarray,
     corner_normal: np.ndarray,
 ) -> np.ndarray:
-    """The rotation from the frame of each face to the frame of each of its corners.
+    """Return the rotation from the frame of each face to the frame of each of its corners.
 
     Transport is the minimal rotation from the face normal to the corner normal. A tangent vector
     with the complex coordinate w in the frame of the face has the coordinate ``w * rotation`` in
@@ -34,7 +35,7 @@ def corner_rotations(
     Returns
     -------
     (C,) complex ndarray
-        Of modulus 1; 0 for the corners of faces without a frame.
+        Numbers of modulus 1; 0 for the corners of faces without a frame.
     """
 
     def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -49,7 +50,7 @@ def corner_rotations(
 def average_over_fans(
     values: np.ndarray, weights: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
-    """The weighted mean of corner values over the fan of each corner.
+    """Return the weighted mean of corner values over the fan of each corner.
 
     The corners of a fan must have the same normal, and so the same frame.
 
@@ -58,7 +59,7 @@ def average_over_fans(
     values : (C,) complex ndarray
     weights : (C,) float ndarray
     corner_fan : (C,) int ndarray
-        As in `Surface`.
+        `Surface.corner_fan`.
 
     Returns
     -------
@@ -74,7 +75,7 @@ def average_over_fans(
 
 
 def corner_angles(surface: Surface) -> np.ndarray:
-    """(C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
+    """Return (C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
@@ -97,7 +98,7 @@ def smooth_face_values(
     z : (F,) complex ndarray
         Representations in the face frames that `rotation` was computed from.
     rotation : (C,) complex ndarray
-        From `corner_rotations`.
+        Result of `corner_rotations`.
     degree : int
         N of the representations.
     weights : (C,) float ndarray

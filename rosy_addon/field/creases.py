@@ -1,8 +1,8 @@
-"""Edges at which the form of a surface breaks, told from the noise of scans and coarse meshes.
+"""Find creases of a surface: chains of sharp edges that are not caused by noise or coarse faces.
 
-Creases are chains of sharp edges. They are judged with hysteresis and as chains, like the edges of an image by
-Canny, "A Computational Approach to Edge Detection", PAMI 1986. The result does not depend on the view, so creases
-do not flicker when something moves.
+As in the edge detector of Canny, "A Computational Approach to Edge Detection", PAMI 1986, a chain with enough
+strong edges may also contain weak ones (hysteresis). The result does not depend on the view, so creases do not
+flicker in animations.
 """
 
 from __future__ import annotations
@@ -13,18 +13,20 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .blocks import mask
+from .connectivity import Edges, build_edges, connected_components
 from .frames import angle_between, dot, normalize
-from .surface import Edges, Surface, build_edges, connected_components, face_area_vectors
+from .polygon_arrays import face_area_vectors
+from .surface import Surface
 
 #: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
 FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35
 
-#: Edges with a larger angle than the second are salient, in radians. Between the two angles, an edge is
-#: salient if its angle is at least `MIN_RATIO` times those of the other edges of its two faces.
+#: Edges with an angle above the second one (radians) are salient. Between the two angles, an edge is salient
+#: if its angle is at least `MIN_RATIO` times the angle of each other edge of its two faces.
 MIN_ANGLE, SHARP_ANGLE = np.pi / 6, np.pi / 3
 MIN_RATIO = 2.0
 
-#: Both angles are at least this multiple of the angle by which noise turns the normals.
+#: Both angles are at least this multiple of the median angle by which noise rotates the normals.
 NOISE_MULTIPLE = 5.0
 
 #: Shortest line of salient edges, relative to `Surface.extent`.
@@ -37,14 +39,14 @@ WEAK_SHARE = 0.5
 #: At least this share of the length of a chain has the full crease angle.
 MIN_STRONG_SHARE = 0.25
 
-#: Smallest angle between filtered normals, relative to the angle between the normals.
+#: Smallest angle between the filtered normals of a crease, relative to the angle between its normals.
 MIN_FILTERED_SHARE = 0.1
 
 #: Shortest chain on a noisy mesh: its number of mean edges, for each radian of noise.
 MIN_EDGES_PER_NOISE = 100.0
 
-#: Mean edge, relative to `Surface.extent`, above which the filtered normals count less: the edges of a
-#: coarse mesh are meant.
+#: Mean edge length, relative to `Surface.extent`, above which the thresholds for noise are reduced: sharp edges
+#: of a coarse mesh are intended.
 NOISY_EDGE_LENGTH = 0.02
 
 #: Rings of faces around sharp edges in which normals are filtered.
@@ -136,7 +138,7 @@ def salient_edges(
     surface : Surface
     edges : Edges
     normals, noise_angle
-        From `filtered_normals`.
+        Results of `filtered_normals`.
 
     Returns
     -------
@@ -163,7 +165,7 @@ def salient_edges(
 
 
 def _largest_of_others(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
-    """(I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
+    """Return (I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
     all_angles = np.zeros(len(edges.ends))
     all_angles[edges.interior] = angle
     corner_angle = all_angles[edges.corner_edge]
@@ -250,7 +252,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 
 
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:
-    """(I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
+    """Return (I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
     angle = np.zeros(sides.shape[1])
     a, b = sides
     is_large = sum(x[a] * x[b] for x in np.ascontiguousarray(normals.T)) < np.cos(least)
@@ -259,7 +261,7 @@ def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.nd
 
 
 def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
-    """(F,) bool: the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
+    """Return (F,) bool, the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
     is_near = mask(len(surface.vertices), ends)
     for _ in range(FILTER_RINGS):
         faces = np.logical_or.reduceat(is_near[surface.corner_vertex], surface.face_start[:-1])
@@ -268,7 +270,7 @@ def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
 
 
 def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
-    """(n,) bool: whether normals are not interpolated across edges, given as of `Edges.halfedges`."""
+    """Return (n,) bool, whether normals are discontinuous across edges, given as rows of `Edges.halfedges`."""
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T
     return (fan[a] != fan[following[b]]) | (fan[following[a]] != fan[b])

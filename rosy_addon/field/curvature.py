@@ -8,9 +8,10 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
+from .polygon_arrays import sum_per_face
 from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, build_surface, sum_per_face
+from .surface import Surface, build_surface
 
 #: The smallest number whose inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)

@@ -24,12 +24,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
+from .connectivity import build_edges
 from .frames import coordinates
 from .representation import face_frames, matching_angles, signed_power, to_representation
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, build_edges
+from .surface import Surface
 from .symmetry import FieldSymmetry
 
 #: Directions within these tolerances count as a RoSy: the error of the angle between neighboring
@@ -68,13 +68,10 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     --------
     rosy_addon.field.validate.validated_directions : Check directions from outside first.
     """
-    label = "reading directions"
-    report(0.0, label)
     x, y = face_frames(surface)
     w = by_rows(coordinates, directions, x, y)
     within_tolerance = all(is_rosy(w[rows]) for rows in row_blocks(len(w)))
-    with progress(0.3, 0.6):
-        first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=label)
+    first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
     if within_tolerance:
         vectors, direction_ratios = directions[:, 0] * (rho > 0)[:, None], None
     else:
@@ -82,8 +79,7 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
             np.cos(first_angle)[:, None] * x + np.sin(first_angle)[:, None] * y
         )
     field = RosyField(directions.shape[1], vectors, direction_ratios)
-    with progress(0.6, 1.0, label):
-        return detect_families(surface, field)
+    return detect_families(surface, field)
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -120,7 +116,7 @@ def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def is_rosy(w: np.ndarray) -> bool:
-    """Whether all rows of (n, N) directions are RoSys within the tolerances.
+    """Return whether all rows of (n, N) directions are RoSys within the tolerances.
 
     Rows that contain a zero are ignored.
     """
@@ -140,7 +136,7 @@ def is_rosy(w: np.ndarray) -> bool:
 
 
 def _relative_angles(w: np.ndarray) -> np.ndarray:
-    """(n, N) counter-clockwise angles from the first direction, radians from 0 to 2 pi."""
+    """Return (n, N) counter-clockwise angles from the first direction, radians from 0 to 2 pi."""
     angle = np.angle(w)
     relative = (angle - angle[:, :1]) % (2 * np.pi)
     relative[:, 0] = 0
@@ -193,7 +189,7 @@ def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
 
 
 def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
-    """The same harmonics as `field_harmonics`, from (n, N) `direction_ratios`."""
+    """Return the harmonics of (n, N) `direction_ratios`, as `field_harmonics` does for a field."""
     degree = direction_ratios.shape[1]
     member_angles = 2 * np.pi * np.arange(degree) / degree
     coefficients = {}
@@ -205,13 +201,13 @@ def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
 
 
 def ratios_from_harmonics(coefficients: dict[int, np.ndarray], degree: int) -> np.ndarray:
-    """(n, N) `direction_ratios` from harmonics; the inverse of `ratio_harmonics`."""
+    """Return (n, N) `direction_ratios` from harmonics; the inverse of `ratio_harmonics`."""
     member = np.exp(2j * np.pi * np.arange(degree) / degree)
     return sum(values[:, None] * signed_power(member, j) for j, values in coefficients.items())
 
 
 def field_symmetry(field: RosyField) -> FieldSymmetry:
-    """The `FieldSymmetry` of a field: its degree and the orders of its harmonics."""
+    """Return the `FieldSymmetry` of a field: its degree and the orders of its harmonics."""
     return FieldSymmetry(field.degree, tuple(field_harmonics(field)))
 
 
@@ -227,19 +223,19 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
     Returns
     -------
     RosyField
-        The stored member lies along the major eigenvector, that of the greater signed eigenvalue.
+        The stored member lies along the major eigenvector, which has the greater signed eigenvalue.
         The directions have the absolute eigenvalues as lengths. `family_count` is 2. The field is
         zero where the two eigenvalues are equal.
     """
     frames = face_frames(surface)
-    vectors, ratios = by_rows(_tensor_directions, tensors, *frames, label="reading directions")
+    vectors, ratios = by_rows(_tensor_directions, tensors, *frames)
     return RosyField(4, vectors, ratios, 2)
 
 
 def _tensor_directions(
     tensors: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The stored members and the `direction_ratios` of `tensor_field`, in the frames x, y."""
+    """Return the stored members and the `direction_ratios` of `tensor_field`, in the frames x, y."""
     a = np.einsum("fi,fij,fj->f", x, tensors, x)
     b = np.einsum("fi,fij,fj->f", x, tensors, y)
     c = np.einsum("fi,fij,fj->f", y, tensors, y)
@@ -271,17 +267,13 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
         one when the two faces are unfolded into a plane. Members are counted counter-clockwise from
         the stored ones. The same holds for directions.
     """
-    label = "matching directions"
-    report(0.0, label)
     x, y = face_frames(surface)
     edges = build_edges(surface.corner_vertex, surface.face_start)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
     z_stored = to_representation(field.vectors, x, y, 1)
     z = to_representation(field.vectors, x, y, field.degree)
-    with progress(0.4, 0.7):
-        closest_angle = matching_angles(surface, x, y, z, field.degree, a, b, label)
-    with progress(0.7, 1.0):
-        stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b, label)
+    closest_angle = matching_angles(surface, x, y, z, field.degree, a, b)
+    stored_angle = matching_angles(surface, x, y, z_stored, 1, a, b)
     matching = (
         np.rint((closest_angle - stored_angle) * field.degree / (2 * np.pi)).astype(np.int32)
         % field.degree

@@ -1,12 +1,13 @@
 """The faces and the triangles of a surface as graphs, and spanning forests of graphs.
 
-The potential of a field (`turning_angles`) is linear on triangles. The angle by which the field turns across an
-edge is the difference of the potential along the edge, times half the sum of the cotangents of the angles
-opposite it (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and Their Conjugates*, 1993). This
-holds on triangles of any shape. The distance of the centers of two faces over the length of their edge is the
-same only where the line between the centers is perpendicular to the edge.
+The angles by which a field turns across edges follow from a potential that is linear on triangles
+(`turning_angles`). Across an edge, the angle is the difference of the potential along the edge, times half the
+sum of the cotangents of the two opposite angles (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and
+Their Conjugates*, 1993). Cotangents are right for triangles of any shape. The distance between two face centers
+divided by the length of the edge is the same factor only if the line between the centers is perpendicular to
+the edge.
 
-A larger face is a fan of triangles. Its direction is the mean of those of its triangles.
+A face with more corners is a fan of triangles. Its direction is the mean direction of its triangles.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ import numpy as np
 from ..core.progress import report
 from .analysis import edge_lengths
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
+from .connectivity import build_edges, connected_components, connected_corners
 from .frames import dot
+from .polygon_arrays import next_corners
 from .representation import edge_unfolding
 from .singularities import signed_corner_angles
-from .surface import Surface, build_edges, connected_components, connected_corners, next_corners
+from .surface import Surface
 
 #: Smallest and largest conductance of an edge, relative to the median.
 MAX_CONDUCTANCE_RATIO = 1e4
@@ -37,21 +40,21 @@ LABEL = "placing the singularities"
 class FaceGraph:
     """The faces of a surface as nodes of a graph, with an edge where a field continues.
 
-    A *vertex node* is a vertex with those of its corners that are connected by such edges.
+    A *vertex node* is a vertex with some of its corners: a set that is connected by such edges.
 
     Attributes
     ----------
     halfedges : (I, 2) int32 ndarray
         The corners where each edge starts, in the face on either side.
     source, target : (I,) int32 ndarray
-        Those two faces.
+        The two faces of each edge.
     unfolding : (I,) float64 ndarray
-        Angle in radians that is added to a direction in the frame of the source, if it is transported to
-        that of the target.
+        Angle in radians to add to a direction in the frame of the source, to transport it to the frame of the
+        target.
     tail, head : (I,) int32 ndarray
         The vertex nodes at the start and at the end of the edge, as the source runs along it.
     conductance : (I,) float64 ndarray
-        Distance of the centers of both faces over the length of the edge.
+        Distance between the centers of both faces, divided by the length of the edge.
     corner_node : (C,) int32 ndarray
         Vertex node of each corner.
     is_interior : (n,) bool ndarray
@@ -61,7 +64,7 @@ class FaceGraph:
     component : (F,) int32 ndarray
         Connected component of each face.
     node_component : (n,) int32 ndarray
-        That of the faces of each vertex node.
+        Connected component of the faces at each vertex node.
     """
 
     halfedges: np.ndarray
@@ -227,8 +230,8 @@ class TriangleGraph:
     Attributes
     ----------
     graph : FaceGraph
-        Of the T triangles. Its M edges are the I edges between faces, and then those within faces. Its
-        conductance is half the sum of the cotangents. It may be negative, but the matrix of the potential
+        The graph of the T triangles. Its M edges are the I edges between faces, followed by the edges within
+        faces. Its conductance is half the sum of the cotangents. It may be negative, but the matrix of the potential
         is positive semidefinite.
     weight : (M, 2) float64 ndarray
         Half the cotangent opposite each edge, in the source and in the target.
@@ -246,7 +249,7 @@ class TriangleGraph:
     face_edge_count: int
 
     def on_triangles(self, angle: np.ndarray | float) -> np.ndarray:
-        """Return (M,) angles: those at the edges between faces, and 0 within faces."""
+        """Return (M,) angles from (I,) angles at the edges between faces; they are 0 within faces."""
         result = np.zeros(len(self.graph.source))
         result[: self.face_edge_count] = angle
         return result
@@ -254,8 +257,8 @@ class TriangleGraph:
     def turns_to_centers(self, drop: np.ndarray) -> np.ndarray:
         """Return (T,) angles from the circumcenter of each triangle to its center.
 
-        `drop` is (M,) differences of the potential along the edges. The angles between triangles are those from
-        circumcenter to circumcenter. They lead across the middles of the edges, whose mean is the center.
+        `drop` is (M,) differences of the potential along the edges. Angles between triangles lead from
+        circumcenter to circumcenter, across the middles of edges. The mean of these is the center.
         """
         graph, count = self.graph, len(self.triangle_face)
         total = np.bincount(graph.source, self.weight[:, 0] * drop, count)
@@ -277,7 +280,7 @@ class TriangleGraph:
         return (direction - self._turns_in_faces(angle, to_center))[first]
 
     def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
-        """(T,) angles from the direction of a face to that of each of its triangles."""
+        """Return (T,) angles from the direction of each triangle's face to the direction of the triangle."""
         face, inner = self.triangle_face, slice(self.face_edge_count, None)
         step = np.zeros(len(face))
         step[self.graph.target[inner]] = angle[inner]
@@ -288,8 +291,8 @@ class TriangleGraph:
     def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
         """Return a graph whose edges between faces resist angles more, by (I,) factors of at least 1.
 
-        Those within faces resist them as much as the edges around. No conductance is negative any more, as the
-        matrix might be indefinite.
+        Edges within faces get the largest factor of the edges around their face. Negative conductances are
+        raised, because the matrix might become indefinite.
         """
         graph, face, outer = self.graph, self.triangle_face, slice(self.face_edge_count)
         face_factor = np.ones(len(np.bincount(face)))
@@ -303,7 +306,7 @@ class TriangleGraph:
 
 
 def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
-    """Split the graph of the faces of a surface into that of their triangles."""
+    """Split the graph of the faces of a surface into the graph of their triangles."""
     size = np.diff(surface.face_start)
     face = np.repeat(np.arange(len(size)), size - 2)
     first_triangle = np.cumsum(size - 2) - (size - 2)
@@ -342,7 +345,7 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
 
 
 def _cotangents(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 3) cotangents of the angles, and (T,) areas, of triangles with (T, 3, 3) points.
+    """Return (T, 3) cotangents of the angles, and (T,) areas, of triangles with (T, 3, 3) points.
 
     Areas are enlarged to `MIN_AREA`. That scales the cotangents of a triangle, so that their matrix stays
     positive semidefinite.

@@ -1,4 +1,4 @@
-"""The curvature of the features of a surface, and what the noise of its vertices does to it."""
+"""Measure the curvature of the features of a surface, and how noise of the vertices changes it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import numpy as np
 
 from ..core.progress import progress
 from .connection import build_connection
+from .connectivity import Edges, build_edges, smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
 from .curvature import face_curvature, with_smooth_normals
 from .frames import angle_between, dot, normalize
+from .polygon_arrays import face_area_vectors
 from .representation import face_frames
-from .surface import Edges, Surface, build_edges, face_area_vectors, smooth_fans
+from .surface import Surface
 from .surface_averages import SurfaceAverages
 
 #: Length over which curvature is averaged, relative to `Surface.extent`.
@@ -35,18 +37,20 @@ LABEL = "measuring features"
 
 @dataclass(frozen=True, eq=False)
 class NoisyCurvature:
-    """The curvature of a surface between its salient edges, as of `curvature.face_curvature`.
+    """The curvature of a surface between its salient edges, and how much noise changes it.
+
+    See `curvature.face_curvature` for the mean and the deviator.
 
     Attributes
     ----------
     salient_ends : (E, 2) int32 ndarray
         The salient edges: pairs of vertices.
     averages : SurfaceAverages
-        With the frames of the faces.
+        Averages in the frames of the faces.
     mean : (F,) float64 ndarray
     deviator : (F,) complex128 ndarray
     mean_noise, deviator_noise : (F,) ndarray
-        By how much the mean and the deviator change if there is as much noise again.
+        Changes of the mean and of the deviator if as much noise is added again.
     """
 
     salient_ends: np.ndarray
@@ -96,9 +100,9 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
 def _bounded_curvature(
     surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Curvature of each face, with normals that are smooth within the given fans of corners.
+    """Return the mean curvature and the deviator of each face; normals are smooth within the given fans.
 
-    A larger curvature than the inverse size of the face is reduced to it: slivers have no better one.
+    Curvature is limited to the inverse size of the face, because slivers cannot resolve more.
     """
     mean, deviator = face_curvature(with_smooth_normals(surface, corner_fan), x, y)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
@@ -109,19 +113,19 @@ def _bounded_curvature(
 
 
 def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
-    """Sample noise as strong as that of the vertices along their normals.
+    """Sample white noise as strong as the noise of the vertices along their normals.
 
-    Two properties are compared with those of white noise of unit amplitude: the angle by which it
-    turns the face normals, and its difference from the mean of the neighbors. The form of the surface
-    adds to both, to the first on coarse meshes and to the second at creases, so the smaller result
-    is used.
+    Two effects of the noise are compared with the effects of white noise of unit amplitude: the angle by
+    which it rotates the face normals, and the difference of vertices from the mean of their neighbors. The
+    form of the surface adds to the first effect on coarse meshes and to the second one at creases, so the
+    smaller result is used.
 
     Parameters
     ----------
     surface : Surface
     edges : Edges
     noise_angle : float
-        From `salient_edges.filtered_normals`.
+        Result of `creases.filtered_normals`.
 
     Returns
     -------
@@ -150,7 +154,7 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
 
 
 def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """(V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
+    """Return (V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
     tail, head = ends.T
     degree = np.maximum(np.bincount(ends.ravel(), minlength=len(points)), 1)
 
@@ -177,7 +181,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     Returns
     -------
     (T, 3) float32 ndarray
-        In 1 / Blender unit of object space. 0 is flat.
+        Units of 1 / length in object space. 0 is flat.
     """
     if surface.rest_vertices is not None:
         with progress(0.0, 0.05):

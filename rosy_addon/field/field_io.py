@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
 from ..core.errors import RosyError, counted
-from ..core.file_io import check_parsing_memory, check_writable, write_blocks
+from ..core.file_io import check_parsing_memory, write_bytes
 from ..core.progress import progress, report
 from .directional_field import field_directions, tensor_field
 from .formats.fieldgen import fieldgen_text, read_fieldgen
-from .formats.plain import directions_text, npy_blocks, read_npy, read_text
+from .formats.plain import npy_bytes, read_npy, read_text
 from .formats.polygons import RawField
 from .formats.rosy_rawfield import (
     rawfield_text,
@@ -21,7 +21,7 @@ from .formats.rosy_rawfield import (
     rosy_text,
 )
 from .formats.sings import SINGULARITY_SUFFIXES, sings_text
-from .formats.text_rows import ROWS_PER_BLOCK
+from .formats.text_rows import format_lines
 from .mesh_io import READERS as MESH_READERS
 from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
@@ -92,8 +92,8 @@ def load_field(
     nonfinite : {"error", "zero"}
         Raise an error if a vector is not finite, or treat it as undefined.
     mesh : path-like, optional
-        The mesh file that the rows refer to, if its faces differ from those of `surface`, for
-        example because one of them was triangulated or reordered. The field is then transferred by
+        The mesh file that the rows refer to, if its faces differ from the faces of `surface`, for
+        example because one of the meshes was triangulated or reordered. The field is then transferred by
         position. If not given, and the counts differ, a mesh file of the same name in the same
         folder is used.
 
@@ -149,7 +149,7 @@ def field_from_raw(
     raw : RawField
     surface : Surface
     degree : int or None
-        Of rows with one member that state no degree; `DEFAULT_DEGREE` if None.
+        Degree of rows with one member that state none; `DEFAULT_DEGREE` if None.
     source : str
         Name of the file, for messages.
     nonfinite : {"error", "zero"}
@@ -157,7 +157,7 @@ def field_from_raw(
     Raises
     ------
     RosyError
-        As of `load_field`.
+        If the rows belong to another mesh, or a vector is not finite or not tangent to the surface.
     """
     _check_count(raw, surface, source)
     values = raw.values
@@ -198,7 +198,7 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
 def _source_surface(
     path: Path, raw: RawField, surface: Surface, mesh: str | os.PathLike[str] | None
 ) -> Surface | None:
-    """The surface that the rows of a file refer to, if it is not `surface`; None if it is."""
+    """Return the surface that the rows of a file refer to, if it is not `surface`; None if it is."""
     if mesh is not None:
         return Surface(mesh)
     count = len(raw.values)
@@ -240,14 +240,7 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     --------
     load_field : The formats.
     """
-    path = Path(path)
-    _check_storable(path, field)
-    check_writable(path)
-    report(0.0, "writing the file")
-    with progress(0.0, 0.4):
-        blocks = _contents(path.suffix.lower(), field, surface)
-    with progress(0.4, 1.0):
-        write_blocks(path, blocks, _step_count(path, surface))
+    write_bytes(path, field_file(path, field, surface))
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
@@ -256,24 +249,12 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
     Raises
     ------
     RosyError
-        As `write_field`, but nothing is written.
+        If the extension is not in `WRITE_SUFFIXES`, or the format cannot store such a field.
     """
     path = Path(path)
     _check_storable(path, field)
     report(0.0, "writing the file")
-    with progress(0.0, 0.4):
-        blocks = _contents(path.suffix.lower(), field, surface)
-    step_count, contents = _step_count(path, surface), bytearray()
-    for index, block in enumerate(blocks):
-        report(0.4 + 0.6 * min(index / step_count, 1.0), "writing the file")
-        contents += block
-    return bytes(contents)
-
-
-def _step_count(path: Path, surface: Surface) -> float:
-    """Return about how many blocks the file of a field has."""
-    vertex_rows = 3 * len(surface.vertices) if path.suffix.lower() == ".obj" else 0
-    return 1 + (surface.face_count + vertex_rows) / ROWS_PER_BLOCK
+    return _contents(path.suffix.lower(), field, surface)
 
 
 def _check_storable(path: Path, field: RosyField) -> None:
@@ -290,22 +271,23 @@ def _check_storable(path: Path, field: RosyField) -> None:
         )
 
 
-def _contents(suffix: str, field: RosyField, surface: Surface) -> Iterator[bytes]:
-    """The contents of a field file, as blocks that are formatted one by one."""
+def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
+    """Return the contents of a field file."""
     if suffix == ".rosy":
-        text = rosy_text(field)
-    elif suffix == ".obj":
-        text = fieldgen_text(surface, field)
-    elif suffix in SINGULARITY_SUFFIXES:
-        text = sings_text(field.degree, *find_singularities(surface, field))
-    else:
-        rows = field.source_directions
-        if rows is None:
-            rows = field_directions(surface, field)
-        if suffix == ".npy":
-            return npy_blocks(rows)
-        text = rawfield_text(rows) if suffix == ".rawfield" else directions_text(rows)
-    return (block.encode("ascii") for block in text)
+        return rosy_text(field).encode("ascii")
+    if suffix == ".obj":
+        return fieldgen_text(surface, field).encode("ascii")
+    if suffix in SINGULARITY_SUFFIXES:
+        return sings_text(field.degree, *find_singularities(surface, field)).encode("ascii")
+    rows = field.source_directions
+    if rows is None:
+        rows = field_directions(surface, field)
+    if suffix == ".npy":
+        return npy_bytes(rows)
+    text = (
+        rawfield_text(rows) if suffix == ".rawfield" else format_lines(rows.reshape(len(rows), -1))
+    )
+    return text.encode("ascii")
 
 
 def _join_names(names: tuple[str, ...]) -> str:

@@ -22,8 +22,8 @@ from .surface import Surface
 #: Lengths over which curvature is averaged, relative to `Surface.extent`.
 SCALES = (0.01, 0.02, 0.04, 0.08)
 
-#: The smallest scale is used at which noise turns half of the directions by less than this angle, in
-#: radians, as measured by adding as much noise again.
+#: The scale is the smallest one at which noise rotates half of the directions by less than this angle, in
+#: radians. It is measured by adding as much noise again.
 MAX_TURN = np.radians(6)
 
 #: Ratio of curvature and noise at which the confidence in a direction is half.
@@ -51,8 +51,8 @@ def follows_curvature(degree: int) -> bool:
 def form(surface: Surface, degree: int) -> RosyField:
     """Generate a field that follows the form of a surface.
 
-    For degree 2 and the multiples of 4. Fields of other degrees cannot follow principal directions, and
-    are the smoothest ones.
+    Fields of degree 2 and of multiples of 4 follow principal directions. Other degrees cannot, and give the
+    smoothest field.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def form(surface: Surface, degree: int) -> RosyField:
     Returns
     -------
     RosyField
-        Of magnitude 1; 0 on faces without area.
+        A field of magnitude 1; 0 on faces without area.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def form(surface: Surface, degree: int) -> RosyField:
 
     References
     ----------
-    Averages of curvature are as robust as those of Cohen-Steiner and Morvan, "Restricted Delaunay
+    Averaging curvature makes it robust, as in Cohen-Steiner and Morvan, "Restricted Delaunay
     Triangulations and Normal Cycle", SoCG 2003. Choosing the scale by adding noise is a parametric
     bootstrap (Efron and Tibshirani, "An Introduction to the Bootstrap", 1993).
     """
@@ -106,7 +106,7 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
     guides : (F, 3) float64 ndarray
         Unit vectors, or zero.
     confidence : (F,) float64 ndarray
-        From 0 to 1.
+        Confidence in each guide, from 0 to 1.
     """
     averages = measured.averages
     matrix, flat_matrix = averages.laplacian(2), averages.laplacian(0)
@@ -119,7 +119,8 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
             z = averages.smooth(matrix, area, deviators[0], z)
         with progress(start + 0.1, start + 0.2):
             z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
-        # The angle of a cross is a quarter of that of the square of a deviator.
+        # The phase of a deviator is twice the angle of a line, so its square has four times the angle of a
+        # cross.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
         modulus = np.abs(z)
         clear = averages.mass * modulus / (modulus + 1)

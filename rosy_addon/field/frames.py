@@ -9,17 +9,17 @@ from numpy.typing import ArrayLike
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(...) dot products of the vectors of two (..., 3) arrays."""
+    """Return (...) dot products of the vectors of two (..., 3) arrays."""
     return np.einsum("...i,...i->...", a, b)
 
 
 def coordinates(vectors: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(F, N) complex coordinates of (F, N, 3) vectors in (F, 3) frames x, y."""
+    """Return (F, N) complex coordinates of (F, N, 3) vectors in (F, 3) frames x, y."""
     return dot(vectors, x[:, None]) + 1j * dot(vectors, y[:, None])
 
 
 def normalize(vectors: np.ndarray) -> np.ndarray:
-    """(..., 3) vectors scaled to length 1; zero vectors stay zero."""
+    """Return (..., 3) vectors scaled to length 1; zero vectors stay zero."""
     length = np.sqrt(dot(vectors, vectors))[..., None]
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
@@ -64,7 +64,7 @@ def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np
 
 
 def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-    """`dot` of vectors given as three component arrays; faster, because each is contiguous."""
+    """Return the `dot` of vectors given as three component arrays: faster, because each is contiguous."""
     product = a[0] * b[0]
     product += a[1] * b[1]
     product += a[2] * b[2]
@@ -74,7 +74,7 @@ def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarr
 def transport_components(
     vectors: Sequence[np.ndarray], source: Sequence[np.ndarray], target: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """`transport` of vectors given as three component arrays."""
+    """Return the `transport` of vectors given as three component arrays."""
     factor = dot_components(vectors, target)
     factor /= np.maximum(1 + dot_components(source, target), np.finfo(factor.dtype).eps)
     return [v - factor * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
@@ -95,7 +95,7 @@ def transform_components(
     Returns
     -------
     (m, n) ndarray
-        In the dtype of the vectors.
+        Array of the same dtype as the vectors.
 
     Notes
     -----
@@ -114,7 +114,7 @@ def transform_components(
 
 
 def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit tangents x, y for each normal, with x cross y = normal.
+    """Return two unit tangents x, y for each normal, with x cross y = normal.
 
     The frames vary smoothly over normals with z > 0 and over those with z < 0.
 

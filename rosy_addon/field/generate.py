@@ -1,19 +1,21 @@
-"""Field generators: make a field on a surface by the name of its kind.
+"""Generate a field on a surface, by the name of a method.
 
-The field along an axis is implemented here. Fields are cut along edges whose faces disagree on
-orientation; see `surface.count_inconsistent_edges`.
+`GeneratorSettings` describes the options of all methods. Fields are cut along edges whose faces disagree
+on orientation; see `surface.count_inconsistent_edges`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..core.errors import NoFeaturesError, RosyError
 from ..core.memory import check_memory
 from ..core.progress import progress, report
+from ..core.settings import check_settings, choice, number, settings_of, switch, vector
 from .cheapest_singularities import cheapest_singularities
 from .curvature import TINY, curvature_field
 from .form import form
@@ -50,33 +52,28 @@ GENERATORS = {
 #: Shorter projections of a unit axis are rounding errors: the face is perpendicular to the axis.
 MIN_PROJECTION = 1e-12
 
-#: Bytes of memory that a triangle takes at the peak, by kind. The other kinds take little.
-BYTES_PER_TRIANGLE = dict(form=1200, smoothest=640, features=1000, guided=950, prescribed=900)
+#: Bytes of memory for each triangle at the peak, measured with the most expensive options of each kind.
+#: The other kinds take little.
+BYTES_PER_TRIANGLE = dict(
+    form=1200, smoothest=640, curvature=950, features=1000, guided=950, prescribed=1600
+)
 
-#: For "prescribed", bytes that a triangle takes if the field bends to guides.
-BENT_BYTES_PER_TRIANGLE = 1600
 
-#: For "curvature", bytes that a face takes, and bytes that a triangle takes with a reach.
-CURVATURE_BYTES_PER_FACE, REACH_BYTES_PER_TRIANGLE = 710, 950
+def _only_for(*kinds: str) -> Callable[[Any], bool]:
+    """Return the predicate `Setting.applies` of an option of some kinds of fields."""
+    return lambda settings: settings.kind in kinds
 
 
 @dataclass(frozen=True)
 class GeneratorSettings:
-    """The settings of `generate`.
+    """The kind of a generated field, its options and its inputs.
+
+    The first fields are options that describe themselves (`core.settings`). The properties of the operator,
+    its panel, the options of the command line and the checks are derived from the descriptions. Inputs are
+    read from the scene, from files or from the arguments of a script.
 
     Attributes
     ----------
-    kind : str
-        One of `GENERATORS`.
-    axis : 3 floats
-        For "axis": the direction to follow, in object space.
-    smoothing_length : float
-        Relative to `Surface.extent`. For "curvature": the distance over which directions of high
-        confidence spread to regions of low confidence; 0 for none. For "guided": the distance over
-        which guides are smoothed; at 0 they are followed exactly. For "prescribed": the distance over which
-        the field bends to guides; at 0 they only turn the whole field.
-    sharp_angle : float
-        For "features": the smallest angle between face normals at a sharp edge, in radians.
     edges : (E, 2) int ndarray or None
         For "features" and "guided": pairs of vertices, the edges to follow. For "features", they
         replace the border and sharp edges.
@@ -93,14 +90,49 @@ class GeneratorSettings:
         `guided_system.firmness_weights`.
     singularities : ((K,) int ndarray, (K,) int ndarray) or None
         For "prescribed": vertices, and their indices in units of 1 / N.
-    add_missing : bool
-        For "prescribed": whether the field gets the further singularities that it needs.
+
+    Raises
+    ------
+    RosyError
+        If the value of an option is not allowed.
     """
 
-    kind: str
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    smoothing_length: float = 0.0
-    sharp_angle: float = np.pi / 6
+    kind: str = choice(
+        "form",
+        "Method that generates the field",
+        GENERATORS,
+        label="From",
+        option_labels={"uv": "UV Map"},
+    )
+    axis: tuple[float, float, float] = vector(
+        (0.0, 0.0, 1.0),
+        "Direction in object space that is projected to the surface",
+        applies=_only_for("axis"),
+    )
+    reach: float = number(
+        0.0,
+        0.0,
+        10.0,
+        "Distance, as a fraction of the size of the mesh, by which curvature extends into flat parts, "
+        "over which guides are smoothed, or over which a field with prescribed singularities bends to "
+        "guides. 0: guides are met exactly",
+        soft_high=0.2,
+        unit="size",
+        applies=_only_for("curvature", "guided", "prescribed"),
+    )
+    sharp_angle: float = number(
+        np.pi / 6,
+        0.0,
+        np.pi,
+        "Smallest angle between the faces of a sharp edge",
+        unit="angle",
+        applies=_only_for("features"),
+    )
+    add_missing: bool = switch(
+        False,
+        "Add the further singularities that the field needs, where it is smoothest",
+        applies=_only_for("prescribed"),
+    )
     edges: np.ndarray | None = None
     strokes: Sequence[np.ndarray] = ()
     axis_guides: Sequence[tuple[Sequence[float], Sequence[float], float]] = ()
@@ -108,11 +140,18 @@ class GeneratorSettings:
     vectors: np.ndarray | None = None
     vectors_have_firmness: bool = False
     singularities: tuple[np.ndarray, np.ndarray] | None = None
-    add_missing: bool = False
 
     def __post_init__(self) -> None:
-        if self.smoothing_length < MIN_SMOOTHING_LENGTH:
-            object.__setattr__(self, "smoothing_length", 0.0)
+        check_settings(self)
+        if self.reach < MIN_SMOOTHING_LENGTH:
+            object.__setattr__(self, "reach", 0.0)
+
+
+def options_of(kind: str) -> list[str]:
+    """Return the names of the options of a kind of field."""
+    settings = GeneratorSettings(kind)
+    described = settings_of(GeneratorSettings)
+    return [name for name in described if name != "kind" and described[name].applies(settings)]
 
 
 def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -> RosyField:
@@ -138,64 +177,62 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
     """
     settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
     check_memory(
-        _peak_memory(surface, settings),
+        BYTES_PER_TRIANGLE.get(settings.kind, 0) * len(surface.triangles),
         f"{surface.name}: a field on {surface.face_count:,} faces",
         "choose a smaller mesh, or another kind of field",
     )
     report(0.0, "generating the field")
-    if settings.kind == "form":
-        return form(surface, degree)
-    if settings.kind == "smoothest":
-        return smoothest_field(surface, degree)
-    if settings.kind == "axis":
-        return axis_field(surface, degree, settings.axis)
-    if settings.kind == "curvature":
-        split = 0.4 if settings.smoothing_length else 1.0
-        with progress(0.0, split):
-            field = curvature_field(surface, degree)
-        if not settings.smoothing_length or not field.vectors.any():
-            return field
-        # The extent is zero if all faces are points; then so is the magnitude.
-        length = max(settings.smoothing_length * surface.extent, TINY)
-        weight = (field.magnitude / length) ** 2
-        with progress(split, 1.0):
-            return guided_field(surface, degree, normalize(field.vectors), weight)
-    if settings.kind == "features":
-        return _features(surface, settings, degree)
-    if settings.kind == "guided":
-        return _guides(surface, settings, degree)
-    if settings.kind == "prescribed":
-        if settings.singularities is None:
-            raise RosyError(
-                f"{surface.name}: no singularities are given: give their vertices and indices"
-            )
-        singularities, start = settings.singularities, 0.0
-        if settings.add_missing:
-            with progress(0.0, 0.5):
-                singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5
-        reach = settings.smoothing_length * surface.extent
-        with progress(start, 1.0):
-            return prescribed_field(surface, degree, *singularities, settings.vectors, reach)
-    if settings.kind == "uv":
-        if settings.uv is None:
-            raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")
-        return RosyField(degree, guides_from_uv(surface, settings.uv, check_degree(degree)))
-    raise RosyError(f"unknown generator '{settings.kind}': choose {', '.join(GENERATORS)}")
+    match settings.kind:
+        case "form":
+            return form(surface, degree)
+        case "smoothest":
+            return smoothest_field(surface, degree)
+        case "curvature":
+            return _curvature(surface, settings, degree)
+        case "features":
+            return _features(surface, settings, degree)
+        case "guided":
+            return _guided(surface, settings, degree)
+        case "prescribed":
+            return _prescribed(surface, settings, degree)
+        case "axis":
+            return axis_field(surface, degree, settings.axis)
+    if settings.uv is None:
+        raise RosyError(f"{surface.name}: has no UV map: add one, or choose another generator")
+    return RosyField(degree, guides_from_uv(surface, settings.uv, check_degree(degree)))
 
 
-def _peak_memory(surface: Surface, settings: GeneratorSettings) -> int:
-    """Estimate the bytes that `generate` takes at its peak."""
-    triangle_count = len(surface.triangles)
-    if settings.kind == "prescribed" and settings.vectors is not None and settings.smoothing_length:
-        return BENT_BYTES_PER_TRIANGLE * triangle_count
-    if settings.kind != "curvature":
-        return BYTES_PER_TRIANGLE.get(settings.kind, 0) * triangle_count
-    reach_bytes = REACH_BYTES_PER_TRIANGLE * triangle_count if settings.smoothing_length else 0
-    return max(CURVATURE_BYTES_PER_FACE * surface.face_count, reach_bytes)
+def _curvature(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
+    """Return a field along principal directions, which clear ones extend into the other parts."""
+    split = 0.4 if settings.reach else 1.0
+    with progress(0.0, split):
+        field = curvature_field(surface, degree)
+    if not settings.reach or not field.vectors.any():
+        return field
+    # The extent is zero if all faces are points; then so is the magnitude.
+    weight = (field.magnitude / max(settings.reach * surface.extent, TINY)) ** 2
+    with progress(split, 1.0):
+        return guided_field(surface, degree, normalize(field.vectors), weight)
+
+
+def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
+    """Return the smoothest field with the singularities in the settings."""
+    if settings.singularities is None:
+        raise RosyError(
+            f"{surface.name}: no singularities are given: give their vertices and indices"
+        )
+    singularities, start = settings.singularities, 0.0
+    if settings.add_missing:
+        with progress(0.0, 0.5):
+            singularities, start = cheapest_singularities(surface, degree, *singularities), 0.5
+    with progress(start, 1.0):
+        return prescribed_field(
+            surface, degree, *singularities, settings.vectors, settings.reach * surface.extent
+        )
 
 
 def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
-    """A field along the given edges or, without any, along border and sharp edges."""
+    """Return a field along the given edges or, without any, along border and sharp edges."""
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
@@ -214,8 +251,8 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
         return guided_field(surface, degree, guides)
 
 
-def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
-    """A field along the mean of all guides in the settings."""
+def _guided(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
+    """Return a field along the mean of all guides in the settings."""
     degree = check_degree(degree)
     report(0.0, "finding guides")
     guide_sets = []
@@ -243,7 +280,7 @@ def _guides(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
         firmness = np.linalg.norm(settings.vectors, axis=1)
         for guide in guide_sets[:-1]:
             firmness[guide.any(axis=1)] = 1.0
-    reach = settings.smoothing_length * surface.extent
+    reach = settings.reach * surface.extent
     weight, is_exact = firmness_weights(firmness, surface.mean_edge_length, reach)
     return guided_field(surface, degree, guides, weight, is_exact)
 

@@ -22,8 +22,8 @@ DAB_SPACING = 1 / 6
 #: Least distance between dabs, relative to `Surface.extent`, and largest number of dabs between two points.
 MIN_SPACING, MAX_DABS = 2.0**-12, 100_000
 
-#: A face that a stroke reaches again is combed anew if the stroke has been elsewhere for this length,
-#: relative to the radius.
+#: A face that a stroke reaches again is combed anew if the stroke was elsewhere for this arc length, relative
+#: to the radius.
 PASS_GAP = 2.0
 
 #: Firmness of a guide that is not exact, where the brush has its full effect.
@@ -58,7 +58,7 @@ class GuideBrush:
     is_exact : bool
         The field follows combed guides exactly, in the whole radius.
     front_faces : bool
-        Leave out faces whose normals point away from that under the brush.
+        Leave out faces whose normals point away from the normal under the brush.
     mirror : sequence of 3 bools
         Repeat the stroke on the other sides of the planes x = 0, y = 0 and z = 0.
     """
@@ -71,7 +71,7 @@ class GuideBrush:
     mirror: Sequence[bool] = (False, False, False)
 
     def falloff(self, distance: np.ndarray) -> np.ndarray:
-        """Effect at distances from the stroke: 1 on the stroke, 0 at the radius."""
+        """Return the effect at distances from the stroke: 1 on the stroke, 0 at the radius."""
         if self.is_exact and self.effect == "comb":
             return (distance < self.radius).astype(np.float64)
         x = np.clip(1 - (distance / self.radius) ** 2, 0, 1)
@@ -80,7 +80,7 @@ class GuideBrush:
 
 @dataclass(frozen=True, eq=False)
 class _Dab:
-    """A place where the brush touches the surface: a position (3,), the pressure, and arc length."""
+    """A sample of the stroke: a position (3,), the pressure there, and the arc length up to it."""
 
     position: np.ndarray
     pressure: float
@@ -96,7 +96,7 @@ class BrushStroke:
     ----------
     system : GuidedSystem
     guides : (F,) complex128 ndarray
-        In the frames of the system. They are changed in place.
+        Representations in the frames of the system. They are changed in place.
     brush : GuideBrush
     locate : callable
         Returns the (n,) int faces closest to (n, 3) points in object space; -1 for no face.
@@ -124,7 +124,7 @@ class BrushStroke:
         self._start_arc_length = 0.0
         self._end: _Dab | None = None  # the last point, which need not be a dab
         self._dabs: list[_Dab] = []  # the last two and new ones
-        # Of each face in the current pass of the stroke over it:
+        # State of each face in the current pass of the stroke over it.
         count = self._surface.face_count
         self._last_arc_length = np.full(count, -np.inf)
         self._least_distance = np.full(count, np.inf)
@@ -259,25 +259,33 @@ class BrushStroke:
             mean = self._system.neighbor_means(self.guides, face)
             self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
             return
-        is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * brush.radius]
+        self._begin_passes(face, arc_length)
+        self._coverage[face] = np.maximum(self._coverage[face], effect)
+        if brush.effect == "erase":
+            self._store(face, (1 - self._coverage[face]) * self._base[face])
+        else:
+            self._comb(face, distance, direction[is_reached])
+
+    def _begin_passes(self, face: np.ndarray, arc_length: float) -> None:
+        """Begin a new pass over faces that the stroke left some arc length ago, or has never reached."""
+        is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * self._brush.radius]
         self._last_arc_length[face] = arc_length
         self._base[is_new] = self.guides[is_new]
         self._least_distance[is_new] = np.inf
         self._coverage[is_new] = 0
-        self._coverage[face] = np.maximum(self._coverage[face], effect)
-        if brush.effect == "erase":
-            self._store(face, (1 - self._coverage[face]) * self._base[face])
-            return
+
+    def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
+        """Turn guides to directions of the stroke, unless a nearer part of it has done so."""
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]
         self._least_distance[face] = distance[is_closest]
         target = to_representation(
-            normalize(direction[is_reached][is_closest]),
+            normalize(direction[is_closest]),
             self._system.averages.x[face],
             self._system.averages.y[face],
             self._system.degree,
         )
-        target *= (1.0 if brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
+        target *= (1.0 if self._brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
         coverage = self._coverage[face]
         self._store(face, (1 - coverage) * self._base[face] + coverage * target)
 

@@ -1,10 +1,10 @@
-"""Turn a field to guides without changing its singularities.
+"""Rotate a field toward guides without changing its singularities.
 
-The singularities of a field stay if it is turned by an angle that is continuous over the surface. The
-Dirichlet energy of a field whose angles are of least squares grows by that of this angle alone
-(`turning_angles`). So the angle that follows guides solves a linear equation, once it is known by which
-multiple of 2 pi / N it follows each of them. A linear equation for the representation, which may have other
-singularities, tells these multiples; they are improved until they are the nearest ones.
+The singularities of a field stay if it is rotated by an angle that is continuous over the surface. If the field
+has the least squared turning angles (`turning_angles`), its Dirichlet energy grows by the Dirichlet energy of
+this angle. So the angle solves a linear equation, once the multiple of 2 pi / N is known that takes the field to
+each guide. The first multiples come from a linear equation for the representation, which may have other
+singularities. They are improved until they are the nearest ones.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .representation import complex_bincount, unit_complex
 from .sparse_multigrid import CSRMatrix, Level, from_edges, hierarchy, w_cycle
 from .turning_angles import added_resistance
 
-#: Residual norm relative to that of the right-hand side at which the solver stops.
+#: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-8
 
 #: Number of times that the field is kept from turning too fast between two faces.
@@ -59,14 +59,14 @@ def guided_rotation(
     target : (F,) complex ndarray
         Representation of the guides, 0 where there is none.
     penalty : (F,) ndarray
-        Weight of the squared difference from the guide, relative to that of squared angles at edges whose
-        conductance is 1.
+        Weight of the squared difference from the guide. Squared angles at edges of conductance 1 have the
+        weight 1.
 
     Returns
     -------
     (F,) float64 ndarray
-        In radians. No edge turns by half the angle between two members because of it, unless the guides
-        leave no other way.
+        Angle in radians. It turns no edge by half the angle between two members or more, unless the guides
+        require that.
     """
     offset = target * z.conj()
     is_guide = (offset != 0) & (penalty > 0)
@@ -102,7 +102,7 @@ def guided_rotation(
 
 
 def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
-    """The Laplacian of the faces, with the penalty on its diagonal."""
+    """Return the Laplacian of the faces, with the penalty on its diagonal."""
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
@@ -117,7 +117,7 @@ def _initial_angle(
     offset: np.ndarray,
     penalty: np.ndarray,
 ) -> np.ndarray:
-    """(F,) N times an angle near to that of the guides: the least-squares unwrapping of their mean."""
+    """Return (F,) N times an angle near the guides: the least-squares unwrapping of their smoothed phases."""
     unit = unit_complex(offset)
     with progress(0.0, 0.3):
         mean = _solve(matrix, penalty * unit, levels)

@@ -32,10 +32,10 @@ from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
-#: Residual norm, relative to that of the right-hand side, at which a solution near some nodes stops.
+#: Residual norm at which a solution near some nodes stops, relative to the norm of the right-hand side.
 NEAR_TOLERANCE = 1e-4
 
-#: Guides of at least this firmness are followed exactly; less than 1, for rounding errors of stored ones.
+#: Guides of at least this firmness are followed exactly. It is less than 1 because stored guides are rounded.
 EXACT_FIRMNESS = 1 - 1e-4
 
 #: Added to the diagonal of the Laplacian, relative to it, so that the system is regular on connected
@@ -67,17 +67,17 @@ class NodeGuides:
 
 @dataclass(frozen=True, eq=False)
 class GuidedSystem:
-    """What the guides of a surface do not change.
+    """The linear system of the guided fields of a surface, without the guides.
 
     Attributes
     ----------
     surface : Surface
     degree : int
     averages : SurfaceAverages
-        With `face_frames` of the surface.
+        Averages in `face_frames` of the surface.
     laplacian : (n, n) CSRMatrix
     levels : list of Level
-        Of `laplacian`. Empty until a first solution.
+        Multigrid levels of `laplacian`; empty until a first solution.
     """
 
     surface: Surface
@@ -198,7 +198,7 @@ class GuidedSystem:
         )
 
     def face_representations_at(self, z: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """(m,) complex128 means of (n,) representations at the nodes, on (m,) faces."""
+        """Return (m,) complex128 means of (n,) representations at the nodes, on (m,) faces."""
         corner = self._corners_of_faces(face)
         value = z[self.averages.connection.corner_node[corner]] * self.averages.corner_area[corner]
         value *= np.exp(1j * self.degree * self.averages.frame_angle[corner])
@@ -206,7 +206,7 @@ class GuidedSystem:
         return complex_bincount(corner_face, value, self.surface.face_count)[face]
 
     def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """(m,) complex128 means of (F,) representations around each of (m,) faces."""
+        """Return (m,) complex128 means of (F,) representations around each of (m,) faces."""
         averages = self.averages
         corner = self.corners_of_nodes(self.nodes_of_faces(face))
         total = averages.node_sums(values, self.degree, corner)
@@ -217,17 +217,17 @@ class GuidedSystem:
         return self.face_representations_at(mean, face) / np.maximum(face_area, 1e-300)
 
     def _corners_of_faces(self, face: np.ndarray) -> np.ndarray:
-        """(k,) intp: the corners of the triangles of (m,) faces, in ascending order."""
+        """Return (k,) intp, the corners of the triangles of (m,) faces, in ascending order."""
         return np.flatnonzero(mask(self.surface.face_count, face)[self.averages.corner_face])
 
     def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
-        """(k,) intp: the nodes of (m,) faces, in ascending order."""
+        """Return (k,) intp, the nodes of (m,) faces, in ascending order."""
         connection = self.averages.connection
         node = connection.corner_node[self._corners_of_faces(face)]
         return np.flatnonzero(mask(connection.node_count, node))
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
-        """(k,) intp: the corners of triangles at (m,) nodes, in ascending order."""
+        """Return (k,) intp, the corners of triangles at (m,) nodes, in ascending order."""
         corner_node = self.averages.connection.corner_node
         return np.flatnonzero(mask(len(self.laplacian), node)[corner_node])
 
@@ -242,7 +242,7 @@ class GuidedSystem:
         Returns
         -------
         (k,) intp ndarray
-            In ascending order.
+            Nodes in ascending order.
         """
         is_near = mask(len(self.laplacian), node)
         total, ring = len(node), node
@@ -265,7 +265,7 @@ def firmness_weights(
     Parameters
     ----------
     firmness : (F,) ndarray
-        From 0 to 1.
+        Firmness of the guide of each face, from 0 to 1.
     edge_length : float
         Mean length of the edges.
     reach : float
@@ -302,7 +302,9 @@ def guided_field(
     hard: np.ndarray | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
 ) -> RosyField:
-    """Compute the smooth field that follows guides, on components without a guide the smoothest field.
+    """Compute the smooth field that follows guides.
+
+    Connected components without a guide get the smoothest field.
 
     Parameters
     ----------
@@ -322,7 +324,7 @@ def guided_field(
     Returns
     -------
     RosyField
-        Of magnitude 1; zero on faces without area.
+        A field of magnitude 1; zero on faces without area.
 
     Raises
     ------

@@ -12,9 +12,11 @@ import numpy as np
 from ..core.errors import RosyError
 from .blocks import mask
 from .closest_point import closest_triangles
+from .connectivity import build_edges
 from .frames import dot, normalize
+from .polygon_arrays import mean_per_face, sum_per_face
 from .representation import complex_bincount, face_frames, from_representation, to_representation
-from .surface import Surface, build_edges, mean_per_face, sum_per_face
+from .surface import Surface
 
 #: Largest distance of a stroke point from the surface, relative to `Surface.extent`. Points farther
 #: away are ignored.

@@ -20,19 +20,21 @@ def interpolate_fields(
 ) -> RosyField:
     """Return a field between two others of the same degree.
 
-    Faces of a RoSy field have the direction of (1 - s) z + s z', the linear interpolation of the
-    representations z = rho exp(i N t) in `face_frames`. It turns the shorter way. Moving singularities
-    move, where the magnitude vanishes at them. Where a member turns by nearly pi / N, the shorter way is to the
-    left on one face and to the right on the next one. An interpolation of the angle would open a cut between
-    them, at which directions differ by up to pi / N for all of the time. The linear one keeps either field
-    until it is replaced within a short time by the other, and the cut is short-lived. Up to turns of a
-    quarter of 2 pi / N, the two differ by less than 4 / N degrees.
+    The direction of a RoSy field is the direction of (1 - s) z + s z', a linear interpolation of the
+    representations z = rho exp(i N t) in `face_frames`. Members turn the shorter way. Singularities move, if the
+    magnitude vanishes at them.
 
-    Magnitudes are interpolated linearly, too. Only where z turns by more than a quarter of a full turn, they are
-    reduced, as the direction is uncertain there.
+    Where members turn by nearly pi / N, the shorter way may be to the left on one face and to the right on the
+    next one. If angles were interpolated, directions would differ by up to pi / N between these faces for all
+    of the time. With the linear interpolation, each face keeps its first direction, then takes the second one
+    within a short time. For turns up to a quarter of 2 pi / N, the two interpolations differ by less than
+    4 / N degrees.
 
-    Directions that are not rotationally symmetric, and fields with families, such as those of tensors, are
-    interpolated direction by direction, by the matching that turns them least of those that keep the families.
+    Magnitudes are interpolated linearly. They are reduced where the phase of z turns by more than pi / 2, because
+    the direction is uncertain there.
+
+    Fields that are not RoSys, and fields with families, such as the fields of tensors, are interpolated direction
+    by direction. Among the matchings that keep the families, the one with the least rotation is used.
 
     Parameters
     ----------

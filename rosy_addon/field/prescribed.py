@@ -1,8 +1,8 @@
 """Fields with given singularities (Crane, Desbrun and Schröder, *Trivial Connections*, 2010).
 
-The angles by which a field turns from face to face follow from its singularities (`turning_angles`). Those
-of the least squares belong to the field of the least Dirichlet energy, but for terms of fourth order. The
-singularities of a field are changed by adding the angles that belong to the change.
+The singularities of a field determine the angles by which it turns from face to face (`turning_angles`). The
+angles of least squares give the field of least Dirichlet energy, up to terms of fourth order. To change the
+singularities of a field, the angles of the change are added to its angles.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from ..core.progress import progress, report
 from .face_graph import LABEL, FaceGraph, face_graph
 from .frames import normalize
 from .guided_rotation import guided_rotation
+from .polygon_arrays import face_area_vectors
 from .representation import (
     complex_bincount,
     face_frames,
@@ -23,7 +24,7 @@ from .representation import (
     unit_complex,
 )
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, face_area_vectors
+from .surface import Surface
 from .turning_angles import turning_angles
 
 
@@ -33,7 +34,7 @@ class TurningError(RosyError):
     Attributes
     ----------
     vertices : (n,) intp ndarray
-        Those of the edges between such faces.
+        Vertices of the edges between such faces.
     """
 
     def __init__(self, vertices: np.ndarray, message: str) -> None:
@@ -70,7 +71,7 @@ def prescribed_field(
     Returns
     -------
     RosyField
-        Of magnitude 1; zero on faces without area.
+        A field of magnitude 1; zero on faces without area.
 
     Raises
     ------
@@ -108,14 +109,14 @@ def change_singularities(
         A RoSy.
     vertex : (K,) int ndarray
     change : (K,) int ndarray
-        What is added to the index of each vertex, in units of 1 / N.
+        Amount that is added to the index of each vertex, in units of 1 / N.
     reach : float
         Distance over which the change of direction falls off, in object space.
 
     Returns
     -------
     RosyField
-        With the magnitude of the field.
+        A field of the same magnitude.
 
     Raises
     ------
@@ -152,7 +153,10 @@ def _turning(
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The results of `turning_angles` that give vertices their indices, where nodes have (n,) defects."""
+    """Return the angles and directions of a field with given indices; see `turning_angles`.
+
+    `defect` is (n,) angle defects of the vertex nodes. `present` is the angles of a field that are changed.
+    """
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
     required = 2 * np.pi / degree * node_index - defect
@@ -172,7 +176,7 @@ def _bent(
     target: np.ndarray,
     reach: float,
 ) -> np.ndarray:
-    """(F,) the representation z, turned to a target where there is one, with the same singularities."""
+    """Return (F,) the representation z, rotated toward a target without changing singularities."""
     area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     penalty = np.linalg.norm(area, axis=1) / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
@@ -183,7 +187,7 @@ def _bent(
 def index_at_nodes(
     surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
 ) -> np.ndarray:
-    """(n,) int64 indices of the vertex nodes. That of a vertex is at its first node."""
+    """Return (n,) int64 indices of the vertex nodes. The index of a vertex is given to its first node."""
     vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
@@ -259,6 +263,6 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
-    """(F,) factors that turn the representation z to a target as a whole, on each connected component."""
+    """Return (F,) factors that turn the representation z to a target as a whole, on each connected component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
     return unit_complex(total, otherwise=1)[component]

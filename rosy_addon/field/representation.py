@@ -17,7 +17,7 @@ from .surface import face_frames as face_frames
 
 
 def power(base: np.ndarray, degree: int) -> np.ndarray:
-    """`base` ** `degree` by repeated squaring, which is fast for arrays; `degree` is at least 1."""
+    """Return `base` ** `degree` by repeated squaring, which is fast for arrays; `degree` is at least 1."""
     result = None
     while True:
         if degree & 1:
@@ -29,9 +29,9 @@ def power(base: np.ndarray, degree: int) -> np.ndarray:
 
 
 def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
-    """`base` ** `exponent` for numbers of modulus 1 or 0 and any integer exponent.
+    """Return `base` ** `exponent` for numbers of modulus 1 or 0 and any integer exponent.
 
-    Negative powers are conjugates of the positive ones, so those of 0 are 0.
+    Negative powers are conjugates of positive ones, so negative powers of 0 are 0.
     """
     if exponent == 0:
         return 1
@@ -46,7 +46,7 @@ def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
 
 
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
-    """(count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
+    """Return (count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
     real = np.bincount(index, weights.real, count)
     return real + 1j * np.bincount(index, weights.imag, count)
 
@@ -90,7 +90,7 @@ def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
 
 
 def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
-    """(F,) complex128 representations z of a field in `face_frames`."""
+    """Return (F,) complex128 representations z of a field in `face_frames`."""
     x, y = face_frames(surface)
     return to_representation(field.vectors, x, y, field.degree)
 
@@ -101,7 +101,7 @@ def edge_unfolding(
     """Return (I,) complex128 factors of modulus 1, from the frame of the first face at each edge to the second.
 
     A direction in the first face, as a complex number, times the factor is the same direction in the second
-    one if the faces are unfolded into one plane. The parameters are those of `matching_angles`.
+    one if the faces are unfolded into one plane. The parameters are the same as in `matching_angles`.
     """
     source_face, target_face = surface.corner_face[a], surface.corner_face[b]
     edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
@@ -119,9 +119,8 @@ def matching_angles(
     degree: int,
     a: np.ndarray,
     b: np.ndarray,
-    label: str | None = None,
 ) -> np.ndarray:
-    """The angle between matching members of the two faces at each interior edge.
+    """Return the angle between matching members of the two faces at each interior edge.
 
     The faces are unfolded into one plane. A member of the first face matches the nearest member of
     the second face.
@@ -137,8 +136,6 @@ def matching_angles(
         N of the representations.
     a, b : (I,) int ndarray
         The columns of `Edges.halfedges`: the corners of both faces where the edge starts.
-    label : str, optional
-        Of the progress.
 
     Returns
     -------
@@ -152,4 +149,4 @@ def matching_angles(
         unfolding = edge_unfolding(surface, x, y, a, b)
         return np.angle(target * (source * power(unfolding, degree)).conj()) / degree
 
-    return by_rows(angles, a, b, label=label)
+    return by_rows(angles, a, b)

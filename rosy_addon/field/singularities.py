@@ -7,12 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.errors import counted
-from ..core.progress import progress, report
+from ..core.progress import report
 from .blocks import mask
+from .connectivity import build_edges
 from .frames import dot
+from .polygon_arrays import face_blocks, next_corners
 from .representation import face_frames, matching_angles, to_representation
 from .rosy_field import RosyField
-from .surface import Surface, build_edges, face_blocks, next_corners
+from .surface import Surface
 
 
 def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
@@ -39,26 +41,21 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     index : (K,) int32 ndarray
         Singularity indices in units of 1 / N; never 0.
     """
-    label = "counting singularities"
-    report(0.0, label)
+    report(0.0, "counting singularities")
     x, y = face_frames(surface)
-    report(0.1, label)
     z = to_representation(field.vectors, x, y, field.degree)
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    report(0.4, label)
     a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    with progress(0.4, 0.7):
-        matching = matching_angles(surface, x, y, z, field.degree, a, b, label)
+    matching = matching_angles(surface, x, y, z, field.degree, a, b)
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
-    report(0.7, label)
+    report(0.7, "counting singularities")
     # A counter-clockwise loop around the head of an edge crosses it from side a to side b, a loop
     # around its tail from b to a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
     corner_angles = signed_corner_angles(surface, x, y)
     angle_defect = 2 * np.pi - np.bincount(corner_vertex, corner_angles, count)
-    report(0.9, label)
     angle_sum = angle_sum + angle_defect
     index = np.rint(angle_sum * field.degree / (2 * np.pi)).astype(np.int32)
 
@@ -122,7 +119,7 @@ def first_pairs(pairs: np.ndarray) -> np.ndarray:
 
 
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
+    """Return (C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)

@@ -7,12 +7,13 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress, report
 from .blocks import concatenated_ranges, mask, neighbors_of_nodes
+from .connectivity import build_edges
 from .prescribed import TurningError, change_singularities
 from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
-from .surface import Surface, build_edges
+from .surface import Surface
 
-#: Stands for no vertex: what is moved there leaves the surface over a border.
+#: Instead of a vertex: an index that is moved there leaves the surface across a border.
 OUTSIDE = -1
 
 #: Least distance over which the change falls off, relative to `Surface.extent`.
@@ -47,7 +48,7 @@ def move_index(
     Returns
     -------
     RosyField
-        All its other singularities are those of `field`.
+        A field with the same other singularities.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def move_index(
 
 
 def _distance(surface: Surface, ends: np.ndarray) -> float:
-    """Distance between two vertices; 0 if one is `OUTSIDE`, or not in the mesh."""
+    """Return the distance between two vertices; 0 if one is `OUTSIDE`, or not in the mesh."""
     if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0
     return float(np.linalg.norm(np.diff(surface.vertices[ends].astype(np.float64), axis=0)))
@@ -130,7 +131,7 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 
 
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """(P,) bool: which (P, 2) pairs of vertices are the nearest to others, by the number of faces between."""
+    """Return (P,) bool, which (P, 2) pairs of vertices are the fewest faces away from other vertices."""
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
     while not is_near[pairs].any():

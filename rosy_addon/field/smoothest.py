@@ -37,7 +37,7 @@ SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the field of least Dirichlet energy among those of equal L2 norm, made unit.
+    """Compute the field of least Dirichlet energy for its L2 norm, then normalize it.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     Returns
     -------
     RosyField
-        Of magnitude 1; 0 on faces without area. The energy does not determine the rotation of the
-        whole field, so it is chosen to align the field with the edges of the mesh.
+        A field of magnitude 1; 0 on faces without area. A rotation of the whole field does not change its
+        energy, so the field is rotated to align with the edges of the mesh.
 
     Raises
     ------
@@ -159,69 +159,76 @@ def _lobpcg(
     energy : (components,) float64 ndarray
         The Rayleigh quotients.
     """
-    matrix, component_count = levels[0].matrix, int(component.max()) + 1
+    matrix, products = levels[0].matrix, _ComponentProducts(mass, component)
     tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
-
-    def sums(values: np.ndarray) -> np.ndarray:
-        """(components,) sums of (n,) values over each component."""
-        return _component_sums(component, values, component_count)
-
-    def gram_matrices(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-        """(components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
-        gram = np.empty((component_count, len(a), len(b)), dtype=np.complex128)
-        for i, conjugate in enumerate(a):
-            conjugate = conjugate.conj()
-            for j in range(i, len(b)):
-                gram[:, i, j] = sums(conjugate * b[j])
-                gram[:, j, i] = gram[:, i, j].conj()
-        return gram
-
-    def broadcast(values: np.ndarray) -> np.ndarray:
-        """Expand a value for each component to its nodes."""
-        return values[component] if component_count > 1 else values
-
-    def mass_norms(vector: np.ndarray) -> np.ndarray:
-        """(components,) mass norms of a vector."""
-        return np.sqrt(sums(mass * (vector.real**2 + vector.imag**2)).real)
-
-    def normalized(pair: np.ndarray) -> np.ndarray:
-        """Divide a (2, n) vector and its image in place by the mass norm of the vector."""
-        norm = mass_norms(pair[0])
-        pair *= broadcast(1 / np.where(norm > 0, norm, 1))
-        return pair
-
-    def combine(pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
-        """The linear combination of pairs with (components, k) coefficients."""
-        total = pairs[0] * broadcast(coefficients[:, 0])
-        for index, pair in enumerate(pairs[1:], 1):
-            total += pair * broadcast(coefficients[:, index])
-        return total
-
     # Vectors are in pairs with their images: their products with the matrix.
-    current = normalized(np.stack([z, matrix @ z]))
+    current = products.normalize(np.stack([z, matrix @ z]))
     previous_step: list[np.ndarray] = []
-    energy = sums(current[0].conj() * current[1]).real
+    energy = products.sums(current[0].conj() * current[1]).real
     for iteration in range(max_iterations):
         # 20 to 50 iterations are usual; the progress bar is scaled for that.
         report(1 - 0.95**iteration, "solving for the smoothest field")
         z, image = current
-        direction = w_cycle(levels, image - broadcast(energy) * (mass * z))
-        direction -= broadcast(sums(mass * (z.conj() * direction))) * z
-        search = normalized(np.stack([direction, matrix @ direction]))
+        direction = w_cycle(levels, image - products.at_nodes(energy) * (mass * z))
+        direction -= products.at_nodes(products.sums(mass * (z.conj() * direction))) * z
+        search = products.normalize(np.stack([direction, matrix @ direction]))
         basis = [current, search, *previous_step]
         vectors, images = zip(*basis, strict=True)
         coefficients, energy = _rayleigh_ritz(
-            gram_matrices(vectors, images),
-            gram_matrices(vectors, [mass * vector for vector in vectors]),
+            products.gram_matrices(vectors, images),
+            products.gram_matrices(vectors, [mass * vector for vector in vectors]),
         )
-        step = combine(basis[1:], coefficients[:, 1:])
-        change = mass_norms(step[0]).max()
-        new_coefficients = np.stack([coefficients[:, 0], np.ones(component_count)], axis=1)
-        current = normalized(combine([current, step], new_coefficients))
-        previous_step = [normalized(step)]
+        step = products.combine(basis[1:], coefficients[:, 1:])
+        change = products.norms(step[0]).max()
+        kept = np.stack([coefficients[:, 0], np.ones(len(energy))], axis=1)
+        current = products.normalize(products.combine([current, step], kept))
+        previous_step = [products.normalize(step)]
         if change < tolerance:
             break
     return current[0], energy
+
+
+class _ComponentProducts:
+    """Inner products and linear combinations of vectors, separately on each connected component."""
+
+    def __init__(self, mass: np.ndarray, component: np.ndarray) -> None:
+        self._mass, self._component = mass, component
+        self._count = int(component.max()) + 1
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Return (components,) sums of (n,) values over each component."""
+        return _component_sums(self._component, values, self._count)
+
+    def at_nodes(self, values: np.ndarray) -> np.ndarray:
+        """Expand a value for each component to its nodes."""
+        return values[self._component] if self._count > 1 else values
+
+    def norms(self, vector: np.ndarray) -> np.ndarray:
+        """Return (components,) mass norms of a vector."""
+        return np.sqrt(self.sums(self._mass * (vector.real**2 + vector.imag**2)).real)
+
+    def normalize(self, pair: np.ndarray) -> np.ndarray:
+        """Divide a (2, n) vector and its image in place by the mass norm of the vector."""
+        norm = self.norms(pair[0])
+        pair *= self.at_nodes(1 / np.where(norm > 0, norm, 1))
+        return pair
+
+    def combine(self, pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
+        """Return the linear combination of pairs with (components, k) coefficients."""
+        total = pairs[0] * self.at_nodes(coefficients[:, 0])
+        for index, pair in enumerate(pairs[1:], 1):
+            total += pair * self.at_nodes(coefficients[:, index])
+        return total
+
+    def gram_matrices(self, a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
+        """Return (components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
+        gram = np.empty((self._count, len(a), len(b)), dtype=np.complex128)
+        for i, vector in enumerate(a):
+            conjugate = vector.conj()
+            for j in range(i, len(b)):
+                gram[:, i, j] = self.sums(conjugate * b[j])
+                gram[:, j, i] = gram[:, i, j].conj()
+        return gram
 
 
 def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -258,7 +265,7 @@ def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _component_sums(component: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) complex128 sums of (n,) values over each component."""
+    """Return (count,) complex128 sums of (n,) values over each component."""
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
     return complex_bincount(component, values, count)

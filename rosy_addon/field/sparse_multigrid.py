@@ -1,6 +1,6 @@
 """Sparse Hermitian matrices in numpy, and algebraic multigrid for connection Laplacians.
 
-Matrices are complex or, if all their entries are, real; so is all that is made from them.
+Matrices are complex or real. Products, levels and solutions have the same type.
 
 The smooth vectors of a connection Laplacian are parallel, not constant: between neighboring
 unknowns their phase changes by the phase of the matrix entry. So each aggregate stores the phases
@@ -102,7 +102,7 @@ class CSRMatrix:
         return entries
 
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
-        """(k,) intp: the entries of (m,) rows, row by row."""
+        """Return (k,) intp, the entries of (m,) rows, row by row."""
         return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
@@ -171,14 +171,14 @@ def from_edges(
 
 
 def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
-    """The matrix product a b."""
+    """Return the matrix product a b."""
     return _assemble_by_rows(a, b.column_count, lambda part: _product_terms(a, b, part))
 
 
 def _product_terms(
     a: CSRMatrix, b: CSRMatrix, block: slice
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows, columns and values of the terms that a block of entries of `a` adds to a b."""
+    """Return rows, columns and values of the terms that a block of entries of `a` adds to the product a b."""
     inner = a.indices[block]
     first = b.indptr.take(inner)
     count = b.indptr.take(inner + 1) - first
@@ -201,7 +201,7 @@ def _assemble_by_rows(
     matrix : CSRMatrix
         The result has the same number of rows.
     column_count : int
-        Of the result.
+        Number of columns of the result.
     entries : callable
         Takes a slice of the entries of `matrix` and returns the rows, columns and values of the
         result that come from them. Entries at the same position are summed.
@@ -225,7 +225,7 @@ def _assemble_by_rows(
 
 
 def _sum_duplicates(key: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The distinct keys in ascending order, and the sum of the values of each."""
+    """Return the distinct keys in ascending order, and the sum of the values of each."""
     order = np.argsort(key, kind="stable")
     key = key.take(order)
     first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
@@ -263,7 +263,7 @@ def hierarchy(matrix: CSRMatrix) -> list[Level]:
     Returns
     -------
     list of Level
-        From the finest level to the coarsest.
+        Levels from the finest to the coarsest.
     """
     levels = []
     unknown_count = len(matrix)
@@ -350,20 +350,23 @@ def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
 
 
 def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
-    """(n,) weights of a Jacobi step that damps the upper part of the spectrum."""
+    """Return (n,) weights of a Jacobi step that damps the upper part of the spectrum."""
     diagonal = _positive_diagonal(matrix)
     scaled_row_sum = np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1]) / diagonal
     return 4 / (3 * scaled_row_sum.max() * diagonal)
 
 
 def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
-    """(n,) diagonal without zeros: the eigenvalue of a component of tiny area is lost in rounding."""
+    """Return (n,) the diagonal, made positive.
+
+    Rounding errors can remove the diagonal of a component of tiny area.
+    """
     diagonal = matrix.diagonal
     return np.maximum(diagonal, SINGULAR_SHIFT * diagonal.max())
 
 
 def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
-    """The inverse of a sparse matrix as a dense array.
+    """Return the inverse of a sparse matrix as a dense array.
 
     If the matrix is singular, its diagonal is enlarged a little. The inverse is a preconditioner, so
     that changes the rate of convergence, not the solution.
@@ -384,7 +387,7 @@ def _smoothed_prolongation(
     count: int,
     phase: np.ndarray,
 ) -> CSRMatrix:
-    """The prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
+    """Return the prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
     unknowns = np.arange(len(matrix))
 
     def entries(block: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -1,56 +1,36 @@
 """Evenly spaced lines along the directions of a field, as a phase on the surface.
 
-A phase is a number of lines: it grows by 1 from one line to the next, and the lines are where it is
-an integer. Along an edge, the phase of a family of lines changes by the component of the edge
-across the lines divided by the spacing. On a curved surface no phase has exactly these changes; the
-one sought has the least squared error of exp(2 pi i phase). Where lines diverge too much, new lines
-begin, at triangles around which the phase changes by an integer.
+A phase counts lines: it grows by 1 from one line to the next, and the lines are where it is an integer.
+Along an edge, the phase of a family of lines should change by the component of the edge across the lines,
+divided by the spacing. On a curved surface, no phase changes exactly so. `stripe_pattern` computes the phase
+with the least squared error of exp(2 pi i phase). Where lines diverge too much, new lines begin, at triangles
+around which the phase changes by an integer.
 
-Energy, covering and interpolation are those of Knöppel, Crane, Pinkall and Schröder, "Stripe
-Patterns on Surfaces" (SIGGRAPH 2015). The energy is minimized over numbers of modulus 1 from coarse
-to fine, as the position fields of Jakob, Tarini, Panozzo and Sorkine-Hornung, "Instant
-Field-Aligned Meshes" (SIGGRAPH Asia 2015): an eigenvector would be small on most parts of the
+Energy, covering and interpolation follow Knöppel, Crane, Pinkall and Schröder, "Stripe Patterns on
+Surfaces" (SIGGRAPH 2015). The energy is minimized over numbers of modulus 1
+(`angular_synchronization`) instead of eigenvectors: an eigenvector would be small on most parts of the
 surface, and take longer.
 
-The families of a field change places around its singularities. So the unknowns live on the
-covering: a *node* is a vertex with one of its families, joined across edges by the directions that
-match. A family that comes back with the opposite direction has the conjugate unknown.
+Around a singularity, the families of a field are permuted. So the unknowns are on the covering: a *node* is
+a vertex with one of its families, and nodes are connected across edges by the directions that match. If a
+family continues as the opposite direction of another one, its value is the conjugate of the other's.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from ..core.progress import progress, report
+from .angular_synchronization import LABEL, PhaseGraph, phase_graph, synchronize
 from .blocks import mask, row_blocks
 from .connection import sums_in_umbrellas, umbrella_order
-from .representation import unit_complex
-from .surface import build_edges, next_corners, sorted_with_order
-
-#: Label of the progress.
-LABEL = "spacing lines"
+from .connectivity import build_edges
+from .polygon_arrays import next_corners
 
 #: Bounds of the cotangent weights of edges. The lower one also connects obtuse triangles.
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0
-
-#: Smoothing steps on the finest level, factor for each coarser level, and their largest number.
-SMOOTHING_STEPS, STEP_GROWTH, MAX_SMOOTHING_STEPS = 8, 1.5, 100
-
-#: Share of the old value in a smoothing step. It damps oscillations.
-INERTIA = 0.3
-
-#: Levels have at least this many nodes, and are coarsened by at least this factor.
-MIN_LEVEL_NODES, MIN_COARSENING = 12, 1.1
-
-#: Odd factor of the hash of two nodes.
-HASH_FACTOR = 0x9E3779B97F4A7C15
-
-#: Rounds in which pairs of nodes are matched on a level.
-MATCHING_ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +49,7 @@ class CornerDirections:
         Angle of direction 0 in that frame, radians. Within a triangle direction 0 is the same
         branch at all corners.
     deviation : (T, 3, N) complex128 ndarray or None
-        Ratios of the directions to those of a RoSy, of modulus 1. None for a RoSy.
+        Ratios of the directions to the members of the nearest RoSy, of modulus 1. None for a RoSy.
     defined : (T,) bool ndarray
         Whether the field is defined in the triangle.
     """
@@ -87,7 +67,7 @@ class CornerDirections:
         return self.degree // 2 if self.has_opposites else self.degree
 
     def phase_changes(self, spacing: float) -> np.ndarray:
-        """(3 T, M) changes of the phase from each corner to the next, for lines along the field."""
+        """Return (3 T, M) changes of the phase from each corner to the next, for lines along the field."""
         edge = np.roll(self.offset, -1, axis=1) - self.offset
         middle = 0.5 * (self.angle + np.roll(self.angle, -1, axis=1))
         result = np.empty((*edge.shape, self.family_count))
@@ -130,12 +110,12 @@ class StripePattern:
         Returns
         -------
         (P,) float32 ndarray
-            In lines.
+            Phase in lines.
 
         Notes
         -----
-        In a triangle with an index, the phase is that of Knöppel et al. (section 4.3): linear along
-        the edges, and constant on rays from the center of the triangle apart from a linear part.
+        In a triangle with an index, the phase is the sum of a linear function and of a part that is linear
+        along the edges and constant on rays from the center (Knöppel et al., section 4.3).
         """
         entry = triangle * np.int32(self.index.shape[1]) + family
         corners = self.phase.reshape(-1, 3)
@@ -150,9 +130,9 @@ class StripePattern:
 
 
 def _turn_fraction(weights: np.ndarray) -> np.ndarray:
-    """(P,) part of a turn around a triangle, from 0 at corner 0 through 1 / 3 at corner 1.
+    """Return (P,) parts of a turn around a triangle: 0 at corner 0, 1/3 at corner 1, 2/3 at corner 2.
 
-    It is linear along the edges and constant on rays from the center.
+    They are linear along the edges and constant on rays from the center.
     """
     opposite = weights.argmin(axis=0)
     points = np.arange(weights.shape[1])
@@ -188,9 +168,9 @@ def stripe_pattern(
     change = _shared_changes(change, gluing, directions)
     report(0.2, LABEL)
     covering = _covering(triangle_vertex, gluing, directions)
-    graph = _graph(covering, gluing, change, directions)
+    graph = _covering_graph(covering, gluing, change, directions)
     with progress(0.4, 0.9):
-        z = _smoothest(graph)
+        z = synchronize(graph)
     change, node, conjugated = (
         values.reshape(-1, 3, directions.family_count)
         for values in (change, covering.node, covering.conjugated)
@@ -202,7 +182,7 @@ def stripe_pattern(
         corner = z[node[block]]
         np.conjugate(corner, out=corner, where=conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
-        # From corner to corner, the phase changes by nearly as much as it should.
+        # Choose the change from corner to corner that is nearest to what it should be.
         step = np.roll(corner_phase, -1, axis=1) - corner_phase
         step += np.rint(change[block] - step)
         index[block] = np.rint(step.sum(axis=1))
@@ -254,7 +234,7 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
 def _shared_changes(
     change: np.ndarray, gluing: _Gluing, directions: CornerDirections
 ) -> np.ndarray:
-    """(3 T, M) changes of phases that are exactly opposite in the two triangles of an edge."""
+    """Return (3 T, M) changes of the phases, made exactly opposite in the two triangles of an edge."""
     families = directions.family_count
     result = change.copy()
     glued = np.flatnonzero(gluing.twin >= 0)
@@ -292,7 +272,7 @@ class _Covering:
 def _covering(
     triangle_vertex: np.ndarray, gluing: _Gluing, directions: CornerDirections
 ) -> _Covering:
-    """Count the directions of all corners around a vertex from the same one."""
+    """Find the nodes: number the directions at all corners around a vertex from the same direction."""
     degree, families = directions.degree, directions.family_count
     corner = np.arange(len(gluing.twin), dtype=np.int32)
     previous, _ = umbrella_order(triangle_vertex.reshape(-1), gluing.twin, gluing.next_corner)
@@ -314,7 +294,7 @@ def _covering(
 
 
 def _edge_weights(directions: CornerDirections) -> np.ndarray:
-    """(T, 3) half the cotangents of the angles opposite the edge from each corner to the next."""
+    """Return (T, 3) halves of the cotangents of the angles opposite the edge from each corner to the next."""
     to_corner = directions.offset - np.roll(directions.offset, 1, axis=1)
     to_next = np.roll(directions.offset, -1, axis=1) - np.roll(directions.offset, 1, axis=1)
     product = to_corner.conj() * to_next
@@ -325,47 +305,10 @@ def _edge_weights(directions: CornerDirections) -> np.ndarray:
     return weight
 
 
-@dataclass(frozen=True, eq=False)
-class _Graph:
-    """Nodes and what their neighbors say about their values.
-
-    An entry says that the value at `row` should be ``a z + b conj(z)``, with the value z at
-    `column`. Its moduli are weights. Entries are sorted by row, and come in both directions.
-    """
-
-    node_count: int
-    row: np.ndarray
-    column: np.ndarray
-    a: np.ndarray
-    b: np.ndarray
-
-    @cached_property
-    def row_start(self) -> np.ndarray:
-        """The first entry of each row that has any."""
-        return _run_starts(self.row)
-
-    @cached_property
-    def strength(self) -> np.ndarray:
-        """(m,) float64 weights of the entries."""
-        return np.abs(self.a) + np.abs(self.b)
-
-    @cached_property
-    def conjugating(self) -> np.ndarray:
-        """The entries with b."""
-        return np.flatnonzero(self.b)
-
-
-def _run_starts(values: np.ndarray) -> np.ndarray:
-    """The first index of each run of equal values."""
-    is_first = np.ones(len(values), dtype=bool)
-    np.not_equal(values[1:], values[:-1], out=is_first[1:])
-    return np.flatnonzero(is_first)
-
-
-def _graph(
+def _covering_graph(
     covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
-) -> _Graph:
-    """The graph of the edges of all triangles on the covering."""
+) -> PhaseGraph:
+    """Return the graph of the edges of all triangles on the covering."""
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))
     has_twin = gluing.twin >= 0
@@ -382,152 +325,10 @@ def _graph(
     flips = tail_flipped != head_flipped
     a, b = np.where(flips, 0, value).reshape(-1), np.where(flips, value, 0).reshape(-1)
     tail_node, head_node = covering.node[tail].reshape(-1), covering.node[head].reshape(-1)
-    return _graph_of_entries(
+    return phase_graph(
         covering.node_count,
         np.concatenate([head_node, tail_node]),
         np.concatenate([tail_node, head_node]),
         np.concatenate([a, a.conj()]),
         np.concatenate([b, b]),
     )
-
-
-def _graph_of_entries(
-    node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
-) -> _Graph:
-    """A graph of entries in any order; those between the same nodes add up."""
-    entry = np.flatnonzero(row != column)
-    key = row[entry].astype(np.int64) * node_count + column[entry]
-    key, order = sorted_with_order(key, max(node_count, 1) ** 2)
-    entry = entry[order]
-    first = _run_starts(key)
-    if len(first):
-        a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
-    row, column = np.divmod(key[first], max(node_count, 1))
-    return _Graph(node_count, row, column, a[: len(row)], b[: len(row)])
-
-
-def _smoothest(graph: _Graph) -> np.ndarray:
-    """(n,) complex128 values of modulus 1 that agree with their neighbors, from coarse to fine."""
-    levels = [graph]
-    clusterings: list[_Clustering] = []
-    while graph.node_count > MIN_LEVEL_NODES and len(graph.row):
-        clustering = _clustering(graph)
-        if clustering.count * MIN_COARSENING > graph.node_count:
-            break
-        graph = _coarse_graph(graph, clustering)
-        clusterings.append(clustering)
-        levels.append(graph)
-    z = np.ones(graph.node_count, dtype=np.complex128)
-    while True:
-        graph = levels[len(clusterings)]
-        inertia = np.zeros(graph.node_count)
-        if len(graph.row):
-            rows = graph.row[graph.row_start]
-            inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
-        steps = SMOOTHING_STEPS * STEP_GROWTH ** len(clusterings)
-        for _ in range(int(min(steps, MAX_SMOOTHING_STEPS))):
-            report(1 - 0.7 * len(clusterings) / len(levels), LABEL)
-            z = _smoothed(graph, z, inertia)
-        if not clusterings:
-            return z
-        clustering = clusterings.pop()
-        z = z[clustering.cluster]
-        z = clustering.p * z + clustering.q * z.conj()
-
-
-def _smoothed(graph: _Graph, z: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """Replace each value by the one that its neighbors agree on."""
-    if not len(graph.row):
-        return z
-    neighbor = z.take(graph.column)
-    terms = graph.a * neighbor
-    conjugating = graph.conjugating
-    terms[conjugating] += graph.b[conjugating] * neighbor[conjugating].conj()
-    total = inertia * z
-    total[graph.row[graph.row_start]] += np.add.reduceat(terms, graph.row_start)
-    modulus = np.sqrt(total.real**2 + total.imag**2)
-    return np.divide(total, modulus, out=z.copy(), where=modulus > 0)
-
-
-class _Clustering(NamedTuple):
-    """Groups of nodes.
-
-    Attributes
-    ----------
-    cluster : (n,) int ndarray
-        Cluster of each node.
-    p, q : (n,) complex128 ndarray
-        The value of a node is p z + q conj(z), with the value z of its cluster. One of them is 0,
-        the other has the modulus 1.
-    count : int
-        Number of clusters.
-    """
-
-    cluster: np.ndarray
-    p: np.ndarray
-    q: np.ndarray
-    count: int
-
-
-def _clustering(graph: _Graph) -> _Clustering:
-    """Group nodes into pairs and triples along their strongest edges."""
-    count = graph.node_count
-    # A hash makes the strengths distinct, so that many nodes find a partner at once.
-    low, high = np.minimum(graph.row, graph.column), np.maximum(graph.row, graph.column)
-    hashed = (low * count + high).astype(np.uint64) * np.uint64(HASH_FACTOR)
-    strength = graph.strength * (1 + 0.5 * (hashed >> np.uint64(40)).astype(np.float64) / 2**24)
-    partner, link = np.full((2, count), -1, dtype=np.int64)
-    nodes = np.arange(count)
-    entry = np.arange(len(graph.row))
-    for _ in range(MATCHING_ROUNDS):
-        free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
-        entry = entry[free]
-        if not len(entry):
-            break
-        chosen = _strongest_of_row(graph.row, strength, entry)
-        choice = np.full(count, -1, dtype=np.int64)
-        choice[graph.row[chosen]] = graph.column[chosen]
-        chooser = graph.row[chosen]
-        mutual = choice[choice[chooser]] == chooser
-        partner[chooser[mutual]] = choice[chooser[mutual]]
-        link[chooser[mutual]] = chosen[mutual]
-    # The first node of a pair is the root; the other and single neighbors of the root follow it.
-    is_root = (partner < 0) | (partner > nodes)
-    root = np.where(is_root, nodes, partner)
-    joins = np.flatnonzero((partner[graph.row] < 0) & (partner[graph.column] > graph.column))
-    if len(joins):
-        chosen = _strongest_of_row(graph.row, strength, joins)
-        root[graph.row[chosen]] = graph.column[chosen]
-        link[graph.row[chosen]] = chosen
-        is_root[graph.row[chosen]] = False
-    p, q = np.ones(count, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
-    follower = np.flatnonzero(~is_root)
-    a, b = graph.a[link[follower]], graph.b[link[follower]]
-    keeps = np.abs(a) >= np.abs(b)
-    value = unit_complex(np.where(keeps, a, b), otherwise=1)
-    p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
-    number = np.cumsum(is_root) - 1
-    return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))
-
-
-def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:
-    """The strongest of some entries in each row. Entries are in ascending order."""
-    first = _run_starts(row[entry])
-    largest = np.maximum.reduceat(strength[entry], first)
-    is_largest = strength[entry] == np.repeat(largest, np.diff(first, append=len(entry)))
-    candidate = entry[is_largest]
-    return candidate[_run_starts(row[candidate])]
-
-
-def _coarse_graph(graph: _Graph, clustering: _Clustering) -> _Graph:
-    """The graph of clusters: the entries in terms of their values."""
-    cluster, p, q, count = clustering
-    row, column = cluster[graph.row], cluster[graph.column]
-    entry = np.flatnonzero(row != column)
-    tail, head = graph.column[entry], graph.row[entry]
-    a, b = graph.a[entry], graph.b[entry]
-    # After the map of the column.
-    a, b = a * p[tail] + b * q[tail].conj(), a * q[tail] + b * p[tail].conj()
-    # Before the inverse map of the row: that of p is its conjugate, that of q is the map itself.
-    a, b = p[head].conj() * a + q[head] * b.conj(), p[head].conj() * b + q[head] * a.conj()
-    return _graph_of_entries(count, row[entry], column[entry], a, b)

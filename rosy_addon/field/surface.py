@@ -1,4 +1,4 @@
-"""Polygon meshes as flat arrays, with their edges, smooth fans, normals and connectivity."""
+"""`Surface`: a polygon mesh as flat arrays, with its triangles, normals and smooth fans."""
 
 from __future__ import annotations
 
@@ -16,9 +16,21 @@ from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
 from .blocks import mask, row_blocks
+from .connectivity import build_edges, smooth_fans
 from .frames import dot, normalize
 from .mesh_arrays import mesh_arrays
 from .mesh_io import SHARP_ANGLE, read_uv_map, read_vertex_data
+from .polygon_arrays import (
+    BLOCK_ELEMENTS,
+    box_corners,
+    corner_faces,
+    face_area_vectors,
+    face_blocks,
+    fan_normals,
+    mean_per_face,
+    next_corners,
+    sum_per_fan,
+)
 from .triangulate import triangulate
 from .up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
@@ -28,9 +40,6 @@ MAX_COORDINATE, MIN_EXTENT = 1e12, 1e-12
 
 #: Largest difference, in each component, at which a corner normal equals the mean of its fan.
 NORMAL_TOLERANCE = 1e-6
-
-#: Faces or corners processed at once, to bound memory and fit in the CPU caches.
-BLOCK_ELEMENTS = 1 << 14
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
@@ -275,7 +284,7 @@ class Surface:
 
     @cached_property
     def fans_share_normals(self) -> bool:
-        """Whether all corner normals equal that of their fan; custom normals may differ."""
+        """Whether all corner normals equal the normal of their fan; custom normals may differ."""
         normals = self.fan_normal
         return all(
             np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()
@@ -356,7 +365,7 @@ def build_surface(
         )
     report(0.8, "computing normals")
     if corner_normal is None:
-        corner_normal = _fan_normals(vertices, corner_vertex, face_start, corner_fan)
+        corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return _surface_of_parts(
         name=name,
         vertices=vertices,
@@ -379,122 +388,9 @@ def _surface_of_parts(**parts: Any) -> Surface:
     return surface
 
 
-def smooth_fans(
-    vertices: np.ndarray,
-    corner_vertex: np.ndarray,
-    face_start: np.ndarray,
-    sharp_edges: np.ndarray | None = None,
-    sharp_angle: float | None = None,
-    flat_faces: np.ndarray | None = None,
-) -> np.ndarray:
-    """(C,) int32: `Surface.corner_fan`; the parameters are those of `build_surface`.
-
-    Without a sharp angle, the result does not depend on the vertex positions.
-    """
-    edges = build_edges(corner_vertex, face_start)
-    corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
-    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
-    smooth = np.ones(len(a), dtype=bool)
-    if flat_faces is not None:
-        flat = np.asarray(flat_faces, dtype=bool)
-        smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
-    if sharp_angle is not None:
-        normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
-        smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
-    if sharp_edges is not None and len(sharp_edges):
-        stride = int(corner_vertex.max()) + 1
-        sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
-        ends = edges.ends[edges.interior].astype(np.int64)
-        smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
-    a, b = a[smooth], b[smooth]
-    return connected_corners(a, b, next_corner)
-
-
-def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
-    """(C,) int32 components of corners that meet at the ends of edges.
-
-    (I,) a and b are the corners where the edges start in the faces on both sides.
-    """
-    ends = np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)
-    return connected_components(len(next_corner), np.concatenate(ends))
-
-
-def corner_faces(face_start: np.ndarray) -> np.ndarray:
-    """(C,) int32: the face of each corner."""
-    return np.repeat(np.arange(len(face_start) - 1, dtype=np.int32), np.diff(face_start))
-
-
-def next_corners(face_start: np.ndarray) -> np.ndarray:
-    """(C,) int32: the following corner around the same face."""
-    following = np.arange(1, face_start[-1] + 1, dtype=np.int32)
-    following[face_start[1:] - 1] = face_start[:-1]
-    return following
-
-
-def box_corners(points: np.ndarray) -> np.ndarray:
-    """(8, 3) corners of the bounding box of (n, 3) points."""
-    limits = np.stack([points.min(axis=0), points.max(axis=0)])
-    selector = np.indices((2, 2, 2)).reshape(3, 8)
-    return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)
-
-
 def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
-    """(n,) intp: the vertices that a corner refers to, in ascending order."""
+    """Return (n,) intp, the vertices that a corner refers to, in ascending order."""
     return np.flatnonzero(mask(vertex_count, corner_vertex))
-
-
-def sum_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
-    """(F, ...) sums of (C, ...) corner values over each face."""
-    return np.add.reduceat(values, face_start[:-1], axis=0)
-
-
-def mean_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
-    """(F, ...) means of (C, ...) corner values over each face."""
-    count = np.diff(face_start).reshape((-1,) + (1,) * (values.ndim - 1))
-    return sum_per_face(values, face_start) / count
-
-
-def face_area_vectors(
-    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
-) -> np.ndarray:
-    """(F, 3) area vectors (normal times area) of polygons, by Newell's formula.
-
-    Positions are relative to the first corner of each face, so that no precision is lost far from
-    the origin.
-    """
-    area = np.empty((len(face_start) - 1, 3))
-    for faces, corners, starts in face_blocks(face_start):
-        points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
-        twice = sum_per_face(np.cross(points, points[next_corners(starts)]), starts)
-        np.multiply(twice, 0.5, out=area[faces])
-    return area
-
-
-def _relative_to_first_corner(
-    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
-) -> np.ndarray:
-    """(C, 3) positions of corners relative to the first corner of their face."""
-    points = vertices[corner_vertex]
-    return points - np.repeat(points[face_start[:-1]], np.diff(face_start), axis=0)
-
-
-def face_blocks(face_start: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
-    """Split the faces into consecutive blocks, to bound memory.
-
-    Returns
-    -------
-    faces, corners : slice
-        The faces of the block and their corners.
-    starts : (faces + 1,) ndarray
-        `face_start` of the block, counted from its first corner.
-    """
-    count = len(face_start) - 1
-    blocks = []
-    for first in range(0, count, BLOCK_ELEMENTS):
-        faces = slice(first, min(first + BLOCK_ELEMENTS, count))
-        starts = face_start[faces.start : faces.stop + 1]
-        blocks.append((faces, slice(int(starts[0]), int(starts[-1])), starts - starts[0]))
-    return blocks
 
 
 def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
@@ -521,76 +417,6 @@ def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     return x, np.cross(normal, x)
 
 
-@dataclass(frozen=True, eq=False)
-class Edges:
-    """The E edges of a surface, and the two halfedges of each of the I interior edges.
-
-    Attributes
-    ----------
-    corner_edge : (C,) int32 ndarray
-        The edge from each corner to the next corner of its face.
-    ends : (E, 2) int32 ndarray
-        Vertex pairs, the smaller first.
-    face_count : (E,) int32 ndarray
-        Number of faces at the edge: 1 at a boundary, 2 inside, more at nonmanifold edges.
-    interior : (I,) int32 ndarray
-        Edges with exactly two faces that are oriented consistently.
-    halfedges : (I, 2) int32 ndarray
-        For each interior edge, the corner in either face where the edge starts. Consistently
-        oriented faces run along the edge in opposite directions. Edges whose faces run in the same
-        direction are not `interior`, because fields do not continue across them.
-    """
-
-    corner_edge: np.ndarray
-    ends: np.ndarray
-    face_count: np.ndarray
-    interior: np.ndarray
-    halfedges: np.ndarray
-
-
-def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
-    """Find the edges of a polygon mesh; the parameters are arrays of `Surface`."""
-    tail = corner_vertex.astype(np.int64)
-    head = tail[next_corners(face_start)]
-    stride = int(corner_vertex.max(initial=0)) + 1
-    key, corner_by_edge = sorted_with_order(
-        np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
-    )
-    is_first = np.ones(len(key), dtype=bool)
-    np.not_equal(key[1:], key[:-1], out=is_first[1:])
-    first = np.flatnonzero(is_first)
-    edge_key, face_count = key[first], np.diff(first, append=len(key))
-    corner_edge = np.empty(len(key), dtype=np.int32)
-    corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
-    interior = np.flatnonzero(face_count == 2)
-    a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
-    opposite = tail[a] == head[b]
-    return Edges(
-        corner_edge=corner_edge,
-        ends=np.stack([edge_key // stride, edge_key % stride], axis=1).astype(np.int32),
-        face_count=face_count.astype(np.int32),
-        interior=interior[opposite].astype(np.int32),
-        halfedges=np.stack([a, b], axis=1)[opposite].astype(np.int32),
-    )
-
-
-def sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return keys from 0 to `limit` - 1 in ascending order, and the stable order that sorts them.
-
-    Keys and indices are sorted as one number if they fit into it, which is faster than `argsort`.
-    """
-    index_bits = len(key).bit_length()
-    if limit.bit_length() + index_bits > 63:
-        order = np.argsort(key, kind="stable")
-        return key[order], order
-    packed = key << index_bits
-    packed |= np.arange(len(key), dtype=np.int64)
-    packed.sort()
-    order = packed & ((1 << index_bits) - 1)
-    packed >>= index_bits
-    return packed, order
-
-
 def count_inconsistent_edges(surface: Surface) -> int:
     """Count the edges between two faces that disagree on which side is out.
 
@@ -607,7 +433,7 @@ def count_inconsistent_edges(surface: Surface) -> int:
 
 
 def orientation_warning(surface: Surface) -> str:
-    """The warning to show for inconsistently oriented faces; empty if there are none."""
+    """Return the warning to show for inconsistently oriented faces; empty if there are none."""
     count = count_inconsistent_edges(surface)
     if not count:
         return ""
@@ -647,85 +473,6 @@ def _check_polygons(
     points = vertices if len(used) == len(vertices) else vertices[used]
     if 0 < np.ptp(points, axis=0).max() < MIN_EXTENT:
         raise RosyError(f"{name}: is smaller than {MIN_EXTENT:g}: scale the mesh")
-
-
-def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Label the connected components of a graph.
-
-    Each node points to a root: the smallest node known to be in its component. Each round links the
-    roots of connected nodes, then flattens the trees by pointer jumping.
-
-    Parameters
-    ----------
-    count : int
-        Number of nodes.
-    pairs : (n, 2) int ndarray
-        Edges of the graph.
-
-    Returns
-    -------
-    (count,) int32 ndarray
-        Component of each node, numbered from 0 without gaps.
-    """
-    root = np.arange(count, dtype=np.int32)
-    a, b = pairs[:, 0], pairs[:, 1]
-    while len(a):
-        low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
-        _lower(root, high, low)
-        while True:
-            flattened = root[root]
-            if np.array_equal(flattened, root):
-                break
-            root = flattened
-        unmerged = root[a] != root[b]
-        a, b = a[unmerged], b[unmerged]
-    is_root = root == np.arange(count, dtype=np.int32)
-    return (np.cumsum(is_root, dtype=np.int32) - 1)[root]
-
-
-def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
-    """Do the same as ``np.minimum.at(values, index, limits)``, for limits below the values.
-
-    Most indices occur once or twice, for which plain assignments are faster.
-    """
-    for _ in range(2):
-        values[index] = limits
-        remaining = limits < values[index]
-        index, limits = index[remaining], limits[remaining]
-    np.minimum.at(values, index, limits)
-
-
-def _fan_normals(
-    vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
-) -> np.ndarray:
-    """(C, 3) unit corner normals: face normals averaged over each fan, weighted by corner angle.
-
-    Where the mean is zero, the face normal; (0, 0, 1) if that is zero, too.
-    """
-    angle = np.empty(len(corner_vertex))
-    for _, corners, starts in face_blocks(face_start):
-        points = _relative_to_first_corner(vertices, corner_vertex[corners], starts)
-        following = next_corners(starts)
-        to_next = normalize(points[following] - points)
-        to_previous = np.empty_like(to_next)
-        to_previous[following] = -to_next
-        angle[corners] = np.arccos(np.clip(dot(to_next, to_previous), -1, 1))
-    face_normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
-    face = corner_faces(face_start)
-    fan_count = int(corner_fan.max()) + 1
-    total = [np.bincount(corner_fan, angle * column[face], fan_count) for column in face_normal.T]
-    normal = normalize(np.stack(total, axis=1))[corner_fan]
-    undefined = ~normal.any(axis=1)
-    normal[undefined] = face_normal[face[undefined]]
-    normal[~normal.any(axis=1)] = (0.0, 0.0, 1.0)
-    return normal
-
-
-def sum_per_fan(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
-    """(K, k) sums of (C, k) real corner values over the corners of each of the K fans."""
-    fan_count = int(corner_fan.max()) + 1
-    columns = [np.bincount(corner_fan, weights=column, minlength=fan_count) for column in values.T]
-    return np.stack(columns, axis=1)
 
 
 def have_same_polygons(first: Surface, second: Surface) -> bool:

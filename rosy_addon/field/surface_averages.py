@@ -102,7 +102,7 @@ class SurfaceAverages:
         return complex_bincount(node, terms * to_node, count)
 
     def face_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(F,) complex128: (n,) node values at the corners of triangles times the areas, added up."""
+        """Return (F,) complex128, the sum of (n,) node values at triangle corners, weighted by triangle areas."""
         area = self.connection.area
         weighted = np.empty((len(area), 3), dtype=np.complex128)
         node, frame_angle = (
@@ -119,7 +119,7 @@ class SurfaceAverages:
         return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
 
     def face_means(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """(F,) complex128: mean of the node values of a degree on each face."""
+        """Return (F,) complex128, mean of the node values of a degree on each face."""
         total, surface = self.face_sums(values, degree), self.surface
         area = np.bincount(surface.triangle_face, 3 * self.connection.area, surface.face_count)
         return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
@@ -143,14 +143,14 @@ class SurfaceAverages:
         area : float
             The square of the length of the average.
         sums : (n,) ndarray
-            From `node_sums`.
+            Result of `node_sums`.
         start : (n,) ndarray, optional
             An estimate of the solution.
 
         Returns
         -------
         (n,) ndarray
-            Of the precision of `sums`.
+            Solution in the precision of `sums`.
         """
         dtype = matrix.data.dtype
         scale = float(np.abs(sums).max())

@@ -74,7 +74,7 @@ def transfer_field(
 
 
 def _face_points(surface: Surface) -> np.ndarray:
-    """(F, 3) a point on each face: the centroid of its largest triangle."""
+    """Return (F, 3) a point on each face: the centroid of its largest triangle."""
     points = np.empty((surface.face_count, 3))
     for faces in row_blocks(surface.face_count):
         limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])

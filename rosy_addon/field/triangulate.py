@@ -68,7 +68,7 @@ def triangulate(
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`triangles` and `triangle_face` of fans; (F,) `apex` is the corner within each face."""
+    """Return `triangles` and `triangle_face` of fans around (F,) `apex`, a corner of each face, from 0."""
     size = np.diff(face_start)
     count = size - 2
     triangle_face = np.repeat(np.arange(len(size), dtype=np.int32), count)
@@ -118,7 +118,7 @@ def _fan_apexes(
 
 
 def _corner_sines(points: np.ndarray) -> np.ndarray:
-    """(F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
+    """Return (F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
     edge = np.roll(points, -1, axis=1) - points
     previous_edge = np.roll(edge, 1, axis=1)
     relative = points - points[:, :1]
@@ -130,7 +130,7 @@ def _corner_sines(points: np.ndarray) -> np.ndarray:
 
 
 def _project_to_plane(points: np.ndarray) -> np.ndarray:
-    """(k, 2) corners of a polygon projected along its normal, in counter-clockwise order."""
+    """Return (k, 2) corners of a polygon projected along its normal, in counter-clockwise order."""
     relative = points - points[0]
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = np.zeros(3)
@@ -256,12 +256,12 @@ class _RemainingCorners:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(...) z components of the cross products of (..., 2) vectors."""
+    """Return (...) z components of the cross products of (..., 2) vectors."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """(k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
+    """Return (k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
     area = _cross(b - a, c - a)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)

@@ -1,13 +1,13 @@
-"""Angles by which a field turns from face to face, from its singularities.
+"""Compute the angles by which a field turns from face to face, from its singularities.
 
-A field on faces turns by some angle from each face to the next, beyond parallel transport. Around a
-vertex, these angles and the angle defect add up to the singularity index. So a field with given indices
-solves linear equations for the angles, one for each interior vertex; and on surfaces with handles, or with
-several borders, one for each loop that no vertex can contract.
+Beyond parallel transport, a field turns by some angle from each face to the next. Around a vertex, these angles
+and the angle defect add up to the singularity index. So the angles of a field with given indices satisfy a
+linear equation for each interior vertex. On surfaces with handles or with several borders, there is also an
+equation for each loop that cannot be contracted to a vertex.
 
-The angles of least squares are those of a potential at the vertices, which solves a Poisson equation on the
-triangles (`face_graph.TriangleGraph`); and those of one harmonic solution for each loop. Around a loop, the field may
-turn by any multiple of 2 pi / N; the multiples of least energy are chosen.
+The angles of least squares are the sum of the gradient of a potential at the vertices, which solves a Poisson
+equation on the triangles (`face_graph.TriangleGraph`), and of a harmonic part for each loop. Around a loop, the
+field may turn by any multiple of 2 pi / N. The multiples of least energy are chosen.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .conjugate_gradient import conjugate_gradient
+from .connectivity import connected_components
 from .face_graph import LABEL, FaceGraph, SpanningForest, spanning_forest, triangle_graph
 from .sparse_multigrid import CSRMatrix, from_edges, hierarchy, w_cycle
-from .surface import Surface, connected_components
+from .surface import Surface
 
-#: Residual norm relative to that of the right-hand side at which the solver stops.
+#: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
 
 #: Attempts to keep the field from turning too fast between two faces, and the angle up to which edges
@@ -60,22 +61,22 @@ def turning_angles(
     ----------
     surface : Surface
     graph : FaceGraph
-        Of its faces.
+        Graph of its faces.
     degree : int
         N.
     required : (n,) ndarray
-        The sums around interior nodes, in radians; those at other nodes do not count.
+        Sums of the angles around interior nodes, in radians; values at other nodes are ignored.
     present : (I,) ndarray or float
         Angles of a field to which these are added.
 
     Returns
     -------
     angle : (I,) float64 ndarray
-        Of least squares. Around loops, the angles are added to those present and to the unfolding, and
-        have a sum that is a multiple of 2 pi / N. Where a field would turn by half of that or more between
-        two faces, they get smaller, if that is possible.
+        Angles of least squares. Around a loop, these angles, the present angles and the unfolding add up to
+        a multiple of 2 pi / N. Where a field would turn by pi / N or more between two faces, the angles are
+        reduced, if that is possible.
     direction : (F,) float64 ndarray
-        Of the field that turns by these angles, in radians in the frames of the faces.
+        Direction of the field that turns by these angles, in radians in the frames of the faces.
     """
     triangles = triangle_graph(surface, graph)
     present_between = triangles.on_triangles(present)
@@ -117,10 +118,10 @@ def _least_angles_near(
     angle: np.ndarray,
     changed: np.ndarray,
 ) -> np.ndarray | None:
-    """(I,) angles of least squares near changed edges, where the other angles stay.
+    """Return (I,) angles of least squares near changed edges, where the other angles stay.
 
-    The result is None if the angles around loops would change, because the neighborhoods of the edges surround
-    a part of the surface.
+    The result is None if the angles around loops would change. That happens if the neighborhoods of the edges
+    surround a part of the surface.
     """
     is_near = np.zeros(graph.node_count, dtype=bool)
     is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
@@ -151,9 +152,9 @@ def _least_angles_near(
 
 
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
-    """(I,) factors by which edges should resist angles more that are added to those present.
+    """Return (I,) factors to multiply the resistance of edges with, where angles are too large.
 
-    They are 1 where the sum is clearly below the limit.
+    `angle` is added to the `present` angles. Factors are 1 where the sum is clearly below the limit.
     """
     room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
@@ -166,7 +167,7 @@ def least_angles(
     loops: list[tuple[np.ndarray, np.ndarray]],
     present: np.ndarray | float,
 ) -> np.ndarray:
-    """(I,) angles of least squares, divided by the conductances; see `turning_angles`."""
+    """Return (I,) angles of least squares, divided by the conductances; see `turning_angles`."""
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
     share = 0.5 / (len(loops) + 1)
@@ -199,7 +200,7 @@ def least_angles(
 def potential_solver(
     graph: FaceGraph, tolerance: float = TOLERANCE
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A function that computes the (n,) potential with (n,) sums around the interior nodes."""
+    """Return a function that computes the (n,) potential with (n,) sums around the interior nodes."""
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):
@@ -220,7 +221,7 @@ def potential_solver(
 
 
 def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
-    """The Laplacian of potentials at interior nodes, which are 0 at the others.
+    """Return the Laplacian of potentials at interior nodes, which are 0 at the others.
 
     On closed components, the first node is tied to 0 as well; the sums of a solvable equation do not change
     that node.
@@ -239,7 +240,7 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
 
 
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:
-    """(m,) coefficients c of least energy for which matrix @ c equals the sums up to multiples of a turn.
+    """Return (m,) coefficients c of least energy for which matrix @ c equals the sums up to multiples of a turn.
 
     The energy is c @ matrix @ c. The nearest multiples are found by rounding, then one by one and in
     pairs as long as that reduces the energy. This ends: the inverse is made positive definite, so that only

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.errors import RosyError, counted
-from ..core.progress import progress, report
 from .blocks import by_rows, row_blocks
 from .corner_fans import corner_angles, corner_rotations
 from .directional_field import (
@@ -20,6 +19,7 @@ from .directional_field import (
     ratios_from_harmonics,
 )
 from .frames import coordinates, dot, normalize, tangent_frame
+from .polygon_arrays import mean_per_face
 from .representation import (
     face_frames,
     from_representation,
@@ -27,7 +27,7 @@ from .representation import (
     to_representation,
 )
 from .rosy_field import RosyField, check_degree
-from .surface import Surface, mean_per_face
+from .surface import Surface
 
 #: Largest angle in degrees between a vector and the plane of its face or vertex. Larger angles mean
 #: that the field belongs to another mesh or another space. Rounding in text files causes about a
@@ -45,9 +45,6 @@ MAX_COMPONENT = 1e30
 
 #: Vectors whose components are all smaller count as zero, because products would underflow.
 MIN_COMPONENT = 1e-30
-
-#: Label of the progress of checking vectors.
-LABEL = "checking the field"
 
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
 #: rounding error of float32, which Blender stores, so such vectors survive a round trip through
@@ -100,8 +97,7 @@ def validated_field(
     domain = _checked_domain(surface, len(vectors), domain, source)
     apply_nonfinite_policy(vectors, source, domain, nonfinite)
     normal = tangent_normals(surface, domain)
-    with progress(0.4, 0.6):
-        vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
+    vectors = project_to_tangent(vectors, normal, TOLERANCE_DEG[domain], source, domain)
     if domain == "vertex":
         rest = surface.in_rest_shape()
         x, y = face_frames(rest)
@@ -112,7 +108,7 @@ def validated_field(
 
 
 def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
-    """The domain of a number of vectors. Raise an error if they are too many or too few for it."""
+    """Return the domain of a number of vectors. Raise an error if they are too many or too few for it."""
     domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
     if count != {"face": faces, "vertex": vertices}.get(domain):
@@ -141,7 +137,7 @@ def validated_directions(
     directions : (n, N, 3) array_like
         In object space, in any order. Where one of them is zero, the field is undefined.
     source, nonfinite, domain
-        As for `validated_field`.
+        The same as in `validated_field`.
 
     Returns
     -------
@@ -151,7 +147,8 @@ def validated_directions(
     Raises
     ------
     RosyError
-        As for `validated_field`.
+        If the number of directions fits neither faces nor vertices, a direction is not finite, or more than
+        `MAX_OUTLIER_FRACTION` of them are off the tangent plane.
     """
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
@@ -167,28 +164,23 @@ def validated_directions(
         x, y = tangent_frame(normal[rows])
         return is_rosy(coordinates(usable_directions[rows], x, y))
 
-    report(0.1, LABEL)
     if all(map(are_rosys, row_blocks(count))):
         vectors = directions[:, 0].copy()
         vectors[~unusable & ~directions.any(axis=2).all(axis=1)] = 0
-        with progress(0.3, 0.6):
-            field = validated_field(surface, vectors, degree, source, nonfinite, domain)
-        with progress(0.6, 1.0, LABEL):
-            return replace(
-                detect_families(surface.in_rest_shape(), field), source_directions=source_directions
-            )
+        field = validated_field(surface, vectors, degree, source, nonfinite, domain)
+        return replace(
+            detect_families(surface.in_rest_shape(), field), source_directions=source_directions
+        )
     apply_nonfinite_policy(directions.reshape(count, -1), source, domain, nonfinite)
     flat_directions, normals = directions.reshape(-1, 3), np.repeat(normal, degree, axis=0)
-    with progress(0.3, 0.5):
-        directions = project_to_tangent(
-            flat_directions, normals, TOLERANCE_DEG[domain], source, domain
-        ).reshape(count, degree, 3)
+    directions = project_to_tangent(
+        flat_directions, normals, TOLERANCE_DEG[domain], source, domain
+    ).reshape(count, degree, 3)
     surface = surface.in_rest_shape()
-    with progress(0.5, 1.0, LABEL):
-        if domain == "face":
-            field = field_from_directions(surface, directions)
-            return replace(field, source_directions=source_directions)
-        return detect_families(surface, _average_directions(surface, directions, normal))
+    if domain == "face":
+        field = field_from_directions(surface, directions)
+        return replace(field, source_directions=source_directions)
+    return detect_families(surface, _average_directions(surface, directions, normal))
 
 
 def _average_directions(surface: Surface, directions: np.ndarray, normal: np.ndarray) -> RosyField:
@@ -199,15 +191,13 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
     w = coordinates(directions, x, y)
-    with progress(0.0, 0.2):
-        first_angle, rho, direction_ratios = by_rows(closest_rosy, w, label=LABEL)
+    first_angle, rho, direction_ratios = by_rows(closest_rosy, w)
     face_x, face_y = face_frames(surface)
     average = _vertex_averages(surface, normal, face_x)
     z = average(rho * np.exp(1j * degree * first_angle), degree)
     member = np.exp(1j * np.angle(z) / degree)
     coefficients = {}
     for j, values in ratio_harmonics(direction_ratios).items():
-        report(0.5, LABEL)
         mean = average(values * np.exp(-1j * j * first_angle), -j)
         coefficients[j] = mean * signed_power(member, j)
     vectors = from_representation(z, face_x, face_y, degree)
@@ -217,7 +207,7 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
 def _vertex_averages(
     surface: Surface, normal: np.ndarray, face_x: np.ndarray
 ) -> Callable[[np.ndarray, int], np.ndarray]:
-    """A function that averages (V,) complex numbers of an order N onto the faces.
+    """Return a function that averages (V,) complex numbers of an order N onto the faces.
 
     They turn by exp(i N t) if a frame turns by -t. (V, 3) `normal` are the vertex normals, (F, 3) `face_x`
     the x axes of the frames of the faces.
@@ -233,7 +223,7 @@ def _vertex_averages(
 
 
 def infer_domain(surface: Surface, count: int) -> str | None:
-    """The domain, "face" or "vertex", with `count` elements; None for neither.
+    """Return the domain, "face" or "vertex", with `count` elements; None for neither.
 
     Faces take precedence.
     """
@@ -243,7 +233,7 @@ def infer_domain(surface: Surface, count: int) -> str | None:
 
 
 def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
-    """The normals of the tangent planes of faces or vertices, in the rest shape.
+    """Return the normals of the tangent planes of faces or vertices, in the rest shape.
 
     Returns
     -------
@@ -260,7 +250,7 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
 def vertex_normals(surface: Surface) -> np.ndarray:
     """Average the face normals around each vertex, weighted by corner angle.
 
-    Sharp edges are ignored. The normals are those of `Surface.vertices`, the deformed shape.
+    Sharp edges are ignored. The normals belong to `Surface.vertices`, the deformed shape.
 
     Returns
     -------
@@ -299,7 +289,7 @@ def project_to_tangent(
     RosyError
         If more than `MAX_OUTLIER_FRACTION` of the vectors exceed the tolerance.
     """
-    tangent, angle, is_zero = by_rows(_project, vectors, normal, label=LABEL)
+    tangent, angle, is_zero = by_rows(_project, vectors, normal)
     outlier = angle > tolerance_deg
     if outlier.sum() > MAX_OUTLIER_FRACTION * np.count_nonzero(~is_zero):
         worst = int(np.argmax(angle))

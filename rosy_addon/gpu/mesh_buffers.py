@@ -11,8 +11,9 @@ from ..compositor.color_values import ValueRange, value_range
 from ..core.errors import RosyError
 from ..field.directional_field import field_harmonics
 from ..field.frames import transform_components
+from ..field.polygon_arrays import box_corners
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface, box_corners
+from ..field.surface import Surface
 from ..field.symmetry import FieldSymmetry
 from ..projection.corner_field import CornerField, field_at_corners
 from ..projection.face_values import SIMILARITY_EPS

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.progress import progress, report
+from ..field.connectivity import connected_components
 from ..field.frames import dot, normalize
-from ..field.surface import connected_components
 from .stroke_set import Strokes
 from .tangent_mesh import TangentMesh, nearest_member, shared_edges, unit
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.progress import progress, report
+from ..field.connectivity import build_edges
 from ..field.creases import find_creases
 from ..field.frames import angle_between, dot, normalize
-from ..field.surface import Surface, build_edges
+from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix

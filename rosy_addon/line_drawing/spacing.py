@@ -16,7 +16,8 @@ import numpy as np
 from ..core.color import REC709_LUMINANCE
 from ..field.curvature import face_magnitude
 from ..field.frames import dot, normalize
-from ..field.surface import Surface, sum_per_fan
+from ..field.polygon_arrays import sum_per_fan
+from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.vector_components import cofactor_matrix

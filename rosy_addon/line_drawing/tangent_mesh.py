@@ -16,10 +16,11 @@ import numpy as np
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
+from ..field.connectivity import build_edges
 from ..field.directional_field import evaluate_harmonics, field_symmetry
 from ..field.frames import dot, normalize, transport
 from ..field.representation import power, signed_power
-from ..field.surface import Surface, build_edges
+from ..field.surface import Surface
 from ..projection.corner_field import cached_corner_field
 from ..projection.field_channel import REPRESENTATION, rotation_order
 from ..projection.gbuffer import MeshInstance

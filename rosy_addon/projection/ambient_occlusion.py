@@ -9,7 +9,7 @@ import numpy as np
 from ..core.errors import RosyError
 from ..core.progress import progress
 from ..field.frames import dot, normalize
-from ..field.surface import sum_per_fan
+from ..field.polygon_arrays import sum_per_fan
 from .gbuffer import MeshInstance
 from .shadow_maps import (
     NORMAL_BIAS_PIXELS,

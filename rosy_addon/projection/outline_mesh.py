@@ -9,8 +9,9 @@ import numpy as np
 
 from ..core.cache import Cache, content_hash
 from ..core.progress import progress, report
+from ..field.connectivity import connected_components
 from ..field.creases import find_creases
-from ..field.surface import Surface, connected_components
+from ..field.surface import Surface
 from .face_values import similarity_scale
 
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.progress import report
-from ..field.surface import Surface, box_corners
+from ..field.polygon_arrays import box_corners
+from ..field.surface import Surface
 from .camera import Camera
 from .gbuffer import GBuffer, MeshInstance
 from .pixel_blocks import part_of

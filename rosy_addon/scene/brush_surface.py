@@ -13,7 +13,8 @@ from mathutils.bvhtree import BVHTree
 
 from ..core.cache import Cache
 from ..field.frames import dot, normalize
-from ..field.surface import Surface, mean_per_face
+from ..field.polygon_arrays import mean_per_face
+from ..field.surface import Surface
 from .meshes import evaluated_mesh, vertex_positions
 from .singularity_points import mesh_of_own_vertices
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.color import REC709_LUMINANCE
 from ..core.errors import RosyError
-from ..field.surface import mean_per_face
+from ..field.polygon_arrays import mean_per_face
 from ..field.validate import apply_nonfinite_policy
 from .field_attributes import describe_type, field_values
 from .meshes import mesh_label, mesh_surface, polygon_arrays

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..compositor.flow import flow_at
 from ..compositor.look import Look
 from ..core.color import from_hex, to_hex
-from ..core.settings import Color, Number, Setting, settings_of
+from ..core.settings import Color, Number, Setting, Vector, settings_of
 
 if TYPE_CHECKING:
     import bpy
@@ -61,6 +61,8 @@ def read_settings(group: Any, cls: type) -> dict[str, Any]:
 
 def _from_rna(value: Any, setting: Setting) -> Any:
     """Convert a property value: a color to hex, a float to 7 digits within the setting's range."""
+    if isinstance(setting, Vector):
+        return tuple(value)
     if isinstance(setting, Color):
         return to_hex(value)
     if not (isinstance(setting, Number) and isinstance(value, float)):

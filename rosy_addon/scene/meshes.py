@@ -11,7 +11,8 @@ import numpy as np
 from ..core.cache import Cache, content_hash
 from ..core.errors import NoFeaturesError, RosyError
 from ..core.progress import progress
-from ..field.surface import Surface, build_surface, smooth_fans
+from ..field.connectivity import smooth_fans
+from ..field.surface import Surface, build_surface
 
 #: Marks of edges: RNA property, label, and description in the user interface.
 EDGE_MARKS = {

@@ -10,9 +10,10 @@ from ..core.errors import RosyError
 from ..core.progress import progress, report
 from ..field.blocks import as_float64
 from ..field.frames import normalize, tangent_frame
+from ..field.polygon_arrays import mean_per_face
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
-from ..field.surface import Surface, mean_per_face
+from ..field.surface import Surface
 from ..field.validate import (
     apply_nonfinite_policy,
     project_to_tangent,

@@ -17,8 +17,9 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from ..field.connectivity import connected_components
 from ..field.frames import dot, transport
-from ..field.surface import Surface, connected_components
+from ..field.surface import Surface
 from ..line_drawing.tangent_mesh import SharedEdges, TangentMesh, shared_edges
 
 #: Corners are at the same point of a UV map if their coordinates differ by at most this much.

@@ -21,8 +21,9 @@ import numpy as np
 from ..core.progress import progress, report
 from ..field.bisection import BisectionTree, bisect
 from ..field.connection import build_connection
+from ..field.connectivity import connected_components
 from ..field.representation import power
-from ..field.surface import build_surface, connected_components
+from ..field.surface import build_surface
 from ..field.surface_averages import SurfaceAverages
 from ..line_drawing.tangent_mesh import TangentMesh, nearest_member, shared_edges
 

@@ -6,27 +6,21 @@ from typing import Any
 
 import bpy
 
+from ..field.generate import options_of
 from .sidebar import use_property_columns
 
 _CONVERT_SETTINGS = ("new_degree", "angle", "smooth", "pair_distance", "magnitude")
 
-_SETTINGS_BY_KIND = {
-    "axis": ("axis",),
-    "curvature": ("reach",),
-    "features": ("edges", "sharp_angle"),
-    "guided": ("guides", "guide", "edges", "sharp_angle", "uv_map", "vectors", "reach"),
-    "prescribed": ("singularities", "add_missing", "vectors", "reach"),
+#: Inputs of the kinds of generated fields. Their options follow below them.
+_INPUTS_BY_KIND = {
+    "features": ("edges",),
+    "guided": ("guides", "guide", "edges", "uv_map", "vectors"),
+    "prescribed": ("singularities", "vectors"),
     "uv": ("uv_map",),
 }
 
-#: The guide that a setting of a guided field belongs to.
-_GUIDE_OF_SETTING = {
-    "guide": "OBJECTS",
-    "edges": "EDGES",
-    "sharp_angle": "EDGES",
-    "uv_map": "UV",
-    "vectors": "ATTRIBUTE",
-}
+#: The kind of guides that an input of a guided field belongs to.
+_GUIDE_OF_INPUT = {"guide": "OBJECTS", "edges": "EDGES", "uv_map": "UV", "vectors": "ATTRIBUTE"}
 
 #: Placeholder texts of empty settings of the generator.
 _PLACEHOLDERS = {"guide": "Selected", "uv_map": "Active", "vectors": "Attribute"}
@@ -60,11 +54,14 @@ def draw_convert_settings(layout: bpy.types.UILayout, settings: Any) -> None:
 
 def draw_generator_settings(layout: bpy.types.UILayout, settings: Any) -> None:
     """Draw the settings of ``rosy.field_generate`` that apply to the chosen kind, guides and edges."""
-    names = _SETTINGS_BY_KIND.get(settings.kind, ())
+    inputs = _INPUTS_BY_KIND.get(settings.kind, ())
     if settings.kind == "guided":
-        names = tuple(
-            name for name in names if _GUIDE_OF_SETTING.get(name, "") in {"", *settings.guides}
+        inputs = tuple(
+            name for name in inputs if _GUIDE_OF_INPUT.get(name, "") in {"", *settings.guides}
         )
-    if "edges" in names and settings.edges != "FEATURES":
-        names = tuple(name for name in names if name != "sharp_angle")
-    draw_settings(layout, settings, "kind", "degree", *names, **_PLACEHOLDERS)
+    options = options_of(settings.kind)
+    if "edges" in inputs and settings.edges == "FEATURES":
+        options = ["sharp_angle", *(name for name in options if name != "sharp_angle")]
+    elif "sharp_angle" in options:
+        options.remove("sharp_angle")
+    draw_settings(layout, settings, "kind", "degree", *inputs, *options, **_PLACEHOLDERS)

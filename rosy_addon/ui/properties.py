@@ -9,7 +9,7 @@ import bpy
 
 from ..compositor.look import Look
 from ..core.color import from_hex
-from ..core.settings import Choice, Color, Number, Setting, Switch, settings_of, title
+from ..core.settings import Choice, Color, Number, Setting, Switch, Vector, settings_of, title
 from ..field.rosy_field import MAX_DEGREE
 from ..gpu.select import RENDER_DEVICES
 from ..line_drawing.style import StrokeStyle
@@ -103,13 +103,19 @@ def _setting_property(setting: Setting) -> Any:
             return bpy.props.BoolProperty(**arguments)
         case Number(low=low, high=high, is_integer=True):
             return bpy.props.IntProperty(min=low, max=high, **arguments)
-        case Number(low=low, high=high, unit=unit):
-            subtype = SUBTYPE_BY_UNIT.get(unit, "NONE")
-            return bpy.props.FloatProperty(min=low, max=high, subtype=subtype, **arguments)
+        case Vector():
+            return bpy.props.FloatVectorProperty(subtype="XYZ", **arguments)
+        case Number(low=low, high=high, unit=unit, soft_high=soft_high):
+            arguments |= {"min": low, "max": high, "subtype": SUBTYPE_BY_UNIT.get(unit, "NONE")}
+            if soft_high is not None:
+                arguments["soft_max"] = soft_high
+            if unit == "size":
+                arguments |= {"precision": 3, "step": 1}
+            return bpy.props.FloatProperty(**arguments)
     raise TypeError(f"setting '{setting.name}' has no property")
 
 
-def _setting_properties(cls: type) -> dict[str, Any]:
+def setting_properties(cls: type) -> dict[str, Any]:
     """Return Blender's properties for a settings class, by name."""
     return {name: _setting_property(setting) for name, setting in settings_of(cls).items()}
 
@@ -117,7 +123,7 @@ def _setting_properties(cls: type) -> dict[str, Any]:
 class RosyLook(bpy.types.PropertyGroup):
     """How fields are drawn; one property for each setting of a `Look`."""
 
-    __annotations__ = _setting_properties(Look)
+    __annotations__ = setting_properties(Look)
 
 
 class RosyFrameState(bpy.types.PropertyGroup):
@@ -176,7 +182,7 @@ class RosyStrokeObject(bpy.types.PropertyGroup):
 class RosyStrokes(bpy.types.PropertyGroup):
     """How strokes are drawn: the settings of a `StrokeStyle`, the pen and the output."""
 
-    __annotations__ = _setting_properties(StrokeStyle) | {
+    __annotations__ = setting_properties(StrokeStyle) | {
         "kind": bpy.props.EnumProperty(
             name="Make",
             description="Type of object or file made from the strokes",

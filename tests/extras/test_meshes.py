@@ -9,7 +9,8 @@ import pyvista as pv
 from extras.rotations import rotation
 
 from rosy_addon.external.simulation_files import read_simulation
-from rosy_addon.field.surface import Surface, face_area_vectors
+from rosy_addon.field.polygon_arrays import face_area_vectors
+from rosy_addon.field.surface import Surface
 
 
 def triangles_of(mesh):

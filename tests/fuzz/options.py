@@ -10,6 +10,7 @@ from numpy.random import Generator
 from rosy_addon.cli.parser import _build_parser
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.settings import settings_of
+from rosy_addon.field.generate import GeneratorSettings
 from rosy_addon.preset_files.store import preset_keys
 
 from .damage import WORDS
@@ -78,8 +79,10 @@ def _option(rng: Generator, action: argparse.Action, wild: float) -> list[str]:
         value = WORDS[rng.integers(len(WORDS))].replace("\0", "")
     elif action.choices:
         value = str(list(action.choices)[rng.integers(len(action.choices))])
-    else:
+    elif action.dest in _VALUES:
         value = _VALUES[action.dest](rng)
+    else:
+        value = str(setting_value(rng, settings_of(GeneratorSettings)[action.dest]))
     return [name, value] if rng.random() < 0.5 else [f"{name}={value}"]
 
 
@@ -145,7 +148,6 @@ _VALUES: dict[str, Callable[[Generator], str]] = {
     "to_degree": _degree,
     "axis": _numbers(3, 1.0),
     "reach": _number(0, 10, (0.0, 0.05, 0.3)),
-    "sharp_angle": _number(0, 180, (30.0, 80.0)),
     "view": _numbers(2, 60.0),
     "light_direction": _numbers(3, 1.0),
     "size": _size,

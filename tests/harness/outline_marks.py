@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from rosy_addon.field.surface import build_edges
+from rosy_addon.field.connectivity import build_edges
 from rosy_addon.projection.rasterizer import rasterize
 
 #: Coverage from which on a pixel belongs to a mark, or a silhouette is covered.

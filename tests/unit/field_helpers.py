@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from conftest import ROOT
 from scipy import sparse
+from scipy.spatial.transform import Rotation
+from shapes import from_triangles
 
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.representation import face_frames, to_representation
 from rosy_addon.field.surface import build_surface
-
-#: The folder of meshes of other programs, beside the repository.
-MESHES = ROOT.parent / "shared" / "data" / "meshes"
 
 
 def as_scipy(matrix):
@@ -32,6 +30,19 @@ def angle_differences(surface, first, second, degree):
     x, y = face_frames(surface)
     z, w = (to_representation(vectors, x, y, degree) for vectors in (first, second))
     return np.abs(np.angle(z * w.conj())) / degree
+
+
+def copies_of(surface, scale=3.0):
+    """The same mesh of triangles: vertices and corners in another order, and moved.
+
+    Yields each mesh with the (3, 3) rotation by which vectors are turned.
+    """
+    triangles = surface.corner_vertex.reshape(-1, 3)
+    order = np.random.default_rng(5).permutation(len(surface.vertices))
+    yield from_triangles(surface.vertices[order], np.argsort(order)[triangles]), np.eye(3)
+    yield from_triangles(surface.vertices, np.roll(triangles, 1, axis=1)), np.eye(3)
+    rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
+    yield from_triangles(scale * surface.vertices @ rotation.T + (1, 2, 3), triangles), rotation
 
 
 def read_field(*arguments, **settings):

@@ -44,9 +44,7 @@ def write() -> None:
     save(sheet([smooth]), IMAGES / "fields-smoothest.png")
     save(sheet(_form(monkey)), IMAGES / "fields-form.png")
     curved = [
-        _panel(
-            monkey, GeneratorSettings("curvature", smoothing_length=reach), 4, (-26, 8), text, WIDE
-        )
+        _panel(monkey, GeneratorSettings("curvature", reach=reach), 4, (-26, 8), text, WIDE)
         for reach, text in ((0.0, "Curvature of each face"), (0.05, "Curvature, reach 0.05"))
     ]
     save(sheet([curved]), IMAGES / "fields-curvature.png")

@@ -37,7 +37,7 @@ def write() -> None:
     instance = MeshInstance(
         surface,
         np.eye(4),
-        generate(surface, GeneratorSettings("curvature", smoothing_length=0.1), 4),
+        generate(surface, GeneratorSettings("curvature", reach=0.1), 4),
     )
     camera = orbit_camera(surface.vertices, -26.0, 8.0, SIDE, SIDE, margin=0.03)
     panels = []

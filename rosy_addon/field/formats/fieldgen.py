@@ -11,15 +11,13 @@ https://github.com/GeometryCollective/fieldgen.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress, report
-from ..blocks import row_blocks
 from ..corner_fans import corner_angles, corner_rotations
 from ..frames import tangent_frame
 from ..representation import (
@@ -35,7 +33,7 @@ from ..surface import Surface
 from ..validate import vertex_normals
 from .obj import read_obj
 from .polygons import RawField
-from .text_rows import LABEL, ROWS_PER_BLOCK, format_blocks, format_rows, read_rows
+from .text_rows import format_lines, format_rows, read_rows
 
 
 def read_fieldgen(path: Path) -> RawField:
@@ -53,14 +51,10 @@ def read_fieldgen(path: Path) -> RawField:
         line for each vertex.
     """
     data = read_bytes(path, reject_binary=True)
-    with progress(0.0, 0.5):
-        polygons = read_obj(path)
-    with progress(0.5, 0.7):
-        rows = read_rows(path, comment=None, data=data)
+    polygons = read_obj(path)
+    rows = read_rows(path, comment=None, data=data)
     degree, is_vertex_row = None, np.zeros(len(rows), dtype=bool)
     for row, words in enumerate(rows.words):
-        if row % ROWS_PER_BLOCK == 0:
-            report(0.7 + 0.1 * row / len(rows), LABEL)
         if not words[0].startswith(b"#"):
             continue
         words = words[words[0] == b"#" :]
@@ -74,8 +68,7 @@ def read_fieldgen(path: Path) -> RawField:
             is_vertex_row[row] = True
     if degree is None or not is_vertex_row.any():
         raise RosyError(f"{path}: has no field: there are no lines '# field i x y z'")
-    with progress(0.8, 1.0):
-        numbers = rows.select(is_vertex_row, slice(-4, None)).floats("part of a vector")
+    numbers = rows.select(is_vertex_row, slice(-4, None)).floats("part of a vector")
     numbers = numbers.reshape(-1, 4)
     vertex = numbers[:, 0].astype(np.int64) - 1
     count = len(polygons.vertices)
@@ -89,13 +82,12 @@ def read_fieldgen(path: Path) -> RawField:
     return RawField(values, degree, domain="vertex", polygons=polygons)
 
 
-def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
-    """Format a mesh and a field as a fieldgen file, in blocks of lines.
+def fieldgen_text(surface: Surface, field: RosyField) -> str:
+    """Format a mesh and a field as a fieldgen file.
 
     The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
     It is zero where the mean is zero.
     """
-    report(0.0, "averaging the field at the vertices")
     count = len(surface.vertices)
     angle = corner_angles(surface)
     face, vertex = surface.corner_face, surface.corner_vertex
@@ -108,25 +100,20 @@ def fieldgen_text(surface: Surface, field: RosyField) -> Iterator[str]:
     )
     mean = complex_bincount(vertex, z[face] * rotation * angle, count)
     member = from_representation(unit_complex(mean), *tangent_frame(normal), field.degree)
-    return chain(
-        format_blocks(surface.vertices, "v "),
-        format_blocks(normal, "vn "),
-        (_face_lines(surface, block) for block in row_blocks(surface.face_count, ROWS_PER_BLOCK)),
-        [f"# degree {field.degree}\n"],
-        (_field_lines(member, block) for block in row_blocks(count, ROWS_PER_BLOCK)),
+    face_lines = (" ".join(f"{v}//{v}" for v in corners) for corners in _faces(surface))
+    field_lines = enumerate(format_rows(member), 1)
+    return "".join(
+        [
+            format_lines(surface.vertices, "v "),
+            format_lines(normal, "vn "),
+            *(f"f {line}\n" for line in face_lines),
+            f"# degree {field.degree}\n",
+            *(f"# field {number} {line}\n" for number, line in field_lines),
+        ]
     )
 
 
-def _face_lines(surface: Surface, faces: slice) -> str:
-    """Lines `f v//v ...` of a block of faces."""
-    starts = surface.face_start[faces.start : faces.stop + 1]
-    vertices = surface.corner_vertex[starts[0] : starts[-1]] + 1
-    corners = [f"{v}//{v}" for v in vertices.tolist()]
-    offsets = (starts - starts[0]).tolist()
-    return "".join([f"f {' '.join(corners[a:b])}\n" for a, b in pairwise(offsets)])
-
-
-def _field_lines(member: np.ndarray, rows: slice) -> str:
-    """Lines `# field i x y z` of a block of vertices."""
-    lines = enumerate(format_rows(member[rows]), rows.start + 1)
-    return "".join([f"# field {number} {line}\n" for number, line in lines])
+def _faces(surface: Surface) -> Iterator[list[int]]:
+    """Yield the vertices of each face, counted from 1."""
+    vertices, starts = (surface.corner_vertex + 1).tolist(), surface.face_start.tolist()
+    return (vertices[start:stop] for start, stop in pairwise(starts))

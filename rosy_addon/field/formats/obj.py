@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import counted
-from ...core.progress import progress, report
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, ROWS_PER_BLOCK, TextRows, read_rows
+from .text_rows import ROWS_PER_BLOCK, TextRows, read_rows
 
 
 def read_obj(path: Path) -> Polygons:
@@ -28,45 +27,41 @@ def read_obj(path: Path) -> Polygons:
     RosyError
         If the file cannot be read, a line is malformed, or an index is out of range.
     """
-    with progress(0.0, 0.4):
-        rows = read_rows(path)
+    rows = read_rows(path)
     is_vertex, is_face = _is_kind(rows, b"v"), _is_kind(rows, b"f")
-    with progress(0.5, 0.6):
-        vertices = rows.select(is_vertex, slice(1, 4)).points("vertex")
+    vertices = rows.select(is_vertex, slice(1, 4)).points("vertex")
     corners = rows.select(is_face, slice(1, None))
     for row, words in enumerate(corners.words):
         if len(words) < 3:
             raise corners.error(
                 row, f"a face has {counted(len(words), 'corner')}, expected 3 or more"
             )
-    with progress(0.6, 0.9):
-        positions = _position_indices(corners)
-    with progress(0.9, 1.0):
-        corner_vertex = _resolved(
-            positions,
-            "vertex of a face",
-            np.cumsum(is_vertex)[is_face],
-            len(vertices),
-            "a face refers to vertex {}, but the vertices",
-        )
+    positions = _position_indices(corners)
+    corner_vertex = _resolved(
+        positions,
+        "vertex of a face",
+        np.cumsum(is_vertex)[is_face],
+        len(vertices),
+        "a face refers to vertex {}, but the vertices",
+    )
     return Polygons(vertices, corner_vertex, offsets_from_sizes(list(map(len, corners.words))))
 
 
 def _resolved(
     rows: TextRows, label: str, defined_above: np.ndarray, count: int, message: str
 ) -> np.ndarray:
-    """Return the indices in rows, counted from 0, of things that the file numbers from 1.
+    """Return the indices in rows, counted from 0, of elements that the file numbers from 1.
 
     Parameters
     ----------
     rows : TextRows
-        Of indices. Negative ones are relative to the number of things above the line.
+        Rows of indices. Negative indices are relative to the number of elements above the line.
     label : str
         What the indices are, for messages.
     defined_above : (rows,) int ndarray
-        The number of things above each line.
+        The number of elements above each line.
     count : int
-        Of all things.
+        The number of all elements.
     message : str
         Begins the message about an index out of range, with a place for it.
     """
@@ -83,7 +78,7 @@ def _resolved(
 
 
 def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
-    """(rows,) bool: whether the first word of each row is that of a kind."""
+    """Return (rows,) bool, whether the first word of each row is the given one."""
     return np.array([words[0] == kind for words in rows.words], dtype=bool)
 
 
@@ -91,7 +86,6 @@ def _position_indices(corners: TextRows) -> TextRows:
     """Reduce corners v, v/vt, v//vn and v/vt/vn to v, the index of the position."""
     rows: list[Sequence[bytes]] = []
     for start in range(0, len(corners), ROWS_PER_BLOCK):
-        report(start / len(corners), LABEL)
         words = corners.words[start : start + ROWS_PER_BLOCK]
         joined = b"\n".join(b" ".join(row) for row in words)
         if b"/" in joined:

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from ...core.errors import RosyError, counted
-from ...core.progress import progress
 from .polygons import Polygons, offsets_from_sizes
 from .text_rows import TextRows, abbreviate, read_rows
 
@@ -28,8 +27,7 @@ def read_off(path: Path) -> Polygons:
     RosyError
         If the file cannot be read, is binary, malformed or truncated, or an index is out of range.
     """
-    with progress(0.0, 0.5):
-        rows = _after_keyword(read_rows(path))
+    rows = _after_keyword(read_rows(path))
     if not len(rows):
         raise RosyError(f"{path}: ends before the numbers of vertices and faces")
     counts = rows[:1].ints("number of vertices, faces or edges")
@@ -43,15 +41,13 @@ def read_off(path: Path) -> Polygons:
             f"{counted(face_count, 'face')}, but ends after "
             f"{counted(len(body), 'row')}"
         )
-    with progress(0.5, 0.7):
-        vertices = body[:vertex_count].points("vertex")
+    vertices = body[:vertex_count].points("vertex")
     face_rows = body[vertex_count : vertex_count + face_count]
-    with progress(0.7, 1.0):
-        return Polygons(vertices, *_faces(face_rows, vertex_count))
+    return Polygons(vertices, *_faces(face_rows, vertex_count))
 
 
 def _after_keyword(rows: TextRows) -> TextRows:
-    """The rows from the counts on. The keyword is optional; the counts may share its line."""
+    """Return the rows from the counts on. The keyword is optional; the counts may share its line."""
     if not len(rows) or rows.words[0][0].isdigit():
         return rows
     keyword, *rest = rows.words[0]
@@ -63,7 +59,7 @@ def _after_keyword(rows: TextRows) -> TextRows:
 
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """`corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
+    """Return `corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
     first_words = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers)
     sizes = first_words.ints("number of corners of a face")
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):
@@ -79,8 +75,7 @@ def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
         [words[1 : size + 1] for size, words in zip(sizes.tolist(), rows.words, strict=True)],
         rows.line_numbers,
     )
-    with progress(0.5, 1.0):
-        corner_vertex = corners.ints("vertex of a face")
+    corner_vertex = corners.ints("vertex of a face")
     out_of_range = (corner_vertex < 0) | (corner_vertex >= vertex_count)
     if out_of_range.any():
         corner = int(np.argmax(out_of_range))

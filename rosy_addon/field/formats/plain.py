@@ -7,19 +7,16 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress
-from ..blocks import as_float64, row_blocks
+from ..blocks import as_float64
 from ..rosy_field import MAX_DEGREE
 from .polygons import RawField
-from .text_rows import ROWS_PER_BLOCK, format_blocks, read_rows
+from .text_rows import read_rows
 
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
@@ -42,8 +39,7 @@ def read_text(path: Path) -> RawField:
         If the file cannot be read, holds no numbers, or its rows differ in length.
     """
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
-    with progress(0.0, 0.4):
-        rows = read_rows(path, data=data)
+    rows = read_rows(path, data=data)
     if not len(rows):
         raise RosyError(f"{path}: contains no numbers")
     columns = len(rows.words[0])
@@ -53,8 +49,7 @@ def read_text(path: Path) -> RawField:
             raise rows.error(
                 row, f"the row has {counted(len(words), 'number')}, the rows above have {columns}"
             )
-    with progress(0.4, 1.0):
-        values = rows.floats("part of a vector")
+    values = rows.floats("part of a vector")
     return _raw_field(values.reshape(-1, columns))
 
 
@@ -96,18 +91,11 @@ def read_npy(path: Path) -> RawField:
     return _raw_field(values)
 
 
-def directions_text(directions: np.ndarray) -> Iterator[str]:
-    """Format (F, N, 3) directions as text, 3 N numbers per row, in blocks of lines."""
-    return format_blocks(directions.reshape(len(directions), -1))
-
-
-def npy_blocks(directions: np.ndarray) -> Iterator[bytes]:
-    """The contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N), in blocks."""
-    rows = np.ascontiguousarray(directions.reshape(len(directions), -1))
-    header = io.BytesIO()
-    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(rows))
-    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
-    return chain([header.getvalue()], (rows[block].tobytes() for block in blocks))
+def npy_bytes(directions: np.ndarray) -> bytes:
+    """Return the contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N)."""
+    file = io.BytesIO()
+    np.save(file, directions.reshape(len(directions), -1))
+    return file.getvalue()
 
 
 def _check_columns(source: str, columns: int) -> None:

@@ -14,10 +14,9 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress, report
 from ..blocks import as_float64
 from .polygons import Polygons, offsets_from_sizes
-from .text_rows import LABEL, TextRows, abbreviate, read_rows
+from .text_rows import TextRows, abbreviate, read_rows
 
 _DTYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -88,7 +87,7 @@ def read_ply(path: Path) -> Polygons:
 
 
 def _is_index(values: np.ndarray, count: int) -> np.ndarray:
-    """(n,) bool: whether numbers are whole ones from 0 to `count` - 1."""
+    """Return (n,) bool, whether numbers are whole ones from 0 to `count` - 1."""
     in_range = (values >= 0) & (values < count)
     return in_range & (np.where(in_range, values, 0) % 1 == 0)
 
@@ -119,17 +118,16 @@ def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
 
 
 def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
-    """All values of a file by element and property, and the elements that its header declares."""
+    """Return all values of a file by element and property, and the elements that its header declares."""
     data = read_bytes(path)
     byte_order, elements, offset = _header(path, data)
     if byte_order == "":
         return _text_elements(path, data, elements), elements
-    report(0.1, LABEL)
     return _binary_elements(path, data, offset, byte_order, elements), elements
 
 
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
-    """The byte order ("" for text), the elements, and the offset of the data in bytes."""
+    """Return the byte order ("" for text), the elements, and the offset of the data in bytes."""
     if data[:3] != b"ply":
         raise RosyError(f"{path}:1: expected 'ply', found {abbreviate(data[:3])}")
     end = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE).search(data)
@@ -178,10 +176,9 @@ def _check_unique(
 
 
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
-    """The values of all elements of a text file."""
-    # The header is included, so that line numbers are those of the file.
-    with progress(0.0, 0.5):
-        rows = read_rows(path, comment=None, data=data)
+    """Return the values of all elements of a text file."""
+    # The header is included, so that rows have the line numbers of the file.
+    rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
     columns = {}
     for element in elements:
@@ -189,13 +186,12 @@ def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[st
         if len(element_rows) < element.count:
             raise _truncated(path, element, len(element_rows))
         first += element.count
-        with progress(0.5, 1.0):
-            columns[element.name] = _text_columns(element_rows, element)
+        columns[element.name] = _text_columns(element_rows, element)
     return columns
 
 
 def _text_columns(rows: TextRows, element: _Element) -> _Columns:
-    """The values of one element, given its rows."""
+    """Return the values of one element, given its rows."""
     starts = offsets_from_sizes([len(words) for words in rows.words])
     values = rows.floats(f"value of a {element.name}")
     position = starts[:-1]
@@ -235,7 +231,7 @@ def _check_row_lengths(
 def _binary_elements(
     path: Path, data: bytes, offset: int, byte_order: str, elements: list[_Element]
 ) -> dict[str, _Columns]:
-    """The values of all elements of a binary file, whose data begin at `offset`.
+    """Return the values of all elements of a binary file, whose data begin at `offset`.
 
     If all rows of an element have the same list lengths, it is read as one structured array.
     """
@@ -278,7 +274,7 @@ def _binary_elements(
 def _read_rows(
     path: Path, data: bytes, offset: int, byte_order: str, element: _Element, row_count: int
 ) -> tuple[_Columns, int]:
-    """The values of the first rows of an element, and the offset of what follows them.
+    """Return the values of the first rows of an element, and the offset of what follows them.
 
     Each row begins where the previous one ends, so the rows are read in a loop.
     """
@@ -312,14 +308,14 @@ def _read_rows(
 
 
 def _list_length(path: Path, element: _Element, row: int, length) -> int:
-    """The count of a list as an int; raises an error if it is negative or not a whole number."""
+    """Return the count of a list as an int; raises an error if it is negative or not a whole number."""
     if not (0 <= length < np.inf and length == int(length)):
         raise RosyError(f"{path}: {element.name} {row} has a list of length {length}")
     return int(length)
 
 
 def _truncated(path: Path, element: _Element, row_count: int) -> RosyError:
-    """The error for a file that ends after `row_count` rows of an element."""
+    """Return the error for a file that ends after `row_count` rows of an element."""
     return RosyError(
         f"{path}: declares {counted(element.count, 'row')} of element '{element.name}', but ends after {row_count}"
     )

@@ -68,7 +68,7 @@ class RawField:
 
 
 def offsets_from_sizes(sizes: np.ndarray | list[int]) -> np.ndarray:
-    """(n + 1,) int64 offsets of n consecutive ranges of these sizes; the last is the total size.
+    """Return (n + 1,) int64 offsets of n consecutive ranges of these sizes; the last is the total size.
 
     Examples
     --------

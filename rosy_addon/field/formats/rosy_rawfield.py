@@ -5,17 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from ...core.errors import RosyError, counted
-from ...core.progress import progress
 from ..rosy_field import RosyField, check_degree
 from .polygons import RawField
-from .text_rows import TextRows, abbreviate, format_blocks, read_rows
+from .text_rows import TextRows, abbreviate, format_lines, read_rows
 
 
 def read_rosy(path: Path) -> RawField:
@@ -28,11 +25,9 @@ def read_rosy(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    with progress(0.0, 0.4):
-        rows = read_rows(path, comment=None)
+    rows = read_rows(path, comment=None)
     count, degree = _read_header(rows, "count", "degree")
-    with progress(0.4, 1.0):
-        table = _vector_table(rows, 3, count)
+    table = _vector_table(rows, 3, count)
     return RawField(table.reshape(-1, 1, 3), _validated_degree(rows, 1, degree), count)
 
 
@@ -44,28 +39,26 @@ def read_rawfield(path: Path) -> RawField:
     RosyError
         If the file cannot be read, or is malformed.
     """
-    with progress(0.0, 0.4):
-        rows = read_rows(path, comment=None)
+    rows = read_rows(path, comment=None)
     degree, count = _read_header(rows, "degree", "count")
     degree = _validated_degree(rows, 0, degree)
-    with progress(0.4, 1.0):
-        table = _vector_table(rows, 3 * degree, count)
+    table = _vector_table(rows, 3 * degree, count)
     return RawField(table.reshape(-1, degree, 3), degree, count)
 
 
-def rosy_text(field: RosyField) -> Iterator[str]:
-    """Format the member vectors of a field as a `.rosy` file, in blocks of lines."""
-    return chain([f"{len(field.vectors)}\n{field.degree}\n"], format_blocks(field.vectors))
+def rosy_text(field: RosyField) -> str:
+    """Format the member vectors of a field as a `.rosy` file."""
+    return f"{len(field.vectors)}\n{field.degree}\n{format_lines(field.vectors)}"
 
 
-def rawfield_text(directions: np.ndarray) -> Iterator[str]:
-    """Format (F, N, 3) directions as a `.rawfield` file, in blocks of lines."""
+def rawfield_text(directions: np.ndarray) -> str:
+    """Format (F, N, 3) directions as a `.rawfield` file."""
     count, degree = directions.shape[:2]
-    return chain([f"{degree} {count}\n"], format_blocks(directions.reshape(count, -1)))
+    return f"{degree} {count}\n{format_lines(directions.reshape(count, -1))}"
 
 
 def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
-    """The first two integers of the file, on one line or on two; `names` are for messages."""
+    """Return the first two integers of the file, on one line or on two; `names` are for messages."""
     words = [word for line in rows.words[:2] for word in line][:2]
     values = []
     for index, name in enumerate(names):
@@ -81,7 +74,7 @@ def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
 
 
 def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
-    """`check_degree`, with the file and the line of the word in its error."""
+    """Return `check_degree(degree)`, with the file and the line of the word in its error."""
     try:
         return check_degree(degree)
     except RosyError as reason:
@@ -89,7 +82,7 @@ def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
 
 
 def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
-    """(n, columns) float64 numbers after the header; line breaks have no meaning.
+    """Return (n, columns) float64 numbers after the header; line breaks have no meaning.
 
     `count` is the number of rows that the header declares, for the message.
     """

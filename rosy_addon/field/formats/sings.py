@@ -5,13 +5,11 @@ A file holds the degree, a count, and rows with an element and its singularity i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from .text_rows import format_blocks, read_rows
+from .text_rows import format_lines, read_rows
 
 #: File name extensions of the format.
 SINGULARITY_SUFFIXES = (".sings", ".sing")
@@ -45,7 +43,7 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     return int(numbers[0]), numbers[2::2], numbers[3::2]
 
 
-def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> Iterator[str]:
+def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> str:
     """Format singularities as a `.sings` file; the parameters are the results of `read_sings`."""
     rows = np.stack([element, index], axis=1)
-    return chain([f"{degree} {len(element)}\n"], format_blocks(rows))
+    return f"{degree} {len(element)}\n{format_lines(rows)}"

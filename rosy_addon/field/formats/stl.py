@@ -8,10 +8,9 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import progress, report
 from ..blocks import as_float64
 from .polygons import Polygons
-from .text_rows import LABEL, read_rows
+from .text_rows import read_rows
 
 #: Size of the header of a binary file, with the number of triangles in its last 4 bytes.
 _HEADER_BYTES = 84
@@ -35,12 +34,10 @@ def read_stl(path: Path) -> Polygons:
         and data.lstrip()[:5].lower() == b"solid"
         and b"\0" not in data[:_HEADER_BYTES]
     ):
-        with progress(0.0, 0.8):
-            points = _text_points(path, data)
+        points = _text_points(path, data)
     else:
         points = _binary_points(path, data, count)
     points = as_float64(points)
-    report(0.8, LABEL)
     vertices, corner_vertex = weld(points)
     return Polygons(vertices, corner_vertex, np.arange(0, len(points) + 1, 3))
 
@@ -74,7 +71,7 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
-    """(3 T, 3) float32 corners of the triangles of a binary file."""
+    """Return (3 T, 3) float32 corners of the triangles of a binary file."""
     available = (len(data) - _HEADER_BYTES) // _TRIANGLE_DTYPE.itemsize
     if len(data) < _HEADER_BYTES:
         raise RosyError(f"{path}: is not an .stl file: it is shorter than the header")
@@ -86,9 +83,8 @@ def _binary_points(path: Path, data: bytes, count: int) -> np.ndarray:
 
 
 def _text_points(path: Path, data: bytes) -> np.ndarray:
-    """(3 T, 3) float64 corners of the triangles of a text file."""
-    with progress(0.0, 0.6):
-        rows = read_rows(path, comment=None, data=data)
+    """Return (3 T, 3) float64 corners of the triangles of a text file."""
+    rows = read_rows(path, comment=None, data=data)
     is_corner = np.array([words[0].lower() == b"vertex" for words in rows.words], dtype=bool)
     corners = rows.select(is_corner, slice(1, None))
     loops = sum(words[0].lower() == b"endloop" for words in rows.words)
@@ -98,5 +94,4 @@ def _text_points(path: Path, data: bytes) -> np.ndarray:
             f"the file has {counted(len(corners), 'corner')} in "
             f"{counted(loops, 'complete triangle')}; is it truncated?",
         )
-    with progress(0.6, 1.0):
-        return corners.points("corner")
+    return corners.points("corner")

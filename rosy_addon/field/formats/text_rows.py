@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, chain, islice
 from pathlib import Path
@@ -11,14 +11,9 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ...core.progress import report
-from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
-
-#: Label of the progress of reading a file.
-LABEL = "reading the file"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +40,7 @@ class TextRows:
         return TextRows(self.path, self.words[rows], self.line_numbers[rows])
 
     def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
-        """Some of the rows, given as (rows,) bool, cut to some of their words."""
+        """Return some of the rows, given as (rows,) bool, cut to some of their words."""
         rows = np.flatnonzero(is_selected).tolist()
         return TextRows(
             self.path,
@@ -54,7 +49,7 @@ class TextRows:
         )
 
     def error(self, row: int, message: str) -> RosyError:
-        """The error to raise for a row: names the file and, if the row exists, its line."""
+        """Return the error to raise for a row: names the file and, if the row exists, its line."""
         if row < len(self.line_numbers):
             return RosyError(f"{self.path}:{self.line_numbers[row]}: {message}")
         return RosyError(f"{self.path}: {message}")
@@ -84,7 +79,6 @@ class TextRows:
                 raise self.error(
                     row, f"{label} has {counted(len(words), 'coordinate')}, expected 3"
                 )
-        report(0.0, LABEL)
         coordinates = TextRows(self.path, [words[:3] for words in self.words], self.line_numbers)
         points = coordinates.floats(label).reshape(-1, 3)
         finite = np.isfinite(points).all(axis=1)
@@ -94,7 +88,7 @@ class TextRows:
         return points
 
     def row_of_word(self, word: int) -> int:
-        """The row that holds a word, which is counted from 0 over all rows."""
+        """Return the row that holds a word, which is counted from 0 over all rows."""
         ends = list(accumulate(map(len, self.words)))
         return int(np.searchsorted(ends, word, side="right"))
 
@@ -104,7 +98,6 @@ class TextRows:
         values = np.empty(count, dtype=dtype)
         words = chain.from_iterable(self.words)
         for start in range(0, count, WORDS_PER_BLOCK):
-            report(start / count, LABEL)
             stop = min(start + WORDS_PER_BLOCK, count)
             try:
                 values[start:stop] = list(map(convert, islice(words, stop - start)))
@@ -113,7 +106,7 @@ class TextRows:
         return values
 
     def _parse_error(self, convert: Callable, expected: str, first_row: int) -> RosyError:
-        """The error for the first word that cannot be converted, which is not above `first_row`."""
+        """Return the error for the first word that cannot be converted, which is not above `first_row`."""
         for row, words in enumerate(self.words[first_row:], first_row):
             for word in words:
                 try:
@@ -141,7 +134,6 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
         If the file cannot be read or is not text.
     """
     data = read_bytes(path, reject_binary=True) if data is None else data
-    report(0.0, LABEL)
     # Also accept a lone CR, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
@@ -150,15 +142,11 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
-    for start in range(0, len(lines), ROWS_PER_BLOCK):
-        report(start / len(lines), LABEL)
-        block = lines[start : start + ROWS_PER_BLOCK]
-        if has_comments:
-            block = [line.partition(comment)[0] for line in block]
-        for number, line in enumerate(block, start + 1):
-            if line_words := tuple(line.split()):
-                words.append(line_words)
-                line_numbers.append(number)
+    for number, line in enumerate(lines, 1):
+        text = line.partition(comment)[0] if has_comments else line
+        if line_words := tuple(text.split()):
+            words.append(line_words)
+            line_numbers.append(number)
     return TextRows(path, words, line_numbers)
 
 
@@ -173,7 +161,6 @@ def format_rows(rows: np.ndarray) -> list[str]:
     return [" ".join(map(repr, row)) for row in rows.tolist()]
 
 
-def format_blocks(rows: np.ndarray, prefix: str = "") -> Iterator[str]:
-    """Format (n, k) numbers as lines of text with a prefix, in blocks of up to `ROWS_PER_BLOCK`."""
-    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
-    return ("".join([f"{prefix}{line}\n" for line in format_rows(rows[block])]) for block in blocks)
+def format_lines(rows: np.ndarray, prefix: str = "") -> str:
+    """Format (n, k) numbers as lines of text with a prefix; see `format_rows`."""
+    return "".join([f"{prefix}{line}\n" for line in format_rows(rows)])

@@ -19,7 +19,6 @@ from rosy_addon.core.progress import current_report, listening, progress, report
 from rosy_addon.field.convert import Conversion, convert
 from rosy_addon.field.generate import generate
 from rosy_addon.field.prescribed import prescribed_field
-from rosy_addon.field.singularities import find_singularities
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.preset_files.store import load_preset
@@ -145,7 +144,6 @@ LONG = {
     "features": (generate, (SQUARE, "features", 4), 0.7),
     "prescribed": (prescribed_field, (SURFACE, 4, np.array([5, 200]), np.array([1, -1])), 0.8),
     "convert": (convert, (SURFACE, FIELD, replace(CONVERSION, magnitude="curvature")), 0.9),
-    "singularities": (find_singularities, (SURFACE, FIELD), 0.9),
     "project": (project, ([INSTANCE] * 2, CAMERA), 0.9),
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
     "picture": (picture, (Look(),), 0.9),

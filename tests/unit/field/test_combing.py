@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import mainly
 from scipy.spatial import cKDTree
 from shapes import from_quads, icosphere, plane, torus
 
@@ -57,11 +56,7 @@ def on_torus(u: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("degree", "is_exact", "limit"),
-    mainly(
-        [(1, False, 3.0), (4, True, 0.1)],
-        [(n, *case) for n in (1, 2, 4, 6) for case in ((False, 3.0), (True, 0.1))],
-    ),
+    ("degree", "is_exact", "limit"), [(1, False, 3.0), (4, True, 0.1), (6, False, 3.0)]
 )
 def test_field_runs_along_strokes(degree, is_exact, limit):
     combing = start(torus(192, 96, MAJOR, MINOR), degree)
@@ -110,17 +105,6 @@ def test_settled_field_is_the_guided_field():
             found, find_singularities(surface, expected), strict=True
         ):
             assert np.array_equal(values, expected_values)
-
-
-def test_the_rest_of_the_field_stays():
-    surface = torus(96, 48, MAJOR, MINOR)
-    combing = start(surface, 4)
-    before = combing.vectors
-    draw(combing, on_torus(np.linspace(0, 0.5, 100)), radius=0.1)
-    distance = cKDTree(on_torus(np.linspace(0, 0.5, 100))).query(surface.face_center)[0]
-    change = angles(combing, before, combing.vectors)
-    assert change[distance < 0.05].max() > 20
-    assert np.median(change[distance > 1]) < 0.3
 
 
 def test_field_near_the_brush_follows_at_once():

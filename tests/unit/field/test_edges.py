@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rosy_addon.field.surface import connected_components, sorted_with_order
+from rosy_addon.field.connectivity import connected_components, sorted_with_order
 
 
 @pytest.mark.parametrize("limit", [50, 1 << 40, 1 << 62])

@@ -68,26 +68,12 @@ def test_free_directions_round_trip_exactly(ending, degree, tmp_path):
     field = read_field(tmp_path / "first.npy", BALL)
     assert field.degree == degree and field.direction_ratios is not None
     write_field(tmp_path / f"a{ending}", field, BALL)
+    with pytest.raises(RosyError, match="the directions of this field do not form a RoSy"):
+        write_field(tmp_path / "a.rosy", field, BALL)
     again = read_field(tmp_path / f"a{ending}", BALL)
     assert np.array_equal(again.source_directions, stored)
     assert np.array_equal(again.vectors, field.vectors)
     assert np.array_equal(again.direction_ratios, field.direction_ratios)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka-cf"])
-@pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
-def test_files_of_other_programs_round_trip_exactly(name, ending, shared_data, tmp_path):
-    surface = Surface(shared_data / "meshes" / f"{name.partition('-')[0]}.off")
-    source = shared_data / "fields" / f"{name}.rawfield"
-    write_field(tmp_path / f"a{ending}", read_field(source, surface), surface)
-    expected = np.array(source.read_text().split(), dtype=float)[2:]
-    if ending == ".npy":
-        actual = np.load(tmp_path / "a.npy").ravel()
-    else:
-        words = (tmp_path / f"a{ending}").read_text().split()
-        actual = np.array(words[2 * (ending == ".rawfield") :], dtype=float)
-    assert np.array_equal(actual, expected)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4, 6])
@@ -194,9 +180,12 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     assert expected in message and str(tmp_path / name) in message and "\n" not in message
 
 
+DAMAGED_SUFFIXES = [".rosy", ".rawfield", ".obj", ".txt", ".npy"]
+
+
 @pytest.mark.slow
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from([".obj", ".txt", ".npy"]))
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.binary(max_size=200), st.integers(0, 300), st.sampled_from(DAMAGED_SUFFIXES))
 def test_random_damage_raises_only_rosy_errors(tmp_path, garbage, offset, ending):
     path = tmp_path / f"damaged{ending}"
     write_field(path, axis_field(BALL, 4), BALL)
@@ -235,28 +224,19 @@ def test_a_field_is_transferred_by_position_with_a_note(degree, tmp_path):
     certain = expected.magnitude > 0.3  # elsewhere small tilts of a face rotate the projected axis
     assert np.degrees(np.abs(np.angle(z * expected_z.conj()))[certain]).max() / degree < 8
     assert np.median(np.abs(np.angle(z * expected_z.conj()))[certain]) / degree < np.radians(1)
+    assert np.abs(dot(again.vectors, triangles.face_normal)).max() < 1e-12
 
 
-def test_reordered_faces_are_transferred_from_a_given_mesh(tmp_path):
-    order = np.random.default_rng(1).permutation(BALL.face_count)
-    mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
-    field = axis_field(BALL, 4, (0.0, 0.0, 1.0))
-    write_field(tmp_path / "a.rosy", field, BALL)
-    write_off(tmp_path / "own.off", BALL)
-    again = read_field(tmp_path / "a.rosy", mixed, mesh=tmp_path / "own.off")
-    assert np.allclose(again.vectors, field.vectors[order], atol=1e-12)
-
-
-def test_free_directions_are_transferred(tmp_path):
+@pytest.mark.parametrize("degree", [3, 4])
+def test_reordered_faces_are_transferred_from_a_given_mesh(degree, tmp_path):
+    """Also directions that are not a RoSy, and to fewer faces."""
     order = np.random.default_rng(1).permutation(BALL.face_count)[:-2]
     mixed = from_triangles(BALL.vertices, BALL.triangle_vertex[order])
-    np.save(tmp_path / "a.npy", free_directions(3))
-    write_off(tmp_path / "a.off", BALL)
-    again = read_field(tmp_path / "a.npy", mixed)
-    original = read_field(tmp_path / "a.npy", BALL)
-    assert np.allclose(
-        field_directions(mixed, again), field_directions(BALL, original)[order], atol=1e-9
-    )
+    np.save(tmp_path / "a.npy", free_directions(degree))
+    write_off(tmp_path / "own.off", BALL)
+    again = read_field(tmp_path / "a.npy", mixed, mesh=tmp_path / "own.off")
+    expected = field_directions(BALL, read_field(tmp_path / "a.npy", BALL))[order]
+    assert np.allclose(field_directions(mixed, again), expected, atol=1e-9)
 
 
 def test_another_shape_is_refused(tmp_path, error_of):
@@ -265,11 +245,3 @@ def test_another_shape_is_refused(tmp_path, error_of):
     far = build_surface(plane(5, 5).vertices + 3, plane(5, 5).corner_vertex, plane(5, 5).face_start)
     message = error_of(read_field, tmp_path / "a.rosy", far)
     assert "must have the same shape and position" in message
-
-
-def test_transferred_vectors_are_tangent(tmp_path):
-    quads, triangles = quads_and_triangles()
-    write_off(tmp_path / "a.off", quads)
-    write_field(tmp_path / "a.rosy", axis_field(quads, 2), quads)
-    again = read_field(tmp_path / "a.rosy", triangles)
-    assert np.abs(dot(again.vectors, triangles.face_normal)).max() < 1e-12

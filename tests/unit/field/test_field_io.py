@@ -12,8 +12,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import cylinder, from_quads, icosphere, plane, torus
 
-from rosy_addon.core.errors import RosyError
-from rosy_addon.field.directional_field import field_directions
 from rosy_addon.field.field_io import write_field
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import axis_field
@@ -36,19 +34,15 @@ def rosy_text(rows, count=None, degree=4, form="{count}\n{degree}\n"):
 
 
 @pytest.mark.parametrize(
-    "form", ["{count}\n{degree}\n", "{count} {degree}\n", "\t{count}\r\n\n {degree} "]
+    "form", ["{count}\n{degree}\n", "{count} {degree}\n", "\t{count}\r\n\n {degree} \n\n"]
 )
-def test_count_and_degree_may_be_on_one_line_or_two(form, tmp_path):
-    (tmp_path / "a.rosy").write_text(rosy_text(WEST, form=form))
-    field = read_field(tmp_path / "a.rosy", SQUARES)
-    assert field.degree == 4
-    assert np.array_equal(field.vectors, WEST)
-
-
-def test_line_breaks_have_no_meaning(tmp_path):
-    words = rosy_text(WEST).split()
-    (tmp_path / "a.rosy").write_text("\n".join(words))
-    assert np.array_equal(read_field(tmp_path / "a.rosy", SQUARES).vectors, WEST)
+def test_line_breaks_have_no_meaning(form, tmp_path):
+    text = rosy_text(WEST, form=form)
+    for content in (text, "\n".join(text.split())):
+        (tmp_path / "a.rosy").write_text(content)
+        field = read_field(tmp_path / "a.rosy", SQUARES)
+        assert field.degree == 4
+        assert np.array_equal(field.vectors, WEST)
 
 
 def test_a_vertex_count_is_accepted_above_face_rows(tmp_path, error_of):
@@ -91,16 +85,6 @@ def test_written_fields_are_read_back_exactly(tmp_path, degree, vectors, ending)
     assert np.array_equal(again.vectors, field.vectors)
 
 
-@pytest.mark.parametrize("ending", [".rosy", ".rawfield"])
-@pytest.mark.parametrize("degree", [1, 3, 6])
-def test_round_trip_on_a_curved_surface(degree, ending, tmp_path):
-    surface = icosphere(2)
-    field = axis_field(surface, degree, (0.3, -0.2, 1.0))
-    write_field(tmp_path / f"a{ending}", field, surface)
-    again = read_field(tmp_path / f"a{ending}", surface)
-    assert np.array_equal(again.vectors, field.vectors)
-
-
 def test_rawfield_members_run_counter_clockwise_from_the_stored_one(tmp_path):
     write_field(tmp_path / "a.rawfield", RosyField(4, WEST), SQUARES)
     lines = (tmp_path / "a.rawfield").read_text().splitlines()
@@ -127,16 +111,6 @@ def test_fields_of_other_programs(name, shared_data):
     if name == "cheburashka":  # the only closed mesh
         _, index = find_singularities(surface, field)
         assert index.sum() == field.degree * surface.euler_characteristic
-
-
-def test_free_directions_keep_their_angles_and_lengths(shared_data, tmp_path, error_of):
-    surface = Surface(shared_data / "meshes" / "cheburashka.off")
-    path = shared_data / "fields" / "cheburashka-cf.rawfield"
-    field = read_field(path, surface)
-    stored = np.array(path.read_text().split()[2:], dtype=float).reshape(-1, 4, 3)
-    assert np.allclose(field_directions(surface, field), stored, atol=1e-5)
-    message = error_of(write_field, tmp_path / "a.rosy", field, surface)
-    assert "the directions of this field do not form a RoSy" in message
 
 
 @pytest.mark.parametrize(
@@ -210,19 +184,6 @@ def test_missing_file_and_conflicting_degree(tmp_path, error_of):
     assert "the field has degree 4, but degree 6 was requested" in message
 
 
-@pytest.mark.slow
-@given(st.binary(max_size=200), st.integers(0, 100), st.sampled_from([".rosy", ".rawfield"]))
-def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, offset, ending):
-    path = tmp_path_factory.getbasetemp() / f"damaged{ending}"
-    write_field(path, RosyField(4, WEST), SQUARES)
-    data = path.read_bytes()
-    path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
-    try:
-        read_field(path, SQUARES)
-    except RosyError as error:
-        assert "\n" not in str(error) and str(path) in str(error)
-
-
 def test_unwritable_output_is_an_error_and_keeps_the_old_file(tmp_path, error_of, monkeypatch):
     field = RosyField(4, WEST)
     assert "does not exist" in error_of(write_field, tmp_path / "no" / "a.rosy", field, SQUARES)
@@ -286,11 +247,9 @@ def test_the_field_is_undefined_on_faces_without_area():
     assert field.magnitude.tolist() == [np.sqrt(2), 0]
 
 
-def test_wrong_count_and_wrong_degree(error_of):
+def test_a_wrong_count(error_of):
     message = error_of(validated_field, SQUARES, np.ones((5, 3)), 4, "mesh 'A', attribute 'rosy'")
     assert "mesh 'A', attribute 'rosy': contains 5 vectors, but plane has 6 faces and 12" in message
-    for degree in (0, -1, 1000, 2.5):
-        assert f"degree {degree} is not" in error_of(validated_field, SQUARES, WEST, degree, "here")
 
 
 def test_the_domain_decides_if_both_counts_agree(error_of):

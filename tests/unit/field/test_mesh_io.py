@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from shapes import torus
 
 from rosy_addon.field.formats.stl import weld
 from rosy_addon.field.surface import MIN_EXTENT, Surface
@@ -158,20 +157,6 @@ def test_weld_keeps_positions_and_removes_duplicates(points):
     assert first == sorted(first)
 
 
-@pytest.mark.slow
-def test_meshes_of_other_programs(shared_data):
-    counts = {
-        path.name: (len(surface.vertices), surface.face_count)
-        for path in sorted((shared_data / "meshes").iterdir())
-        for surface in [Surface(path)]
-    }
-    assert counts["stanford-bunny.obj"][1] == 69451
-    assert counts["spot.obj"][1] == 5856
-    assert counts["cheburashka.off"] == (6669, 13334)
-    assert counts["vase.off"] == (1274, 2404)
-    assert counts["dome.off"] == (5000, 9635)
-
-
 def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
     # Three squares with edges along z, at angles of 90 and 45 degrees.
     (tmp_path / "bent.off").write_text(
@@ -285,15 +270,3 @@ def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
     surface = Surface(path)
     assert surface.vertices.ravel().tolist() == numbers
-
-
-def test_a_torus_is_closed_when_read_from_stl(tmp_path):
-    """Equal corners become one vertex: every edge has two triangles."""
-
-    shape = torus(12, 8)
-    points = shape.vertices[shape.corner_vertex[shape.triangles]].astype("<f4")
-    rows = b"".join(struct.pack("<12fH", 0, 0, 0, *three.ravel(), 0) for three in points)
-    (tmp_path / "t.stl").write_bytes(bytes(80) + struct.pack("<I", len(points)) + rows)
-    surface = Surface(tmp_path / "t.stl")
-    assert len(surface.vertices) == 96
-    assert surface.euler_characteristic == 0

@@ -14,7 +14,7 @@ from rosy_addon.field.prescribed import change_singularities, prescribed_field
 from rosy_addon.field.representation import face_frames, face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.singularity_changes import opposite_pairs
+from rosy_addon.field.singularity_changes import OUTSIDE, move_index, opposite_pairs
 from rosy_addon.field.surface import build_surface
 
 #: Many faces meet at its poles, so that they can have large indices.
@@ -50,8 +50,7 @@ def test_near_pairs_are_cancelled_and_nothing_else(degree):
         vertex, _ = find_singularities(BALL, clean)
         assert len(vertex) == left
         assert set(poles) <= set(vertex)
-    vertex, index = find_singularities(BALL, clean)
-    assert vertex.tolist() == poles and index.tolist() == [degree, degree]
+    assert indices(BALL, clean) == dict.fromkeys(poles, degree)
 
 
 def test_far_from_a_pair_nothing_turns():
@@ -90,12 +89,10 @@ def test_curvature_is_cleaned(degree, subdivisions, noise):
     )
     surface = build_surface(rough, surface.corner_vertex, surface.face_start)
     field = generate(surface, GeneratorSettings("curvature"), degree)
-    vertex, index = find_singularities(surface, field)
     clean = convert(surface, field, Conversion(pair_distance=0.4 / subdivisions))
-    left = dict(zip(*map(np.ndarray.tolist, find_singularities(surface, clean)), strict=True))
-    assert left.items() <= dict(zip(vertex.tolist(), index.tolist(), strict=True)).items()
-    assert 0 < len(left) < 0.7 * len(vertex)
-    assert sum(left.values()) == index.sum() == 2 * degree
+    before, left = indices(surface, field), indices(surface, clean)
+    assert left.items() <= before.items() and 0 < len(left) < 0.7 * len(before)
+    assert sum(left.values()) == sum(before.values()) == 2 * degree
 
 
 def test_a_singularity_moves_around_a_handle():
@@ -158,8 +155,7 @@ def test_guides_bend_a_field_with_the_same_singularities(degree):
         guides[near] = direction
     whole = prescribed_field(BALL, degree, last, [degree, degree], guides)
     bent = prescribed_field(BALL, degree, last, [degree, degree], guides, 0.02)
-    vertex, index = find_singularities(BALL, bent)
-    assert vertex.tolist() == last and index.tolist() == [degree, degree]
+    assert indices(BALL, bent) == dict.fromkeys(last, degree)
     normal = BALL.face_normal
     tangential = guides - (guides * normal).sum(axis=1, keepdims=True) * normal
     is_guided = guides.any(axis=1)
@@ -182,3 +178,68 @@ def test_a_field_bends_by_several_members(degree):
     assert not len(find_singularities(surface, field)[0])
     inner = np.abs(height - height.mean()) < 0.3 * np.ptp(height)
     assert turned_by(surface, field, RosyField(degree, guides))[inner].max() < 1
+
+
+# --- by hand ---------------------------------------------------------------------------------
+
+#: The poles, and vertices on three parallels of one meridian.
+NORTH, SOUTH = 0, len(BALL.vertices) - 1
+NEAR_NORTH, EQUATOR, NEAR_SOUTH = (1 + row * 64 for row in (4, 15, 27))
+
+
+def indices(surface, field):
+    return dict(zip(*map(np.ndarray.tolist, find_singularities(surface, field)), strict=True))
+
+
+@pytest.fixture(scope="module")
+def field():
+    vertex = [NORTH, SOUTH, EQUATOR, NEAR_SOUTH]
+    return prescribed_field(BALL, 4, vertex, [4, 4, 1, -1])
+
+
+@pytest.mark.parametrize(
+    "source, target, index, expected",
+    [
+        (EQUATOR, NEAR_NORTH, 0, {NORTH: 4, NEAR_NORTH: 1, SOUTH: 4, NEAR_SOUTH: -1}),
+        (NEAR_SOUTH, SOUTH, 0, {NORTH: 4, EQUATOR: 1, SOUTH: 3}),
+        (NORTH, NEAR_NORTH, 1, {NORTH: 3, NEAR_NORTH: 1, EQUATOR: 1, SOUTH: 4, NEAR_SOUTH: -1}),
+        (
+            NEAR_NORTH,
+            EQUATOR + 6,
+            1,
+            {NORTH: 4, NEAR_NORTH: -1, EQUATOR: 1, EQUATOR + 6: 1, SOUTH: 4, NEAR_SOUTH: -1},
+        ),
+    ],
+    ids=["moved", "merged", "split", "pair"],
+)
+def test_only_the_two_vertices_change(field, source, target, index, expected):
+    assert indices(BALL, move_index(BALL, field, source, target, index, 0.3)) == expected
+
+
+def test_far_from_a_move_nothing_turns(field):
+    moved = move_index(BALL, field, EQUATOR, EQUATOR + 3)
+    turned = turned_by(BALL, moved, field)
+    distance = np.linalg.norm(BALL.face_center - BALL.vertices[EQUATOR], axis=1)
+    assert turned[distance > 1.5].max() < 1 < 20 < turned[distance < 0.2].max()
+
+
+def test_a_singularity_leaves_over_a_border():
+    tube = cylinder(24, 12)
+    field = prescribed_field(tube, 4, [150, 200], [1, 1])
+    assert indices(tube, move_index(tube, field, 150, OUTSIDE)) == {200: 1}
+    assert indices(tube, move_index(tube, field, OUTSIDE, 100, -1)) == {100: -1, 150: 1, 200: 1}
+
+
+@pytest.mark.parametrize(
+    "source, target, index, message",
+    [
+        (NORTH, NORTH, 0, "both source and target"),
+        (EQUATOR + 1, NORTH, 0, "is not singular"),
+        (EQUATOR, OUTSIDE, 0, "this closed surface needs 0/4"),
+        (EQUATOR, 10**6, 0, "has no vertex 1000000"),
+        (OUTSIDE, NORTH, 0, "is not singular"),
+    ],
+)
+def test_moves_that_cannot_be_are_refused(field, source, target, index, message):
+    with pytest.raises(RosyError, match=message):
+        move_index(BALL, field, source, target, index)

@@ -6,9 +6,10 @@ from functools import partial
 
 import numpy as np
 import pytest
+from field_helpers import as_scipy, bumpy
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
-from shapes import torus
+from shapes import icosphere, torus
 
 from rosy_addon.field.conjugate_gradient import conjugate_gradient
 from rosy_addon.field.connection import build_connection
@@ -17,6 +18,7 @@ from rosy_addon.field.sparse_multigrid import (
     add_diagonal,
     from_coo,
     hierarchy,
+    matrix_product,
     w_cycle,
 )
 
@@ -28,24 +30,38 @@ def laplacian():
     return matrix.plus_diagonal(1e-3 * matrix.diagonal)
 
 
-def to_scipy(matrix):
-    shape = len(matrix), matrix.column_count
-    return sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape)
+def random_matrix(rows, columns, seed):
+    random = np.random.default_rng(seed)
+    row = np.concatenate([np.arange(rows), random.integers(rows, size=4 * rows)])
+    column = random.integers(columns, size=len(row))
+    value = random.standard_normal(len(row)) + 1j * random.standard_normal(len(row))
+    return from_coo(row, column, value, rows, columns)
+
+
+def test_products_and_adjoints():
+    a, b = random_matrix(60, 40, 0), random_matrix(40, 25, 1)
+    product = as_scipy(a) @ as_scipy(b)
+    np.testing.assert_allclose(
+        as_scipy(matrix_product(a, b)).toarray(), product.toarray(), atol=1e-12
+    )
+    vector = np.arange(40) * (1 + 2j)
+    np.testing.assert_allclose(a @ vector, as_scipy(a) @ vector, atol=1e-10)
+    np.testing.assert_array_equal(as_scipy(a.adjoint).toarray(), as_scipy(a).toarray().conj().T)
 
 
 def test_rows_and_columns(laplacian):
     chosen = np.random.default_rng(0).permutation(len(laplacian))[:200]
-    expected = to_scipy(laplacian)[chosen]
+    expected = as_scipy(laplacian)[chosen]
     rows = laplacian.rows(chosen)
-    assert abs(to_scipy(rows) - expected).max() == 0
-    assert abs(to_scipy(rows.columns(chosen)) - expected[:, chosen]).max() == 0
+    assert abs(as_scipy(rows) - expected).max() == 0
+    assert abs(as_scipy(rows.columns(chosen)) - expected[:, chosen]).max() == 0
 
 
 def test_diagonal_with_several_entries_in_a_row():
     row, column = np.array([0, 1, 1, 0, 1]), np.array([0, 1, 0, 1, 1])
     matrix = from_coo(row, column, np.arange(1, 6) + 0j, 2, 2)
-    expected = to_scipy(matrix).toarray() + np.diag([10, 20])
-    assert np.array_equal(to_scipy(matrix.plus_diagonal([10, 20])).toarray(), expected)
+    expected = as_scipy(matrix).toarray() + np.diag([10, 20])
+    assert np.array_equal(as_scipy(matrix.plus_diagonal([10, 20])).toarray(), expected)
 
 
 def test_levels_with_another_diagonal(laplacian):
@@ -58,7 +74,7 @@ def test_levels_with_another_diagonal(laplacian):
     solution = conjugate_gradient(
         new_levels[0].matrix, rhs, 1e-12, partial(w_cycle, new_levels), max_iterations=20
     )
-    expected = spsolve(to_scipy(laplacian) + sparse.diags(diagonal), rhs)
+    expected = spsolve(as_scipy(laplacian) + sparse.diags(diagonal), rhs)
     assert np.abs(solution - expected).max() < 1e-6 * np.abs(expected).max()
 
 
@@ -69,7 +85,7 @@ def test_fixed_unknowns_keep_their_values(laplacian):
     rhs = random.standard_normal(len(laplacian)) + 0j
     solution = conjugate_gradient(laplacian, rhs, 1e-11, start=start, is_fixed=is_fixed)
     assert np.array_equal(solution[is_fixed], start[is_fixed])
-    matrix, free = to_scipy(laplacian), ~is_fixed
+    matrix, free = as_scipy(laplacian), ~is_fixed
     known = rhs - matrix[:, is_fixed] @ start[is_fixed]
     expected = spsolve(matrix[free][:, free].tocsc(), known[free])
     assert np.abs(solution[free] - expected).max() < 1e-6
@@ -85,3 +101,26 @@ def test_tiny_right_hand_sides(laplacian, scale, start_scale):
     for precondition in jacobi, None:
         solution = conjugate_gradient(laplacian, rhs, 1e-4, precondition, start=start)
         assert np.abs(solution).max() <= 1e-12 * start_scale + 1e3 * scale + 1e-160
+
+
+def test_cycles_converge_and_ignore_rows_of_rounding():
+    """The row of a component of tiny area can be all rounding, with 0 on the diagonal."""
+    matrix = field_laplacian(build_connection(bumpy(icosphere(4))), 4, 0.1)
+    count = len(matrix)
+    with_row = from_coo(
+        np.concatenate([matrix.row_indices, [count, count, 0]]),
+        np.concatenate([matrix.indices, [count, 0, count]]),
+        np.concatenate([matrix.data, [0, 1e-16, 1e-16]]),
+        count + 1,
+        count + 1,
+    )
+    rhs = np.append(np.random.default_rng(0).standard_normal(count), 0) + 0j
+    expected = spsolve(as_scipy(matrix).tocsc(), rhs[:-1])
+    solution, errors = np.zeros_like(rhs), []
+    with np.errstate(divide="raise", invalid="raise", over="raise"):
+        levels = hierarchy(with_row)
+        for _ in range(12):
+            solution += w_cycle(levels, rhs - with_row @ solution)
+            errors.append(np.linalg.norm(solution[:-1] - expected))
+    assert len(levels) > 1
+    assert (np.array(errors[1:]) < 0.8 * np.array(errors[:-1])).all()

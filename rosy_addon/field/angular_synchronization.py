@@ -1,0 +1,211 @@
+"""Angles at the nodes of a graph from their differences along its edges (angular synchronization).
+
+The unknowns are complex numbers of modulus 1, and the least squared error is sought. They are smoothed from
+coarse to fine, as the position fields of Jakob, Tarini, Panozzo and Sorkine-Hornung, "Instant
+Field-Aligned Meshes" (SIGGRAPH Asia 2015). Along some edges, the conjugate of the neighbor is meant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.progress import report
+from .connectivity import sorted_with_order
+from .representation import unit_complex
+
+#: Label of the progress.
+LABEL = "spacing lines"
+
+#: Smoothing steps on the finest level, factor for each coarser level, and their largest number.
+SMOOTHING_STEPS, STEP_GROWTH, MAX_SMOOTHING_STEPS = 8, 1.5, 100
+
+#: Share of the old value in a smoothing step. It damps oscillations.
+INERTIA = 0.3
+
+#: Levels have at least this many nodes, and are coarsened by at least this factor.
+MIN_LEVEL_NODES, MIN_COARSENING = 12, 1.1
+
+#: Factor of the multiplicative hash of two nodes: 2^64 divided by the golden ratio.
+HASH_FACTOR = 0x9E3779B97F4A7C15
+
+#: Rounds in which pairs of nodes are matched on a level.
+MATCHING_ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseGraph:
+    """A graph of n nodes with unknown values of modulus 1, and m entries that relate two of them.
+
+    An entry says that the value at node `row` should be ``a z + b conj(z)``, with the value z at node
+    `column`. |a| + |b| is its weight. Entries are sorted by row, and come in both directions.
+    """
+
+    node_count: int
+    row: np.ndarray
+    column: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+
+    @cached_property
+    def row_start(self) -> np.ndarray:
+        """The first entry of each node that has any."""
+        return _run_starts(self.row)
+
+    @cached_property
+    def strength(self) -> np.ndarray:
+        """(m,) float64 weights of the entries."""
+        return np.abs(self.a) + np.abs(self.b)
+
+    @cached_property
+    def conjugating(self) -> np.ndarray:
+        """The entries in which b is not 0."""
+        return np.flatnonzero(self.b)
+
+
+def _run_starts(values: np.ndarray) -> np.ndarray:
+    """Return the first index of each run of equal values."""
+    is_first = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=is_first[1:])
+    return np.flatnonzero(is_first)
+
+
+def phase_graph(
+    node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
+) -> PhaseGraph:
+    """Return a graph of entries in any order. Entries between the same two nodes are added."""
+    entry = np.flatnonzero(row != column)
+    key = row[entry].astype(np.int64) * node_count + column[entry]
+    key, order = sorted_with_order(key, max(node_count, 1) ** 2)
+    entry = entry[order]
+    first = _run_starts(key)
+    if len(first):
+        a, b = (np.add.reduceat(values.take(entry), first) for values in (a, b))
+    row, column = np.divmod(key[first], max(node_count, 1))
+    return PhaseGraph(node_count, row, column, a[: len(row)], b[: len(row)])
+
+
+def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
+    """Return (n,) complex128 values of modulus 1 that agree with their neighbors.
+
+    Values of clusters of nodes come first, by recursion. Then all values are smoothed. `depth` counts the
+    coarser graphs.
+    """
+    clustering = _clustering(graph) if graph.node_count > MIN_LEVEL_NODES else None
+    if clustering is None or clustering.count * MIN_COARSENING > graph.node_count:
+        z = np.ones(graph.node_count, dtype=np.complex128)
+    else:
+        z = synchronize(_coarse_graph(graph, clustering), depth + 1)[clustering.cluster]
+        z = clustering.p * z + clustering.q * z.conj()
+    if not len(graph.row):
+        return z
+    inertia = np.zeros(graph.node_count)
+    rows = graph.row[graph.row_start]
+    inertia[rows] = INERTIA * np.add.reduceat(graph.strength, graph.row_start)
+    for _ in range(int(min(SMOOTHING_STEPS * STEP_GROWTH**depth, MAX_SMOOTHING_STEPS))):
+        report(0.8**depth, LABEL)
+        z = _smoothed(graph, z, inertia)
+    return z
+
+
+def _smoothed(graph: PhaseGraph, z: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """Replace each value by the one that its neighbors and, with a weight of `inertia`, the value itself agree on."""
+    neighbor = z.take(graph.column)
+    terms = graph.a * neighbor
+    conjugating = graph.conjugating
+    terms[conjugating] += graph.b[conjugating] * neighbor[conjugating].conj()
+    total = inertia * z
+    total[graph.row[graph.row_start]] += np.add.reduceat(terms, graph.row_start)
+    modulus = np.sqrt(total.real**2 + total.imag**2)
+    return np.divide(total, modulus, out=z.copy(), where=modulus > 0)
+
+
+class _Clustering(NamedTuple):
+    """Clusters of nodes whose values determine each other.
+
+    Attributes
+    ----------
+    cluster : (n,) int ndarray
+        Cluster of each node.
+    p, q : (n,) complex128 ndarray
+        The value of a node is p z + q conj(z), with the value z of its cluster. One of them is 0,
+        the other has the modulus 1.
+    count : int
+        Number of clusters.
+    """
+
+    cluster: np.ndarray
+    p: np.ndarray
+    q: np.ndarray
+    count: int
+
+
+def _clustering(graph: PhaseGraph) -> _Clustering:
+    """Group nodes into pairs and larger clusters along their strongest edges.
+
+    Nodes without a partner join a pair next to them.
+    """
+    count = graph.node_count
+    # A random factor makes the strengths distinct, so that many nodes find a partner in each round.
+    low, high = np.minimum(graph.row, graph.column), np.maximum(graph.row, graph.column)
+    hashed = (low * count + high).astype(np.uint64) * np.uint64(HASH_FACTOR)
+    strength = graph.strength * (1 + 0.5 * (hashed >> np.uint64(40)).astype(np.float64) / 2**24)
+    partner, link = np.full((2, count), -1, dtype=np.int64)
+    nodes = np.arange(count)
+    entry = np.arange(len(graph.row))
+    for _ in range(MATCHING_ROUNDS):
+        free = (partner[graph.row[entry]] < 0) & (partner[graph.column[entry]] < 0)
+        entry = entry[free]
+        if not len(entry):
+            break
+        chosen = _strongest_of_row(graph.row, strength, entry)
+        choice = np.full(count, -1, dtype=np.int64)
+        choice[graph.row[chosen]] = graph.column[chosen]
+        chooser = graph.row[chosen]
+        mutual = choice[choice[chooser]] == chooser
+        partner[chooser[mutual]] = choice[chooser[mutual]]
+        link[chooser[mutual]] = chosen[mutual]
+    # The first node of a pair is the root. The second one and single neighbors of the root have its value.
+    is_root = (partner < 0) | (partner > nodes)
+    root = np.where(is_root, nodes, partner)
+    joins = np.flatnonzero((partner[graph.row] < 0) & (partner[graph.column] > graph.column))
+    if len(joins):
+        chosen = _strongest_of_row(graph.row, strength, joins)
+        root[graph.row[chosen]] = graph.column[chosen]
+        link[graph.row[chosen]] = chosen
+        is_root[graph.row[chosen]] = False
+    p, q = np.ones(count, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
+    follower = np.flatnonzero(~is_root)
+    a, b = graph.a[link[follower]], graph.b[link[follower]]
+    keeps = np.abs(a) >= np.abs(b)
+    value = unit_complex(np.where(keeps, a, b), otherwise=1)
+    p[follower], q[follower] = np.where(keeps, value, 0), np.where(keeps, 0, value)
+    number = np.cumsum(is_root) - 1
+    return _Clustering(number[root], p, q, int(np.count_nonzero(is_root)))
+
+
+def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:
+    """Return the strongest of some entries in each row. The entries are in ascending order."""
+    first = _run_starts(row[entry])
+    largest = np.maximum.reduceat(strength[entry], first)
+    is_largest = strength[entry] == np.repeat(largest, np.diff(first, append=len(entry)))
+    candidate = entry[is_largest]
+    return candidate[_run_starts(row[candidate])]
+
+
+def _coarse_graph(graph: PhaseGraph, clustering: _Clustering) -> PhaseGraph:
+    """Return the graph of the clusters: the entries between different ones, in terms of their values."""
+    cluster, p, q, count = clustering
+    row, column = cluster[graph.row], cluster[graph.column]
+    entry = np.flatnonzero(row != column)
+    tail, head = graph.column[entry], graph.row[entry]
+    a, b = graph.a[entry], graph.b[entry]
+    # Replace the value at the column by the value of its cluster.
+    a, b = a * p[tail] + b * q[tail].conj(), a * q[tail] + b * p[tail].conj()
+    # Replace the value at the row. The inverse of z -> p z is z -> conj(p) z, and z -> q conj(z) is its own
+    # inverse.
+    a, b = p[head].conj() * a + q[head] * b.conj(), p[head].conj() * b + q[head] * a.conj()
+    return phase_graph(count, row[entry], column[entry], a, b)

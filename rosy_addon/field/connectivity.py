@@ -1,0 +1,174 @@
+"""How the faces of polygon meshes are connected: edges, smooth fans, and components of graphs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .frames import dot, normalize
+from .polygon_arrays import corner_faces, face_area_vectors, next_corners
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The E edges of a surface, and the two halfedges of each of the I interior edges.
+
+    Attributes
+    ----------
+    corner_edge : (C,) int32 ndarray
+        The edge from each corner to the next corner of its face.
+    ends : (E, 2) int32 ndarray
+        Vertex pairs, the smaller first.
+    face_count : (E,) int32 ndarray
+        Number of faces at the edge: 1 at a boundary, 2 inside, more at nonmanifold edges.
+    interior : (I,) int32 ndarray
+        Edges with exactly two faces that are oriented consistently. Fields do not continue across other edges.
+    halfedges : (I, 2) int32 ndarray
+        For each interior edge, the corner in either face where the edge starts. Consistently oriented faces
+        run along the edge in opposite directions.
+    """
+
+    corner_edge: np.ndarray
+    ends: np.ndarray
+    face_count: np.ndarray
+    interior: np.ndarray
+    halfedges: np.ndarray
+
+
+def build_edges(corner_vertex: np.ndarray, face_start: np.ndarray) -> Edges:
+    """Find the edges of a polygon mesh, from `Surface.corner_vertex` and `Surface.face_start`."""
+    tail = corner_vertex.astype(np.int64)
+    head = tail[next_corners(face_start)]
+    stride = int(corner_vertex.max(initial=0)) + 1
+    key, corner_by_edge = sorted_with_order(
+        np.minimum(tail, head) * stride + np.maximum(tail, head), stride * stride
+    )
+    is_first = np.ones(len(key), dtype=bool)
+    np.not_equal(key[1:], key[:-1], out=is_first[1:])
+    first = np.flatnonzero(is_first)
+    edge_key, face_count = key[first], np.diff(first, append=len(key))
+    corner_edge = np.empty(len(key), dtype=np.int32)
+    corner_edge[corner_by_edge] = np.cumsum(is_first, dtype=np.int32) - 1
+    interior = np.flatnonzero(face_count == 2)
+    a, b = corner_by_edge[first[interior]], corner_by_edge[first[interior] + 1]
+    opposite = tail[a] == head[b]
+    return Edges(
+        corner_edge=corner_edge,
+        ends=np.stack([edge_key // stride, edge_key % stride], axis=1).astype(np.int32),
+        face_count=face_count.astype(np.int32),
+        interior=interior[opposite].astype(np.int32),
+        halfedges=np.stack([a, b], axis=1)[opposite].astype(np.int32),
+    )
+
+
+def smooth_fans(
+    vertices: np.ndarray,
+    corner_vertex: np.ndarray,
+    face_start: np.ndarray,
+    sharp_edges: np.ndarray | None = None,
+    sharp_angle: float | None = None,
+    flat_faces: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return (C,) int32, the smooth fan of each corner: `Surface.corner_fan`.
+
+    Parameters
+    ----------
+    vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
+        As in `surface.build_surface`. Without a sharp angle, the result does not depend on the positions of
+        the vertices.
+    """
+    edges = build_edges(corner_vertex, face_start)
+    corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
+    a, b = edges.halfedges[:, 0], edges.halfedges[:, 1]
+    smooth = np.ones(len(a), dtype=bool)
+    if flat_faces is not None:
+        flat = np.asarray(flat_faces, dtype=bool)
+        smooth &= ~(flat[corner_face[a]] | flat[corner_face[b]])
+    if sharp_angle is not None:
+        normal = normalize(face_area_vectors(vertices, corner_vertex, face_start))
+        smooth &= dot(normal[corner_face[a]], normal[corner_face[b]]) >= np.cos(sharp_angle)
+    if sharp_edges is not None and len(sharp_edges):
+        stride = int(corner_vertex.max()) + 1
+        sharp = np.sort(np.asarray(sharp_edges, dtype=np.int64).reshape(-1, 2), axis=1)
+        ends = edges.ends[edges.interior].astype(np.int64)
+        smooth &= ~np.isin(ends[:, 0] * stride + ends[:, 1], sharp[:, 0] * stride + sharp[:, 1])
+    a, b = a[smooth], b[smooth]
+    return connected_corners(a, b, next_corner)
+
+
+def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
+    """Return (C,) int32, the components of corners that meet at the ends of some edges.
+
+    Parameters
+    ----------
+    a, b : (n,) int ndarray
+        The corners at which each edge starts in the faces on its two sides.
+    next_corner : (C,) int ndarray
+        From `next_corners`.
+    """
+    ends = np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)
+    return connected_components(len(next_corner), np.concatenate(ends))
+
+
+def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Label the connected components of a graph.
+
+    Each node points to a root: the smallest node known to be in its component. Each round links the
+    roots of connected nodes, then flattens the trees by pointer jumping.
+
+    Parameters
+    ----------
+    count : int
+        Number of nodes.
+    pairs : (n, 2) int ndarray
+        Edges of the graph.
+
+    Returns
+    -------
+    (count,) int32 ndarray
+        Component of each node, numbered from 0 without gaps.
+    """
+    root = np.arange(count, dtype=np.int32)
+    a, b = pairs[:, 0], pairs[:, 1]
+    while len(a):
+        low, high = np.minimum(root[a], root[b]), np.maximum(root[a], root[b])
+        _lower(root, high, low)
+        while True:
+            flattened = root[root]
+            if np.array_equal(flattened, root):
+                break
+            root = flattened
+        unmerged = root[a] != root[b]
+        a, b = a[unmerged], b[unmerged]
+    is_root = root == np.arange(count, dtype=np.int32)
+    return (np.cumsum(is_root, dtype=np.int32) - 1)[root]
+
+
+def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
+    """Do the same as ``np.minimum.at(values, index, limits)``, faster, for limits below the values.
+
+    Two assignments suffice for indices that occur once or twice, and most do.
+    """
+    for _ in range(2):
+        values[index] = limits
+        remaining = limits < values[index]
+        index, limits = index[remaining], limits[remaining]
+    np.minimum.at(values, index, limits)
+
+
+def sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return keys from 0 to `limit` - 1 in ascending order, and the stable order that sorts them.
+
+    Keys and indices are sorted as one number if they fit into it, which is faster than `argsort`.
+    """
+    index_bits = len(key).bit_length()
+    if limit.bit_length() + index_bits > 63:
+        order = np.argsort(key, kind="stable")
+        return key[order], order
+    packed = key << index_bits
+    packed |= np.arange(len(key), dtype=np.int64)
+    packed.sort()
+    order = packed & ((1 << index_bits) - 1)
+    packed >>= index_bits
+    return packed, order

@@ -126,7 +126,7 @@ def draw_rows(
     strips : sequence of Strip
         A group of `group_strips`.
     cache : Cache
-        Keeps results that do not depend on the camera. By default the cache of this process, for helpers.
+        Keeps what does not depend on the camera. By default that of the process, for helpers.
 
     Returns
     -------
@@ -195,7 +195,7 @@ def _check_picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], wo
 def picture_memory(view: ViewInput, groups: Sequence[Sequence[Strip]], workers: int) -> float:
     """Return the bytes that a picture may take at its peak, beyond those that are taken before.
 
-    The sum of the finished picture and, for each process, the samples of its strips and all triangles. The
+    It is the finished picture, and in each process the samples of its strips and all triangles. The
     surfaces are assumed to fill the picture.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Marks that are drawn over the finished picture of a view: arrowheads, then singularities."""
+"""What is drawn over the finished picture of a view: arrowheads, then singularities."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def with_marks(picture: Picture, view: ViewInput, cache: Cache | None = BAKE_CAC
     view : ViewInput
         The view that it was drawn for.
     cache : Cache, optional
-        Stores corner fields, and the singularities of fields. By default the cache of bakes in
-        this process, for helpers.
+        Stores corner fields, and the singularities of fields. By default that of bakes in the process,
+        for helpers.
 
     Returns
     -------
@@ -86,15 +86,15 @@ def view_arrows(
 
 
 def sequence_key(instances: Sequence[MeshInstance], look: Look) -> PictureKey:
-    """Return the key of an animation.
+    """Find what the key of an animation says.
 
-    It holds for all frames: it has the range of the colors only if the look sets it, and all singularities of
-    the fields, visible or not.
+    It is true of all frames: the range of the colors is known only if the look sets it, and the
+    singularities are those of the fields, visible or not.
 
     Parameters
     ----------
     instances : sequence of MeshInstance
-        Instances of one of the frames.
+        Of one of the frames.
     look : Look
 
     Returns

@@ -36,7 +36,7 @@ VIDEO_SUFFIXES = (".mp4", ".gif")
 #: frames per second, and the file.
 Encoder = Callable[[Path, int, tuple[int, int], float, Path], None]
 
-#: Message for an .mp4 without an encoder.
+#: What is wrong with an .mp4 for which there is no encoder.
 NO_ENCODER = "an .mp4 needs ffmpeg or Blender; a .gif needs neither"
 
 #: Bytes of memory of a pixel of a .gif: its colors until the end, and its compressed data.
@@ -180,7 +180,7 @@ def video_steps(
     draw : function
         Returns the steps that draw the `video_frame` of a view.
     views, count, path, fps
-        See `turntable`. Nothing is written to the path; its suffix selects the kind of video.
+        As for `turntable`. Nothing is written to the path; its suffix says which kind of video is meant.
     encode : function
         Returns the steps that encode an .mp4, given the arguments of an `Encoder`.
     """
@@ -255,7 +255,7 @@ def video_frame(rgba: np.ndarray, as_gif: bool) -> Any:
 
 
 def _swept_hull(points: np.ndarray) -> np.ndarray:
-    """Return points around the volume that a mesh sweeps when it turns about its vertical axis.
+    """Return points around everything that a mesh sweeps when it turns about its vertical axis.
 
     The mesh is cut into 32 horizontal slices. Each is enclosed by a cylinder, whose two rims are
     sampled.

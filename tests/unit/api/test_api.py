@@ -63,6 +63,14 @@ def test_a_flat_mesh_needs_no_z():
     assert np.array_equal(surface.vertices, SQUARE)
 
 
+def test_texture_coordinates_of_vertices_and_corners():
+    faces, uv = [[0, 1, 2], [0, 2, 3]], np.array(SQUARE)[:, :2]
+    corners = [0, 1, 2, 0, 2, 3]
+    for given in (uv, uv[corners]):
+        assert np.array_equal(rf.Surface(SQUARE, faces, uv=given).uv, uv[corners])
+    assert rf.Surface(SQUARE, faces).uv is None
+
+
 @pytest.mark.parametrize(
     ("arguments", "options", "expected"),
     [

@@ -360,24 +360,39 @@ def corner_numbers(
         color_values = _named_array(
             surface, color_values, data, "attribute", "attributes of faces or vertices"
         )
-    try:
-        array = np.asarray(color_values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise RosyError(f"{surface.name}: color_values must be numbers") from None
-    counts = surface.face_count, len(surface.vertices), len(surface.corner_vertex)
-    if array.ndim != 1 or len(array) not in counts:
-        raise RosyError(
-            f"{surface.name}: color_values must be {counts[0]:,} numbers, one for each face, "
-            f"{counts[1]:,}, one for each vertex, or {counts[2]:,}, one for each corner, not an array of "
-            f"shape {array.shape}"
-        )
-    if len(array) == counts[0]:
-        array = array[surface.corner_face]
-    elif len(array) == counts[1]:
-        array = array[surface.corner_vertex]
-    numbers: NDArray[np.float32] = array.astype(np.float32)
+    numbers = _at_corners(surface, color_values, "color_values", may_be_of_faces=True)
     numbers[~np.isfinite(numbers)] = np.nan
     return numbers
+
+
+def _at_corners(
+    surface: Surface, values: ArrayLike, name: str, *, may_be_of_faces: bool = False
+) -> NDArray[np.float32]:
+    """Return (C,) numbers of corners, given numbers of faces, vertices or corners.
+
+    Raises
+    ------
+    RosyError
+        If they are not numbers, or their count fits none of these. The message names the argument.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RosyError(f"{surface.name}: {name} must be numbers") from None
+    corners = np.arange(len(surface.corner_vertex))
+    domains = [
+        ("face", surface.face_count, surface.corner_face),
+        ("vertex", len(surface.vertices), surface.corner_vertex),
+        ("corner", len(corners), corners),
+    ][0 if may_be_of_faces else 1 :]
+    for _, count, element in domains:
+        if array.shape == (count,):
+            numbers: NDArray[np.float32] = array[element].astype(np.float32)
+            return numbers
+    expected = ", or ".join(f"{count:,} numbers, one for each {each}" for each, count, _ in domains)
+    raise RosyError(
+        f"{surface.name}: {name} must be {expected}, not an array of shape {array.shape}"
+    )
 
 
 def _named_array(
@@ -401,18 +416,10 @@ def _surface_tone(
     if values is not None:
         if isinstance(values, str):
             values = _named_tone(surface, values)
-        array = np.asarray(values, dtype=np.float64)
-        counts = len(surface.vertices), len(surface.corner_vertex)
-        if array.ndim != 1 or len(array) not in counts:
-            raise RosyError(
-                f"{surface.name}: tone_values must be {counts[0]:,} numbers, one for each vertex, or "
-                f"{counts[1]:,}, one for each corner, not an array of shape {array.shape}"
-            )
-        if not np.isfinite(array).all():
+        tone = _at_corners(surface, values, "tone_values")
+        if not np.isfinite(tone).all():
             raise RosyError(f"{surface.name}: tone_values has values that are not finite")
-        if len(array) == counts[0]:
-            array = array[surface.corner_vertex]
-        return SurfaceTone(array[:, None].astype(np.float32))
+        return SurfaceTone(tone[:, None])
     if image is not None:
         return SurfaceTone(uv_map(surface).astype(np.float32), _image_luminance(image))
     return None

@@ -30,4 +30,4 @@ def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
 def test_other_numbers_of_tones_are_refused(error_of):
     surface = rf.Surface(*CUBE)
     message = error_of(rf.render, surface, tone_values=np.ones(6), preset="engraving")
-    assert "8 numbers, one for each vertex, or 24, one for each corner" in message
+    assert "8 numbers, one for each vertex, or 24 numbers, one for each corner" in message

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ..rosy_addon.core.errors import REPORTED_ERRORS, RosyError
-from ..rosy_addon.field.guide_brush import EFFECTS, GuideBrush
+from ..rosy_addon.field.combing import EFFECTS, GuideBrush
 from ..rosy_addon.jobs.comb_field import CombStroke
 from ..rosy_addon.ui import comb_brush, overlay
 from ..rosy_addon.ui.properties import BRUSH_STRENGTH

@@ -9,7 +9,7 @@ from ..api.generators import GENERATOR_FUNCTIONS
 from ..core.errors import RosyError
 from ..core.settings import settings_of
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
-from ..field.formats.guide_strokes import read_guide_strokes
+from ..field.formats.plain import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings, options_of
 from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS

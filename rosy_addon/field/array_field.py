@@ -140,7 +140,7 @@ def _all_arrays(arrays: SurfaceArrays) -> list[FieldArray]:
 
 
 def _array_of_name(arrays: SurfaceArrays, listed: list[FieldArray], name: str) -> FieldArray:
-    """Return the array of a name."""
+    """Return the array with a name, which may have the prefix "point:" or "cell:"."""
     found = [array for array in listed if array.name == name]
     prefix, _, rest = name.partition(":")
     if not found and prefix in ("point", "cell"):

@@ -69,7 +69,7 @@ def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.nda
 def vectors_on_rest_shape(
     surface: Surface, rest_vertices: np.ndarray, vectors: np.ndarray
 ) -> np.ndarray:
-    """Return the vectors on the faces of a rest shape that renderers transport to given ones.
+    """Return vectors on a rest shape: renderers transport them to the given ones on the deformed faces.
 
     The linear map from the corners w of a rest face to the corners u of the deformed face of least squared
     error, u = a w + b conj(w), has the polar rotation a / |a|. Its inverse is applied.

@@ -130,7 +130,7 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
 
 
 class _Neighbors:
-    """The vertex nodes, and those next to each of them."""
+    """The vertex nodes and their neighbors along edges."""
 
     def __init__(self, graph: FaceGraph) -> None:
         self._start, self._neighbor, edge = neighbors_of_nodes(
@@ -147,7 +147,7 @@ class _Neighbors:
         potential: np.ndarray,
         share: float,
     ) -> np.ndarray:
-        """Return (n,) indices after a share of the singularities has gone to the best neighbors."""
+        """Return (n,) indices after moving a share of the singularities to their best neighbors."""
         moves = []
         for node in np.flatnonzero(added).tolist():
             around = slice(self._start[node], self._start[node + 1])

@@ -119,7 +119,7 @@ class _ClosestSearch:
         return np.clip(np.floor(self._in_cells(points)), 0, self.shape - 1).astype(np.int64)
 
     def _in_cells(self, points: np.ndarray) -> np.ndarray:
-        """Return (n, 3) positions of points in cells; those far outside of the grid are moved beside it."""
+        """Return (n, 3) positions of points in cells; points far outside of the grid are moved next to it."""
         margin = self.cell_size
         points = np.clip(points, self.origin - margin, self.top + margin)
         return (points - self.origin) / self.cell_size

@@ -1,16 +1,21 @@
-"""A field that follows its guides while a brush changes them.
+"""Combing: a brush that changes guides along strokes, and the field that follows these guides.
 
-The field is at all times a solution of the system of its guides: near the brush at once, and everywhere
+A guide of a face is a representation (see `representation`) whose modulus is its firmness; see
+`guided_system.firmness_weights`. The field solves the system of its guides: near the brush at once, and everywhere
 after `Combing.settle`.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress
 from .conjugate_gradient import RELATIVE_TOLERANCE
+from .frames import dot, normalize
 from .guided_system import (
     EXACT_FIRMNESS,
     GuidedSystem,
@@ -18,8 +23,34 @@ from .guided_system import (
     firmness_weights,
     unit_representations,
 )
-from .representation import unit_complex
+from .representation import to_representation, unit_complex
 from .rosy_field import RosyField
+
+#: Distance between dabs along a stroke, relative to the radius of the brush.
+DAB_SPACING = 1 / 6
+
+#: Least distance between dabs, relative to `Surface.extent`, and largest number of dabs between two points.
+MIN_SPACING, MAX_DABS = 2.0**-12, 100_000
+
+#: A face that a stroke reaches again is combed anew if the stroke was elsewhere for this arc length, relative
+#: to the radius.
+PASS_GAP = 2.0
+
+#: Firmness of a guide that is not exact, where the brush has its full effect.
+SOFT_FIRMNESS = 0.98
+
+#: Guides of less firmness are removed.
+LEAST_FIRMNESS = 1e-6
+
+#: Shortest projection of the unit direction of a stroke to a face that combs it.
+MIN_PROJECTION = 0.2
+
+#: What a brush does.
+EFFECTS = {
+    "comb": "Turn the field along the stroke",
+    "erase": "Remove guides",
+    "smooth": "Average guides with those around them",
+}
 
 #: Nodes around changed guides that are solved at once, and the iterations of the solver.
 NEAR_NODES, NEAR_ITERATIONS = 3000, 30
@@ -152,3 +183,254 @@ def start_combing(
     guides = np.where(guides == 0, weak_guides, guides)
     start = system.averages.node_sums(unit_z, system.degree) / system.averages.mass
     return Combing(system, guides, start, np.where(magnitude > 0, magnitude, 1.0))
+
+
+@dataclass(frozen=True)
+class GuideBrush:
+    """The settings of a brush.
+
+    Attributes
+    ----------
+    radius : float
+        Object space.
+    strength : float
+        0 to 1.
+    effect : str
+        One of `EFFECTS`.
+    is_exact : bool
+        The field follows combed guides exactly, in the whole radius.
+    front_faces : bool
+        Leave out faces whose normals point away from the normal under the brush.
+    mirror : sequence of 3 bools
+        Repeat the stroke on the other sides of the planes x = 0, y = 0 and z = 0.
+    """
+
+    radius: float
+    strength: float = 1.0
+    effect: str = "comb"
+    is_exact: bool = False
+    front_faces: bool = True
+    mirror: Sequence[bool] = (False, False, False)
+
+    def falloff(self, distance: np.ndarray) -> np.ndarray:
+        """Return the effect at distances from the stroke: 1 on the stroke, 0 at the radius."""
+        if self.is_exact and self.effect == "comb":
+            return (distance < self.radius).astype(np.float64)
+        x = np.clip(1 - (distance / self.radius) ** 2, 0, 1)
+        return x * x
+
+
+@dataclass(frozen=True, eq=False)
+class _Dab:
+    """A sample of the stroke: a position (3,), the pressure there, and the arc length up to it."""
+
+    position: np.ndarray
+    pressure: float
+    arc_length: float
+
+
+class BrushStroke:
+    """A stroke of a brush, which may be given point by point.
+
+    The result does not depend on how the points are divided between calls of `extend`.
+
+    Parameters
+    ----------
+    system : GuidedSystem
+    guides : (F,) complex128 ndarray
+        Representations in the frames of the system. They are changed in place.
+    brush : GuideBrush
+    locate : callable
+        Returns the (n,) int faces closest to (n, 3) points in object space; -1 for no face.
+    """
+
+    def __init__(
+        self,
+        system: GuidedSystem,
+        guides: np.ndarray,
+        brush: GuideBrush,
+        locate: Callable[[np.ndarray], np.ndarray],
+    ) -> None:
+        self.guides = guides
+        self._system = system
+        self._surface = system.surface
+        self._brush = brush
+        self._locate = locate
+        self._spacing = max(DAB_SPACING * brush.radius, MIN_SPACING * self._surface.extent)
+        signs = np.array([[1.0, 1.0, 1.0]])
+        for axis in np.flatnonzero(brush.mirror):
+            mirrored = signs.copy()
+            mirrored[:, axis] *= -1
+            signs = np.concatenate([signs, mirrored])
+        self._signs = signs
+        self._start_arc_length = 0.0
+        self._end: _Dab | None = None  # the last point, which need not be a dab
+        self._dabs: list[_Dab] = []  # the last two and new ones
+        # State of each face in the current pass of the stroke over it.
+        count = self._surface.face_count
+        self._last_arc_length = np.full(count, -np.inf)
+        self._least_distance = np.full(count, np.inf)
+        self._coverage = np.zeros(count)
+        self._base = np.zeros(count, dtype=np.complex128)
+
+    def extend(self, points: np.ndarray, pressure: np.ndarray) -> np.ndarray:
+        """Go on to (n, 3) points in object space, with (n,) pressures from 0 to 1.
+
+        Returns
+        -------
+        (m,) intp ndarray
+            Faces whose guides may have changed. The last piece, up to two dabs long, waits for later points.
+
+        Raises
+        ------
+        RosyError
+            If a point is not finite, or so far away that there would be more than `MAX_DABS` up to it.
+        """
+        for point, value in zip(points, pressure, strict=True):
+            self._add_dabs_to(np.asarray(point, dtype=np.float64), float(value))
+        return self._draw()
+
+    def finish(self) -> np.ndarray:
+        """Draw the end of the stroke. Return what `extend` does. Later points begin elsewhere."""
+        end = self._end
+        if end is None:
+            return np.empty(0, dtype=np.intp)
+        rest = end.arc_length - self._dabs[-1].arc_length
+        if rest > 1e-3 * self._spacing:
+            self._dabs.append(end)
+        self._dabs.append(self._dabs[-1])  # the end has no later dab
+        changed = self._draw()
+        self._end = None
+        self._start_arc_length = end.arc_length + 2 * PASS_GAP * self._brush.radius
+        return changed
+
+    def _add_dabs_to(self, point: np.ndarray, pressure: float) -> None:
+        """Add dabs at even distances on the way to a point."""
+        if self._end is None:
+            self._end = _Dab(point, pressure, self._start_arc_length)
+            self._dabs = [self._end, self._end]  # the start has no earlier dab
+            return
+        start = self._end
+        length = float(np.linalg.norm(point - start.position))
+        if not length <= MAX_DABS * self._spacing:
+            raise RosyError(
+                f"{self._surface.name}: the stroke has a point far away from the surface, at "
+                f"({', '.join(f'{value:.4g}' for value in point)}): remove it"
+            )
+        arc_length = self._dabs[-1].arc_length + self._spacing
+        while arc_length <= start.arc_length + length:
+            t = (arc_length - start.arc_length) / max(length, 1e-300)
+            position = (1 - t) * start.position + t * point
+            value = (1 - t) * start.pressure + t * pressure
+            self._dabs.append(_Dab(position, value, arc_length))
+            arc_length += self._spacing
+        self._end = _Dab(point, pressure, start.arc_length + length)
+
+    def _draw(self) -> np.ndarray:
+        """Draw the segments whose ends both have an earlier and a later dab. Return the faces near the segments."""
+        dabs = self._dabs
+        if len(dabs) < 4 and not (len(dabs) == 3 and dabs[1] is dabs[2]):
+            return np.empty(0, dtype=np.intp)
+        positions = np.array([dab.position for dab in dabs])
+        tangents = normalize(positions[2:] - positions[:-2])
+        inner = positions[1:-1]
+        faces = [self._locate(inner * sign) for sign in self._signs]
+        near = [
+            self._near_faces(inner * sign, located)
+            for sign, located in zip(self._signs, faces, strict=True)
+        ]
+        for first in range(max(len(inner) - 1, 1)):
+            segment = slice(first, first + 2)
+            for sign, candidates, located in zip(self._signs, near, faces, strict=True):
+                self._draw_segment(
+                    candidates,
+                    inner[segment] * sign,
+                    tangents[segment] * sign,
+                    dabs[1:-1][segment],
+                    located[segment],
+                )
+        self._dabs = dabs[-3:]
+        return np.unique(np.concatenate(near))
+
+    def _near_faces(self, positions: np.ndarray, located: np.ndarray) -> np.ndarray:
+        """Return the faces that dabs at (n, 3) positions on (n,) located faces may reach."""
+        low, high = positions.min(axis=0), positions.max(axis=0)
+        center = self._surface.face_center
+        excess = np.maximum(np.maximum(low - center, center - high), 0)
+        is_near = dot(excess, excess) < self._brush.radius**2
+        is_near[located[located >= 0]] = True
+        return np.flatnonzero(is_near)
+
+    def _draw_segment(
+        self,
+        near: np.ndarray,
+        positions: np.ndarray,
+        tangents: np.ndarray,
+        dabs: Sequence[_Dab],
+        located: np.ndarray,
+    ) -> None:
+        """Draw between two dabs, or at one."""
+        brush, normal = self._brush, self._surface.face_normal
+        on_face = located[located >= 0]
+        if not len(on_face):
+            return
+        start, along = positions[0], positions[-1] - positions[0]
+        offset = self._surface.face_center[near] - start
+        t = np.clip(offset @ along / max(float(along @ along), 1e-300), 0, 1)
+        offset -= t[:, None] * along
+        distance = np.sqrt(dot(offset, offset))
+        is_on_face = np.isin(near, on_face)
+        is_reached = is_on_face | (distance < brush.radius)
+        if brush.front_faces:
+            is_reached &= normal[near] @ normal[on_face].sum(axis=0) > 0
+        direction = (1 - t)[:, None] * tangents[0] + t[:, None] * tangents[-1]
+        x, y = self._system.averages.x[near], self._system.averages.y[near]
+        member = np.hypot(dot(direction, x), dot(direction, y))
+        if brush.effect == "comb":
+            is_reached &= member > MIN_PROJECTION
+        face, t, distance = near[is_reached], t[is_reached], distance[is_reached]
+        if not len(face):
+            return
+        pressure = (1 - t) * dabs[0].pressure + t * dabs[-1].pressure
+        # A face under the brush is reached even if its center is far away.
+        effect = brush.falloff(np.where(is_on_face[is_reached], 0.0, distance))
+        if not (brush.is_exact and brush.effect == "comb"):
+            effect *= brush.strength * pressure
+        arc_length = dabs[-1].arc_length
+        if brush.effect == "smooth":
+            mean = self._system.neighbor_means(self.guides, face)
+            self._store(face, self.guides[face] + effect * (mean - self.guides[face]))
+            return
+        self._begin_passes(face, arc_length)
+        self._coverage[face] = np.maximum(self._coverage[face], effect)
+        if brush.effect == "erase":
+            self._store(face, (1 - self._coverage[face]) * self._base[face])
+        else:
+            self._comb(face, distance, direction[is_reached])
+
+    def _begin_passes(self, face: np.ndarray, arc_length: float) -> None:
+        """Begin a new pass over faces that the stroke left some arc length ago, or has never reached."""
+        is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * self._brush.radius]
+        self._last_arc_length[face] = arc_length
+        self._base[is_new] = self.guides[is_new]
+        self._least_distance[is_new] = np.inf
+        self._coverage[is_new] = 0
+
+    def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
+        """Turn guides to directions of the stroke, unless a nearer part of it has done so."""
+        is_closest = distance <= self._least_distance[face]
+        face = face[is_closest]
+        self._least_distance[face] = distance[is_closest]
+        target = to_representation(
+            normalize(direction[is_closest]),
+            self._system.averages.x[face],
+            self._system.averages.y[face],
+            self._system.degree,
+        )
+        target *= (1.0 if self._brush.is_exact else SOFT_FIRMNESS) / np.abs(target)
+        coverage = self._coverage[face]
+        self._store(face, (1 - coverage) * self._base[face] + coverage * target)
+
+    def _store(self, face: np.ndarray, guides: np.ndarray) -> None:
+        guides[np.abs(guides) < LEAST_FIRMNESS] = 0
+        self.guides[face] = guides

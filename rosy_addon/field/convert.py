@@ -39,7 +39,7 @@ class Conversion:
         Distance relative to `Surface.extent` up to which singularities with opposite indices are cancelled; 0
         for none.
     magnitude : str, (F,) ndarray or None
-        One of `generate.MAGNITUDES`, or values; None to keep the magnitudes.
+        One of `curvature.MAGNITUDES`, or values; None to keep the magnitudes.
     """
 
     degree: int | None = None

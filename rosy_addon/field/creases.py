@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import report
 from .blocks import mask
 from .connectivity import Edges, build_edges, connected_components
 from .frames import angle_between, dot, normalize
@@ -55,9 +55,6 @@ FILTER_RINGS = 4
 #: Smallest crease angle in radians, below which normals differ by rounding only.
 MIN_CREASE_ANGLE = 1e-3
 
-#: Label of the progress.
-LABEL = "finding creases"
-
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     """Return the value at which half of the total weight is reached; 0 without any weight."""
@@ -91,7 +88,6 @@ def filtered_normals(
     ----------
     Zheng, Fu, Au and Tai, "Bilateral Normal Filtering for Mesh Denoising", TVCG 2011.
     """
-    label = "filtering normals"
     face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
     corner_vertex, face_start = surface.corner_vertex, surface.face_start
     unfiltered = normals = surface.face_normal
@@ -105,13 +101,11 @@ def filtered_normals(
     vectors = face_area_vectors(surface.vertices, corner_vertex, face_start)
     area = np.sqrt(dot(vectors, vectors))
     area /= max(float(area.max(initial=0.0)), 1e-300)
-    for index in range(FILTER_ROUNDS):
-        report(index / FILTER_ROUNDS, label)
+    for _ in range(FILTER_ROUNDS):
         normal_a, normal_b = normals[face_a], normals[face_b]
         difference = normal_a - normal_b
         weight = np.exp(dot(difference, difference) * (-0.5 / FILTER_WIDTH**2))
         weight_a, weight_b = weight * area[face_b], weight * area[face_a]
-        report((index + 0.5) / FILTER_ROUNDS, label)
         total = normals * area[:, None]
         for axis in range(3):
             total[:, axis] += np.bincount(face_a, weight_a * normal_b[:, axis], len(area))
@@ -215,7 +209,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
         Borders and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
-    report(0.0, LABEL)
+    report(0.0, "finding creases")
     edges = build_edges(surface.corner_vertex, surface.face_start)
     sides = surface.corner_face[edges.halfedges].T
     # Smaller angles have no effect.
@@ -224,8 +218,7 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
     if angle.max(initial=0.0) < crease_angle:
         return none
     region = _faces_near(surface, edges.ends[edges.interior[angle >= crease_angle]])
-    with progress(0.4, 0.8, LABEL):
-        normals, noise_angle = filtered_normals(surface, edges, region)
+    normals, noise_angle = filtered_normals(surface, edges, region)
     ends = edges.ends[edges.interior]
     vector = surface.vertices[ends[:, 0]] - surface.vertices[ends[:, 1]]
     length = np.sqrt(dot(vector, vector))

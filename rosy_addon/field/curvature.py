@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.errors import RosyError
-from ..core.progress import progress, report
+from ..core.progress import report
 from .corner_fans import corner_angles, corner_rotations, smooth_face_values
 from .frames import dot
 from .polygon_arrays import sum_per_face
@@ -45,10 +45,10 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
     if kind == "unit":
         return np.ones(surface.face_count)
     if kind == "confidence":
-        field = curvature_field(surface, 4)
-        return field.magnitude
+        return curvature_field(surface, 4).magnitude
     if kind != "curvature":
         raise RosyError(f"unknown magnitude '{kind}': choose {', '.join(MAGNITUDES)}")
+    report(0.0, "computing curvature")
     smooth_surface = with_smooth_normals(surface)
     x, y = face_frames(smooth_surface)
     mean, deviator = face_curvature(smooth_surface, x, y)
@@ -57,16 +57,15 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
 
 def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) -> Surface:
     """Return the surface with normals that are smooth within the given fans, or else everywhere."""
-    with progress(0.0, 0.3, "averaging normals"):
-        return build_surface(
-            surface.vertices,
-            surface.corner_vertex,
-            surface.face_start,
-            name=surface.name,
-            corner_fan=corner_fan,
-            triangles=surface.triangles,
-            triangle_face=surface.triangle_face,
-        )
+    return build_surface(
+        surface.vertices,
+        surface.corner_vertex,
+        surface.face_start,
+        name=surface.name,
+        corner_fan=corner_fan,
+        triangles=surface.triangles,
+        triangle_face=surface.triangle_face,
+    )
 
 
 def curvature_field(surface: Surface, degree: int) -> RosyField:

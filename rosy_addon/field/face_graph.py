@@ -289,7 +289,7 @@ class TriangleGraph:
         return turn - mean[face]
 
     def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
-        """Return a graph whose edges between faces resist angles more, by (I,) factors of at least 1.
+        """Return a graph in which angles across edges between faces cost more, by (I,) factors of at least 1.
 
         Edges within faces get the largest factor of the edges around their face. Negative conductances are
         raised, because the matrix might become indefinite.

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.progress import progress
 from .connection import build_connection
 from .connectivity import Edges, build_edges, smooth_fans
 from .creases import filtered_normals, salient_edges, weighted_median
@@ -23,16 +22,12 @@ SCALE = 0.01
 #: Ratio of curvature and noise below which there is no feature.
 MIN_NOISE_RATIO = 2.0
 
-
 #: Seed of the sample of noise.
 SEED = 777
 
 #: Displacement at which the effect of noise on the normals is measured, relative to the square root
 #: of the mean face area. It must be small.
 PROBE = 1e-3
-
-#: Label of the progress.
-LABEL = "measuring features"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,25 +68,19 @@ def of_unit_extent(surface: Surface) -> Surface:
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
     """Measure the curvature of a surface, without and with a sample of its noise."""
     edges = build_edges(surface.corner_vertex, surface.face_start)
-    with progress(0.1, 0.4):
-        normals, noise_angle = filtered_normals(surface, edges)
+    normals, noise_angle = filtered_normals(surface, edges)
     ends = salient_edges(surface, edges, normals, noise_angle)
     noise = noise_sample(surface, edges, noise_angle)
     fans = smooth_fans(
         surface.vertices, surface.corner_vertex, surface.face_start, sharp_edges=ends
     )
     x, y = face_frames(surface)
-    with progress(0.6, 0.7, LABEL):
-        mean, deviator = _bounded_curvature(surface, fans, x, y)
+    mean, deviator = _bounded_curvature(surface, fans, x, y)
     noisy = surface.with_parts(vertices=surface.vertices + noise)
     normal = noisy.face_normal
     x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
-    with progress(0.7, 0.8, LABEL):
-        mean_noisy, deviator_noisy = _bounded_curvature(
-            noisy, fans, x_noisy, np.cross(normal, x_noisy)
-        )
-    with progress(0.8, 1.0, LABEL):
-        averages = SurfaceAverages(surface, build_connection(surface), x, y)
+    mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, x_noisy, np.cross(normal, x_noisy))
+    averages = SurfaceAverages(surface, build_connection(surface), x, y)
     return NoisyCurvature(
         ends, averages, mean, deviator, mean_noisy - mean, deviator_noisy - deviator
     )
@@ -184,31 +173,25 @@ def feature_curvature(surface: Surface) -> np.ndarray:
         Units of 1 / length in object space. 0 is flat.
     """
     if surface.rest_vertices is not None:
-        with progress(0.0, 0.05):
-            surface = with_smooth_normals(surface.in_rest_shape())
+        surface = with_smooth_normals(surface.in_rest_shape())
     if not surface.face_normal.any():
         return np.zeros((len(surface.triangles), 3), dtype=np.float32)
     extent, surface = surface.extent, of_unit_extent(surface)
-    with progress(0.05, 0.75):
-        measured = noisy_curvature(surface)
+    measured = noisy_curvature(surface)
     averages = measured.averages
     scalar, line = averages.laplacian(0), averages.laplacian(2)
     area = SCALE**2
-    results = []
-    for matrix, values, order in (
-        (scalar, measured.mean, 0),
-        (line, measured.deviator, 2),
-        (scalar, measured.mean_noise, 0),
-        (line, measured.deviator_noise, 2),
-    ):
-        sums, start = averages.node_sums(values, order), 0.8 + 0.04 * len(results)
-        with progress(start, start + 0.04):
-            results.append(averages.smooth(matrix, area, sums))
-    mean, deviator, mean_noise, deviator_noise = map(np.abs, results)
+    mean, mean_noise = (
+        np.abs(averages.smooth(scalar, area, averages.node_sums(values, 0)))
+        for values in (measured.mean, measured.mean_noise)
+    )
+    deviator, deviator_noise = (
+        np.abs(averages.smooth(line, area, averages.node_sums(values, 2)))
+        for values in (measured.deviator, measured.deviator_noise)
+    )
     curvature = mean + deviator
     power = averages.mass * (mean_noise + deviator_noise) ** 2
-    with progress(0.96, 1.0):
-        power = averages.smooth(scalar, 16 * area, power)
+    power = averages.smooth(scalar, 16 * area, power)
     signal = curvature**2 - MIN_NOISE_RATIO**2 * np.maximum(power, 0.0)
     curvature = np.sqrt(np.maximum(signal, 0.0)) / extent
     return curvature.astype(np.float32)[averages.connection.corner_node].reshape(-1, 3)

@@ -113,12 +113,10 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
     deviators = [averages.node_sums(d, 2) for d in (measured.deviator, measured.deviator_noise)]
     z = z_noise = None
     for index, scale in enumerate(SCALES):
+        report(index / len(SCALES), "averaging curvature")
         area = scale**2
-        start = 0.2 * index
-        with progress(start, start + 0.1):
-            z = averages.smooth(matrix, area, deviators[0], z)
-        with progress(start + 0.1, start + 0.2):
-            z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
+        z = averages.smooth(matrix, area, deviators[0], z)
+        z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
         # The phase of a deviator is twice the angle of a line, so its square has four times the angle of a
         # cross.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
@@ -126,11 +124,9 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
         clear = averages.mass * modulus / (modulus + 1)
         if weighted_median(turn, clear) <= MAX_TURN:
             break
-    with progress(0.85, 0.9):
-        mean = averages.smooth(flat_matrix, area, averages.node_sums(measured.mean, 0))
+    mean = averages.smooth(flat_matrix, area, averages.node_sums(measured.mean, 0))
     power = averages.mass * np.abs(z_noise) ** 2
-    with progress(0.9, 0.95):
-        power = averages.smooth(flat_matrix, 4 * area, power)
+    power = averages.smooth(flat_matrix, 4 * area, power)
     power = np.maximum(power, 0.0) * CLEAR_RATIO**2
     modulus = np.abs(z)
     curvature = np.maximum(np.abs(mean), modulus) + FLAT_CURVATURE

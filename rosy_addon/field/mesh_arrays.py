@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import RosyError, RosyWarning
-from ..core.progress import progress
 from .formats.polygons import Polygons, offsets_from_sizes
 from .mesh_io import READERS, read_polygons
 
@@ -95,8 +94,7 @@ def mesh_arrays(
         if arrays.note:
             warnings.warn(arrays.note, RosyWarning, stacklevel=3)
     elif is_path:
-        with progress(0.0, 0.5):
-            arrays = MeshArrays(*read_polygons(vertices, tuple(SIMULATION_READERS)))
+        arrays = MeshArrays(*read_polygons(vertices, tuple(SIMULATION_READERS)))
     elif faces is None:
         arrays = _arrays_of(vertices, name)
     else:

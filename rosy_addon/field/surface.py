@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
-from ..core.progress import progress, report
 from .blocks import mask, row_blocks
 from .connectivity import build_edges, smooth_fans
 from .frames import dot, normalize
@@ -153,15 +152,14 @@ class Surface:
         if up not in UP_AXIS_MATRIX:
             raise RosyError(f"{name}: up is {up!r}: choose 'y' or 'z'")
         arrays = mesh_arrays(vertices, faces, name, uv, step)
-        with progress(0.5, 1.0):
-            built = build_surface(
-                arrays.vertices,
-                arrays.corner_vertex,
-                arrays.face_start,
-                name=name,
-                sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
-                sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
-            )
+        built = build_surface(
+            arrays.vertices,
+            arrays.corner_vertex,
+            arrays.face_start,
+            name=name,
+            sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
+            sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
+        )
         own = vars(self)
         own.update(vars(built), up=up, _path=Path(vertices) if is_path else None)
         given = {"uv": arrays.uv, "vertex_data": arrays.vertex_data, "face_data": arrays.face_data}
@@ -354,16 +352,12 @@ def build_surface(
     corner_vertex = np.ascontiguousarray(corner_vertex, dtype=np.int32).ravel()
     face_start = np.ascontiguousarray(face_start, dtype=np.int32).ravel()
     _check_polygons(name, vertices, corner_vertex, face_start)
-    report(0.1, "reading the mesh")
     if triangles is None:
-        with progress(0.1, 0.3):
-            triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
+        triangles, triangle_face = triangulate(vertices, corner_vertex, face_start)
     if corner_fan is None:
-        report(0.3, "finding smooth edges")
         corner_fan = smooth_fans(
             vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
         )
-    report(0.8, "computing normals")
     if corner_normal is None:
         corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
     return _surface_of_parts(

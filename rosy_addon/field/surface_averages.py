@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core.progress import report
 from .connection import BLOCK_TRIANGLES, Connection, laplacian
 from .frames import dot
 from .representation import complex_bincount
@@ -170,8 +169,7 @@ class SurfaceAverages:
         residual = right - apply(solution)
         limit = AVERAGE_TOLERANCE**2 * np.vdot(right, right / diagonal).real
         direction, previous = np.zeros_like(right), np.float32(1.0)
-        for step in range(MAX_STEPS):
-            report(1 - 0.95**step, "averaging curvature")
+        for _ in range(MAX_STEPS):
             preconditioned = residual / diagonal
             current = np.vdot(residual, preconditioned).real
             if current <= limit:

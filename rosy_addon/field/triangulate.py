@@ -6,16 +6,11 @@ import heapq
 
 import numpy as np
 
-from ..core.progress import report
-
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
 
 #: Corners that are compared with a triangle at once.
 CHUNK_SIZE = 512
-
-#: Label of the progress.
-LABEL = "triangulating the mesh"
 
 #: Faces whose corners are compared at once.
 FACES_PER_BLOCK = 1 << 14
@@ -54,12 +49,9 @@ def triangulate(
     apex = np.zeros(len(size), dtype=np.int32)
     faces = np.flatnonzero(size > 3)
     apex[faces], needs_ears = _fan_apexes(vertices, corner_vertex, face_start, faces)
-    ear_faces = faces[needs_ears]
-    report(0.7, LABEL)
     triangles, triangle_face = _triangle_fans(face_start, apex)
     first_triangle = np.cumsum(size - 2) - (size - 2)
-    for rank, face in enumerate(ear_faces):
-        report(0.8 + 0.2 * rank / len(ear_faces), LABEL)
+    for face in faces[needs_ears]:
         corners = np.arange(face_start[face], face_start[face + 1])
         ears = _ear_clip(_project_to_plane(vertices[corner_vertex[corners]]))
         first = first_triangle[face]

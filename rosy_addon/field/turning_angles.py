@@ -200,7 +200,7 @@ def least_angles(
 def potential_solver(
     graph: FaceGraph, tolerance: float = TOLERANCE
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that computes the (n,) potential with (n,) sums around the interior nodes."""
+    """Return a solver: from (n,) sums of angles around the interior nodes, it computes the (n,) potential."""
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):

@@ -108,7 +108,7 @@ def validated_field(
 
 
 def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
-    """Return the domain of a number of vectors. Raise an error if they are too many or too few for it."""
+    """Return the domain of a number of vectors, or raise an error if the number does not fit."""
     domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
     if count != {"face": faces, "vertex": vertices}.get(domain):

@@ -6,8 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.cache import BAKE_CACHE
-from ..field.combing import Combing, start_combing
-from ..field.guide_brush import BrushStroke, GuideBrush
+from ..field.combing import BrushStroke, Combing, GuideBrush, start_combing
 from ..field.guided_system import guided_system
 from ..field.rosy_field import RosyField
 from ..scene.brush_surface import closest_faces

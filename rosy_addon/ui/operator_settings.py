@@ -60,6 +60,7 @@ def draw_generator_settings(layout: bpy.types.UILayout, settings: Any) -> None:
             name for name in inputs if _GUIDE_OF_INPUT.get(name, "") in {"", *settings.guides}
         )
     options = options_of(settings.kind)
+    # The angle applies to edges by angle alone, also if these are guides.
     if "edges" in inputs and settings.edges == "FEATURES":
         options = ["sharp_angle", *(name for name in options if name != "sharp_angle")]
     elif "sharp_angle" in options:

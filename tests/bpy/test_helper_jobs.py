@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.field.guide_brush import GuideBrush
+from rosy.rosy_addon.field.combing import GuideBrush
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.jobs.bake_texture import bake_texture

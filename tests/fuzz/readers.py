@@ -20,7 +20,7 @@ import numpy as np
 with atheris.instrument_imports(include=["rosy_addon"]):
     from rosy_addon.core.errors import RosyError
     from rosy_addon.field.field_io import READ_SUFFIXES, load_field
-    from rosy_addon.field.formats.guide_strokes import read_guide_strokes
+    from rosy_addon.field.formats.plain import read_guide_strokes
     from rosy_addon.field.formats.sings import read_sings
     from rosy_addon.field.mesh_io import READERS
     from rosy_addon.field.surface import Surface, build_surface

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from awkward import AWKWARD
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 from shapes import from_triangles
 
+from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.field_io import load_field
-from rosy_addon.field.representation import face_frames, to_representation
+from rosy_addon.field.representation import face_frames, from_representation, to_representation
+from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import build_surface
 
 
@@ -43,6 +46,27 @@ def copies_of(surface, scale=3.0):
     yield from_triangles(surface.vertices, np.roll(triangles, 1, axis=1)), np.eye(3)
     rotation = Rotation.from_rotvec([0.3, 1.0, -0.4]).as_matrix()
     yield from_triangles(scale * surface.vertices @ rotation.T + (1, 2, 3), triangles), rotation
+
+
+def awkward_surface(name):
+    """One of the meshes of `awkward.AWKWARD`."""
+    points, faces = AWKWARD[name]()
+    starts = np.cumsum([0, *map(len, faces)])
+    return build_surface(points, np.concatenate(faces), starts, name=name)
+
+
+def random_field(surface, degree, seed=0):
+    """A field of random directions, and of random magnitudes from 0.5 to 1."""
+    random = np.random.default_rng(seed)
+    z = random.uniform(0.5, 1.0, surface.face_count)
+    z = z * np.exp(2j * np.pi * random.random(surface.face_count))
+    return RosyField(degree, from_representation(z, *face_frames(surface), degree))
+
+
+def with_random_members(surface, field, seed=0):
+    """The same RoSys, with a random member of each stored."""
+    member_index = np.random.default_rng(seed).integers(0, field.degree, surface.face_count)
+    return rotate_field(surface, field, 2 * np.pi * member_index / field.degree)
 
 
 def read_field(*arguments, **settings):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
+from ..blocks import row_blocks
 
 #: Rows and words of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
@@ -138,13 +139,13 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lines = data.split(b"\n")
-    has_comments = comment is not None and comment in data
+    if comment is not None and comment in data:
+        lines = [line.partition(comment)[0] for line in lines]
     # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
     for number, line in enumerate(lines, 1):
-        text = line.partition(comment)[0] if has_comments else line
-        if line_words := tuple(text.split()):
+        if line_words := tuple(line.split()):
             words.append(line_words)
             line_numbers.append(number)
     return TextRows(path, words, line_numbers)
@@ -163,4 +164,8 @@ def format_rows(rows: np.ndarray) -> list[str]:
 
 def format_lines(rows: np.ndarray, prefix: str = "") -> str:
     """Format (n, k) numbers as lines of text with a prefix; see `format_rows`."""
-    return "".join([f"{prefix}{line}\n" for line in format_rows(rows)])
+    # Strings of single rows take much more memory than the text, so they are joined block by block.
+    blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
+    return "".join(
+        "".join([f"{prefix}{line}\n" for line in format_rows(rows[block])]) for block in blocks
+    )

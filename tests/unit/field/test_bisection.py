@@ -5,21 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from awkward import AWKWARD
+from field_helpers import awkward_surface
 from shapes import cube, icosphere
 
 from rosy_addon.field.bisection import bisect
-from rosy_addon.field.surface import build_surface
 
 MESHES = [*AWKWARD, "sphere"]
 
 
 def triangles_of(name):
-    if name == "sphere":
-        surface = icosphere(1)
-    else:
-        points, faces = AWKWARD[name]()
-        starts = np.cumsum([0, *map(len, faces)])
-        surface = build_surface(points, np.concatenate(faces), starts, name=name)
+    surface = icosphere(1) if name == "sphere" else awkward_surface(name)
     return surface.vertices, surface.triangle_vertex
 
 

@@ -8,10 +8,9 @@ from scipy.spatial import cKDTree
 from shapes import from_quads, icosphere, plane, torus
 
 from rosy_addon.core.errors import RosyError
-from rosy_addon.field.combing import Combing, start_combing
+from rosy_addon.field.combing import BrushStroke, Combing, GuideBrush, start_combing
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
-from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
 from rosy_addon.field.guided_system import guided_system
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities

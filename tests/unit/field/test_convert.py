@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from field_helpers import with_random_members
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane, torus
@@ -29,13 +30,6 @@ from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
 
 BALL = icosphere(3)
-
-
-def with_random_members(surface, field, seed=0):
-    """The same RoSys, with a random member of each stored."""
-    random = np.random.default_rng(seed)
-    member_index = random.integers(0, field.degree, surface.face_count)
-    return rotate_field(surface, field, 2 * np.pi * member_index / field.degree)
 
 
 # --- degrees -------------------------------------------------------------------------------------

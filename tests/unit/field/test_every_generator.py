@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from awkward import AWKWARD
 from conftest import long
+from field_helpers import bumpy, read_field
+from shapes import torus
 
 from rosy_addon.cli.parser import main
-from rosy_addon.field.generate import GENERATORS
+from rosy_addon.core.errors import RosyError
+from rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate, options_of
+from rosy_addon.field.surface import Surface
 
 #: Degrees in which the edges around each square, or each equilateral triangle, cancel.
 CANCELLED = {"cube": (1, 3), "faces_without_area": (1, 4)}
@@ -70,3 +74,33 @@ def test_every_kind_on_every_mesh(meshes, tmp_path, capsys, kind, name, degree):
     if kind in ("form", "smoothest"):
         assert facts["undefined_faces"] == degenerate_count
     assert facts["undefined_faces"] >= degenerate_count
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "options"),
+    [
+        ("axis", ["--axis", "-1,0.5,2"], {"axis": (-1.0, 0.5, 2.0)}),
+        ("curvature", ["--reach", "0.1"], {"reach": 0.1}),
+        ("features", ["--sharp-angle", "10"], {"sharp_angle": np.radians(10)}),
+    ],
+)
+def test_options_of_the_command_line(kind, words, options, tmp_path):
+    """They are the settings of these names; angles are in degrees."""
+    surface = bumpy(torus(24, 12))
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices.tolist()]
+    rows += ["f {} {} {} {}".format(*(face + 1)) for face in surface.corner_vertex.reshape(-1, 4)]
+    mesh, out = tmp_path / "a.obj", tmp_path / "a.rosy"
+    mesh.write_text("\n".join(rows) + "\n")
+    assert main(["field", str(mesh), "-o", str(out), "--generate", kind, *words]) == 0
+    surface = Surface(mesh)
+    settings = GeneratorSettings(kind, **options)
+    expected = generate(surface, settings, 4).vectors
+    assert np.array_equal(read_field(out, surface).vectors, expected)
+    assert list(options) == options_of(kind)
+
+
+def test_options_out_of_range_are_refused():
+    for options in ({"reach": -0.1}, {"reach": np.nan}, {"sharp_angle": 4.0}, {"axis": (1.0, 2.0)}):
+        (name,) = options
+        with pytest.raises(RosyError, match=f"setting '{name}' is"):
+            GeneratorSettings("curvature", **options)

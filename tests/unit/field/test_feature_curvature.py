@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from awkward import AWKWARD
+from field_helpers import awkward_surface
 from shapes import cube, cylinder, icosphere, plane, torus
 
-from rosy_addon.field.feature_curvature import feature_curvature as field_feature_curvature
+from rosy_addon.field.feature_curvature import feature_curvature
 from rosy_addon.field.surface import build_surface
-
-
-def feature_curvature(surface):
-    return field_feature_curvature(surface)
 
 
 def with_noise(surface, share):
@@ -66,9 +63,7 @@ def test_a_deformation_changes_nothing():
 
 @pytest.mark.parametrize("name", AWKWARD)
 def test_awkward_meshes(name):
-    points, faces = AWKWARD[name]()
-    starts = np.cumsum([0, *map(len, faces)])
-    surface = build_surface(points, np.concatenate(faces), starts)
+    surface = awkward_surface(name)
     curvature = feature_curvature(surface)
     assert curvature.shape == (len(surface.triangles), 3)
     assert np.isfinite(curvature).all() and (curvature >= 0).all()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from field_helpers import random_field, with_random_members
 from hypothesis import given
 from hypothesis import strategies as st
 from shapes import cube, cylinder, from_quads, from_triangles, icosphere, plane, torus
@@ -30,23 +31,6 @@ from rosy_addon.field.surface import build_surface
 
 coordinate = st.floats(-1, 1, allow_nan=False)
 vector = st.tuples(coordinate, coordinate, coordinate).filter(lambda v: np.linalg.norm(v) > 0.1)
-
-
-def with_other_members(field: RosyField, surface, member_index) -> RosyField:
-    """The same field, with another member stored on each face."""
-    normal = surface.face_normal
-    angle = (2 * np.pi / field.degree * member_index)[:, None]
-    vectors = np.cos(angle) * field.vectors + np.sin(angle) * np.cross(normal, field.vectors)
-    return RosyField(field.degree, vectors)
-
-
-def random_field(surface, degree, seed=0) -> RosyField:
-    rng = np.random.default_rng(seed)
-    x, y = face_frames(surface)
-    angle = rng.uniform(-np.pi, np.pi, surface.face_count)[:, None]
-    return RosyField(
-        degree, (np.cos(angle) * x + np.sin(angle) * y) * rng.uniform(0.5, 2, (len(x), 1))
-    )
 
 
 @given(vector, vector, coordinate)
@@ -155,8 +139,7 @@ def test_a_planar_singularity_has_its_index(degree, sign):
 def test_results_do_not_depend_on_the_stored_member(degree):
     surface = torus(20, 12)
     field = random_field(surface, degree)
-    member_index = np.random.default_rng(3).integers(0, degree, surface.face_count)
-    other = with_other_members(field, surface, member_index)
+    other = with_random_members(surface, field, 3)
     assert np.allclose(face_representation(surface, field), face_representation(surface, other))
     for a, b in zip(
         find_singularities(surface, field), find_singularities(surface, other), strict=True

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from field_helpers import random_field
 from shapes import icosphere, plane, torus
 
 from rosy_addon.core.errors import RosyError
@@ -27,14 +28,6 @@ from rosy_addon.projection.field_channel import REPRESENTATION
 @pytest.fixture(scope="module")
 def surface():
     return torus()
-
-
-def random_field(surface, degree, seed=0):
-    rng = np.random.default_rng(seed)
-    z = rng.uniform(0.5, 1.0, surface.face_count) * np.exp(
-        2j * np.pi * rng.random(surface.face_count)
-    )
-    return RosyField(degree, from_representation(z, *face_frames(surface), degree))
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])

@@ -15,13 +15,9 @@ import rosy_addon as rf
 from rosy_addon.cli.parser import main
 
 
-def surface_of(mesh, **options):
-    return rf.Surface(mesh.vertices, np.split(mesh.corner_vertex, mesh.face_start[1:-1]), **options)
-
-
 @pytest.fixture(scope="module")
 def sphere():
-    return surface_of(icosphere(2), name="sphere")
+    return icosphere(2).with_parts(name="sphere")
 
 
 def members(surface, vectors, degree):
@@ -35,7 +31,7 @@ def members(surface, vectors, degree):
 @pytest.mark.parametrize("degree", range(1, 8))
 def test_angles_are_those_of_the_nearest_members(degree):
     """Every member of one field against every member of the other, face by face."""
-    surface = surface_of(torus(16, 10))
+    surface = torus(16, 10)
     one, other = rf.form(surface, degree), rf.along_axis(surface, (1, 2, 3), degree=degree)
     difference = rf.compare([one, other]).differences["field 2"]
     for face, (a, b) in enumerate(

@@ -74,7 +74,7 @@ def mesh_view(
 
 
 def check_light(light: str, name: str) -> None:
-    """Check that a look does not use the lights of a scene, for a mesh that is not in a scene.
+    """Check that a mesh outside of a scene is not lit by the lights of a scene.
 
     Parameters
     ----------

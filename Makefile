@@ -111,7 +111,8 @@ test-wheel: .venv-dist/ready $$(WHEEL_VENV)/ready
 	$(WHEEL_VENV)/$(BIN)/python -m pip uninstall --quiet --yes rosyfields
 	$(WHEEL_VENV)/$(BIN)/python -m pip install --quiet build/wheel/tree/*.whl
 	cd .. && $(abspath $(WHEEL_VENV))/$(BIN)/python -P -m pytest $(abspath tests/wheel)
-	$(WHEEL_VENV)/$(BIN)/mypy --strict --config-file= --explicit-package-bases tests/wheel/every_name.py
+	cd build/wheel && $(abspath $(WHEEL_VENV))/$(BIN)/python -P $(abspath tests/wheel/examples.py) examples.py
+	$(WHEEL_VENV)/$(BIN)/mypy --strict --config-file= --explicit-package-bases build/wheel/examples.py
 
 test-extras: .venv-extras/ready
 	$(EXTRAS) $(PYTEST) $(or $(TESTS),tests/extras)

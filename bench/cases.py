@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -117,7 +117,7 @@ def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE
 
 def _without_cache(surface: Surface) -> Surface:
     """Return a copy without cached results."""
-    return Surface(**{entry.name: getattr(surface, entry.name) for entry in fields(surface)})
+    return surface.with_parts()
 
 
 def frame(

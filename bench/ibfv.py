@@ -25,7 +25,7 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
 from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import generate
-from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
@@ -93,7 +93,7 @@ def _next_frame(gbuffer: GBuffer, method: str) -> Callable[[], object]:
 
 def _seen_field(path: Path, degree: int) -> PixelField:
     """Return the smoothest field of a mesh, as a camera sees it."""
-    surface = read_mesh(path)
+    surface = Surface(path)
     instance = MeshInstance(surface, np.eye(4), generate(surface, "smoothest", degree))
     gbuffer = project(
         [instance], orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)

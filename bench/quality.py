@@ -28,7 +28,6 @@ from rosy_addon.compositor.pixel_field import (
 )
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import orbit_camera
@@ -199,12 +198,12 @@ def _on_torus(degree: int) -> list[PixelField]:
 
 
 def _on_bunny(data: Path) -> list[PixelField]:
-    surface = read_mesh(data / "meshes" / "stanford-bunny.obj")
+    surface = Surface(data / "meshes" / "stanford-bunny.obj")
     return _pixel_fields_of(surface, generate(surface, "curvature", 4))
 
 
 def _on_vase(data: Path, degree: int) -> list[PixelField]:
-    surface = read_mesh(data / "meshes" / "vase.off")
+    surface = Surface(data / "meshes" / "vase.off")
     return _pixel_fields_of(
         surface, load_field(data / "fields" / f"vase-{degree}.rawfield", surface).field
     )

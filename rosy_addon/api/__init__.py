@@ -1,29 +1,31 @@
-"""The functions and classes for scripts and notebooks; the commands for mesh files use them as well.
+"""Functions and classes for scripts, notebooks and the commands for mesh files.
 
-Angles are in radians, except those of a view, which are in degrees.
+Angles are in radians, except for the angles of a view, which are in degrees.
 
-    surface      `Surface`: a mesh from arrays, a file or another library
-    field        `Field`: a field on a surface; fields from arrays and files
+    field        fields from arrays and files
     generators   fields that are computed
     pictures     pictures and turntables
     films        films of fields that change with time
     comparison   how fields differ
-    figures      fields side by side, with their keys
+    figures      fields side by side, with their keys; `figure_panels` draws the pictures
     drawings     strokes
     textures     textures
 
-The names that are imported here are public; `rosy_addon.__all__` lists them.
+`Surface` and `Field` are classes of the room `field`, `Picture` of the room `compositor`. The names
+that are imported here are public; `rosy_addon.__all__` lists them.
 """
 
+from ..compositor.picture import Picture as Picture
 from ..core.errors import RosyError as RosyError
 from ..core.errors import RosyWarning as RosyWarning
+from ..field.field import Difference as Difference
+from ..field.field import Field as Field
+from ..field.field import Singularities as Singularities
+from ..field.surface import Surface as Surface
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .drawings import Drawing as Drawing
 from .drawings import strokes as strokes
-from .field import Difference as Difference
-from .field import Field as Field
-from .field import Singularities as Singularities
 from .field import from_angles as from_angles
 from .field import from_array as from_array
 from .field import from_directions as from_directions
@@ -42,11 +44,9 @@ from .generators import form as form
 from .generators import guided as guided
 from .generators import prescribed as prescribed
 from .generators import smoothest as smoothest
-from .pictures import Picture as Picture
 from .pictures import ambient_occlusion as ambient_occlusion
 from .pictures import list_presets as list_presets
 from .pictures import render as render
 from .pictures import turntable as turntable
-from .surface import Surface as Surface
 from .textures import Texture as Texture
 from .textures import texture as texture

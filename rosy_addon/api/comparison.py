@@ -17,9 +17,9 @@ from ..field.analysis import (
     format_degrees,
     match_on_surface,
 )
-from .field import Difference, Field
+from ..field.field import Difference, Field
 
-#: Characters that LaTeX would interpret, and what prints them.
+#: Replacements for characters that LaTeX interprets.
 _LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
     "\\": r"\textbackslash{}",
@@ -29,7 +29,7 @@ _LATEX = {
 
 
 class _Column(NamedTuple):
-    """A column of the table: its title, the key of its values, and what makes them texts."""
+    """A column of the table: its title, the key of its values, and the function that formats them."""
 
     title: str
     key: str
@@ -64,7 +64,7 @@ class Comparison:
         From the first field, by the titles of the others. Fields of another degree or on another surface
         have none.
     matchings : dict of str to SingularityMatching
-        Which singularities of the first field correspond to which of another one, in the same way.
+        Pairs of matching singularities of the first field and another one, by title.
 
     Examples
     --------
@@ -87,7 +87,7 @@ class Comparison:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """The facts of each field, with angles in degrees.
+        """Measurements of each field, with angles in degrees.
 
         Keys are title, degree, energy, singularities, positive and negative (how many there are), and
         for each field with a difference from the first: mean, rms, p95, max, worst_face, worst_position
@@ -110,7 +110,7 @@ class Comparison:
             return row
         difference, matching = self.differences[title], self.matchings[title]
         has_worst = difference.worst_face >= 0
-        center = field.surface.mesh.face_center
+        center = field.surface.face_center
         row |= {
             name: float(np.degrees(getattr(difference, name)))
             for name in ("mean", "rms", "p95", "max")
@@ -123,7 +123,7 @@ class Comparison:
         return row
 
     def cells(self) -> list[list[str]]:
-        """The table as texts: a row of titles, then one for each field; "-" where there is no value."""
+        """Return the table as texts: a row of titles, then one for each field; "-" for missing values."""
         columns = _COLUMNS + (_DIFFERENCE_COLUMNS if self.differences else ())
         cells = [["field", *(column.title for column in columns)]]
         for row in self.rows:
@@ -134,7 +134,7 @@ class Comparison:
         return cells
 
     def to_text(self) -> str:
-        """The table with columns of equal width, for a terminal."""
+        """Return the table with aligned columns, for a terminal."""
         cells = self.cells()
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
         lines = [
@@ -151,11 +151,11 @@ class Comparison:
         return "\n".join(lines)
 
     def to_json(self) -> str:
-        """The `rows` as a JSON array."""
+        """Return the `rows` as a JSON array."""
         return json.dumps(self.rows)
 
     def to_latex(self) -> str:
-        """The table as a ``tabular`` of LaTeX; it needs the package ``booktabs``."""
+        """Return the table as a ``tabular`` of LaTeX, which needs the package ``booktabs``."""
         cells = self.cells()
         lines = [" & ".join(map(_latex_text, row)) + r" \\" for row in cells]
         columns = "l" + "r" * (len(cells[0]) - 1)
@@ -172,7 +172,7 @@ class Comparison:
 
 
 def _latex_text(text: str) -> str:
-    """Return what prints a text in LaTeX; "--" for a missing value."""
+    """Return a text escaped for LaTeX; "--" for a missing value."""
     return "--" if text == "-" else "".join(_LATEX.get(letter, letter) for letter in text)
 
 
@@ -207,11 +207,11 @@ def compare(
     differences: dict[str, Difference] = {}
     matchings: dict[str, SingularityMatching] = {}
     for title, field in list(titled.items())[1:]:
-        if field.degree != reference.degree or field.surface.mesh is not reference.surface.mesh:
+        if field.degree != reference.degree or field.surface is not reference.surface:
             continue
         differences[title] = reference.difference(field)
         pair = reference.singularities, field.singularities
-        matchings[title] = match_on_surface(field.surface.mesh, *pair, reach)
+        matchings[title] = match_on_surface(field.surface, *pair, reach)
     return Comparison(titled, differences, matchings)
 
 

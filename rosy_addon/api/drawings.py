@@ -15,16 +15,16 @@ from ..compositor.shading import lights_of
 from ..core.errors import RosyError
 from ..core.file_io import write_bytes
 from ..core.settings import settings_of
+from ..field.field import Field
+from ..field.surface import Surface
+from ..field.up_axis import UP_AXIS_MATRIX
 from ..line_drawing.pipeline import StrokeDrawing, draw_instances
 from ..line_drawing.polyline_files import check_drawing_suffix, polyline_file
 from ..line_drawing.style import StrokeStyle
 from ..line_drawing.svg import Pen, svg_text
 from ..projection.camera import Camera, check_size, orbit_camera
-from ..projection.up_axis import UP_AXIS_MATRIX
 from ..rendering.mesh_view import check_light
-from .field import Field
 from .pictures import DEFAULT_SIZE, DEFAULT_VIEW, upright_instance
-from .surface import Surface
 
 
 class Drawing:
@@ -36,7 +36,7 @@ class Drawing:
     camera : rosyfields.projection.camera.Camera
     pen : rosyfields.line_drawing.svg.Pen
     up : {"y", "z"}
-        The upward axis of the mesh.
+        The axis of the mesh that points up.
 
     Examples
     --------
@@ -63,7 +63,7 @@ class Drawing:
 
     @cached_property
     def svg(self) -> str:
-        """The drawing as an SVG document, with a layer for each family of lines."""
+        """SVG document of the drawing, with a layer for each family of lines."""
         return svg_text(self._strokes, self._camera, self._pen, self._marks)
 
     def _repr_svg_(self) -> str:
@@ -71,12 +71,12 @@ class Drawing:
 
     @cached_property
     def polylines(self) -> list[NDArray[np.float64]]:
-        """The points of each stroke in world space, (n, 3), where z points up."""
+        """(n, 3) points of each stroke in world space, where z points up."""
         return np.split(self._strokes.points, self._strokes.start[1:-1])
 
     @property
     def family_names(self) -> list[str]:
-        """The family of each stroke: a line of the field, or a kind of outline."""
+        """Family of each stroke: a line of the field, or a kind of outline."""
         return [self._strokes.names[family] for family in self._strokes.family]
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -118,7 +118,7 @@ def strokes(
     Parameters
     ----------
     surface, field, view, size, orthographic
-        As for `render`. The length of a pixel follows from the size.
+        See `render`. The length of a pixel follows from the size.
     width : float
         Full width of a stroke in pixels.
     colors : sequence of str

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -13,29 +12,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..annotation.figure_parts import ColorBar
 from ..annotation.round_numbers import round_below
-from ..annotation.singularity_marks import SingularityMarks, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.color_values import value_ends, value_ranges
 from ..compositor.look import Look, colors_magnitude, colors_values, magnitude_range, uses_magnitude
 from ..compositor.look_units import scaled_look
-from ..core.cache import Cache
-from ..core.color import color_stops, map_colors
+from ..core.color import color_stops
 from ..core.errors import RosyError, counted
 from ..core.file_io import write_bytes
-from ..field.analysis import DEFAULT_REACH, format_degrees
-from ..image_io.png import to_srgb_uint8
+from ..field.analysis import DEFAULT_REACH
+from ..field.field import Field
 from ..projection.camera import Camera, orbit_basis, orbit_camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.visible_vertices import project_vertices
-from ..rendering.draw import draw_picture
-from ..rendering.view_input import ViewInput
 from .comparison import Comparison, compare, titled_fields
-from .field import Field
+from .figure_panels import Studio
 from .pictures import DEFAULT_VIEW, corner_numbers, picture_look, upright_instance
 
 if TYPE_CHECKING:
-    from ..external.matplotlib_figure import ColorBar, Figure, Panel, Row
+    from ..external.matplotlib_figure import Figure
 
 #: What a figure may have, from top to bottom.
 PARTS = ("fields", "differences", "table")
@@ -46,21 +41,17 @@ LINES = ("other", "first", "both")
 #: The resolution at which the lengths of the look are pixels. Lines are as wide in print at any other.
 LENGTH_DPI = 150
 
+#: The smallest and the largest width in inches, resolution, and angle in degrees.
+LIMITS = {"width": (0.5, 100.0), "dpi": (10, 2400), "largest_angle": (0.0, 360.0)}
+
 #: Limits of the height of a panel, relative to its width.
 MIN_ASPECT, MAX_ASPECT = 0.4, 1.6
 
 #: Panels side by side, unless the caller says how many; empty border of a panel, as a fraction.
 MAX_COLUMNS, MARGIN = 3, 0.02
 
-#: Largest part of a panel that the dots of singularities cover.
-MAX_DOT_SHARE = 0.06
-
 #: The files of figures.
 FIGURE_SUFFIXES = (".pdf", ".svg", ".png")
-
-#: The color map of differences, and where in it an angle of 0 and the largest one are: light and dark, but
-#: not so dark that lines vanish.
-DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
 
 
 def figure(
@@ -91,8 +82,7 @@ def figure(
     Parameters
     ----------
     fields : Field, sequence of Field, mapping of str to Field, or Comparison
-        The keys of a mapping are the titles. Fields may be on different surfaces. A comparison that was made
-        before is not made again.
+        The keys of a mapping are the titles. Fields may be on different surfaces. A `Comparison` is used as it is.
     parts : sequence of {"fields", "differences", "table"}
         What to draw: the fields; the angle of each field to the first as a color, from 0 to 180/N
         degrees, with a cross at the largest, and the singularities of both; the table of `compare`.
@@ -104,14 +94,14 @@ def figure(
         Resolution of the pictures. Lines do not get thinner with it: lengths of the look are in
         pixels at 150 dpi.
     view, preset
-        As for `render`.
+        See `render`.
     orthographic : bool
         Whether the projection is orthographic; a scale bar needs it.
     color_values : str, or sequence of str or array_like, optional
-        Numbers that are shown as colors, as for `render`: for each field, or a name for all.
+        Numbers to show as colors (see `render`) for each field, or a name for all fields.
     color_label : str, optional
         What the color bar of the fields says: a quantity and its unit. By default the name of the numbers,
-        or "magnitude" if that is what is shown.
+        or "magnitude" if the colors show it.
     largest_angle : float
         Angle at the top of the color map of differences, in degrees; 0 for 180/N.
     lines : {"other", "first", "both"}
@@ -123,9 +113,9 @@ def figure(
     caption : str
         Below everything.
     workers
-        As for `render`.
+        See `render`.
     **settings
-        Settings of the look, as for `render`.
+        Settings of the look; see `render`.
 
     Returns
     -------
@@ -136,7 +126,8 @@ def figure(
     Raises
     ------
     RosyError
-        If matplotlib is not installed, there is no field or nothing to compare, or as `render`.
+        If matplotlib is not installed, there is no field or nothing to compare, or for the same reasons as
+        `render`.
 
     Examples
     --------
@@ -146,25 +137,14 @@ def figure(
     >>> page = rf.figure(methods, parts=("fields", "differences", "table"), dpi=60)  # doctest: +SKIP
     >>> page.savefig("torus.pdf")  # doctest: +SKIP
     """
-    load_drawing()
-    from ..external.matplotlib_figure import SCALE_BAR_SHARE, Page, panel_width
-
-    is_single = isinstance(fields, Field)
+    drawing = load_drawing()
     parts = (parts,) if isinstance(parts, str) else tuple(parts)
     comparison = _comparison_of(fields, parts, reach)
-    _check_parts(comparison, parts, lines)
     name = next(iter(comparison.fields.values())).surface.name
+    _check_parts(comparison, parts, lines)
+    _check_numbers(name, width=width, dpi=dpi, largest_angle=largest_angle)
     if not (orthographic or scale_bar is None):
         raise RosyError(f"{name}: a scale bar needs the orthographic projection")
-    for text, value, low, high in (
-        ("width", width, 0.5, 100.0),
-        ("dpi", dpi, 10, 2400),
-        ("largest_angle", largest_angle, 0.0, 360.0),
-    ):
-        if not low <= value <= high:
-            raise RosyError(
-                f"{name}: {text} is {value:g}: it must be a number from {low:g} to {high:g}"
-            )
     shown = {"singularity_dots": "visible", **settings}
     look = picture_look(name, preset, shown, {}, color_values is not None)
     instances = _instances(name, comparison.fields, color_values)
@@ -173,22 +153,25 @@ def figure(
         color_label = color_values if isinstance(color_values, str) else ""
         color_label = "magnitude" if colors_magnitude(look) else color_label
     color_bar = _color_bar(look, color_label)
-    count = len(instances)
-    columns = min(count, MAX_COLUMNS) if columns is None else max(columns, 1)
+    columns = min(len(instances), MAX_COLUMNS) if columns is None else max(columns, 1)
     has_key = shows_singularities(look) or color_bar is not None or "differences" in parts
-    pixels = panel_width(width, columns, has_key, dpi)
-    points = np.concatenate([instance.face_points() for instance in instances.values()])
-    size = pixels, max(round(pixels * _aspect(points, view)), 1)
-    camera = orbit_camera(points, *view, *size, perspective=not orthographic, margin=MARGIN)
-    studio = _Studio(comparison, instances, camera, look, workers)
+    camera = _panel_camera(
+        np.concatenate([instance.face_points() for instance in instances.values()]),
+        view,
+        drawing.panel_width(width, columns, has_key, dpi),
+        perspective=not orthographic,
+    )
+    studio = Studio(comparison, instances, camera, look, workers)
     rows = []
     if "fields" in parts:
-        rows.append(studio.field_row([""] if is_single else list(instances), color_bar))
+        titles = [""] if isinstance(fields, Field) else list(instances)
+        rows.append(studio.field_row(titles, color_bar))
     if "differences" in parts:
         rows.append(studio.difference_row(lines, largest_angle))
     table = comparison.cells() if "table" in parts else []
-    bar = None if scale_bar is None else _scale_bar(camera, scale_bar, SCALE_BAR_SHARE)
-    return Page(rows, table, caption, bar, width, columns, dpi).draw()
+    bar = None if scale_bar is None else _scale_bar(camera, scale_bar, drawing.SCALE_BAR_SHARE)
+    page: Figure = drawing.Page(rows, table, caption, bar, width, columns, dpi).draw()
+    return page
 
 
 def _comparison_of(
@@ -233,12 +216,12 @@ def save_figures(path: str | os.PathLike[str], figures: Figure | Sequence[Figure
 
 
 def check_figure_path(path: Path, count: int = 1) -> None:
-    """Check that a file can hold a number of figures.
+    """Check that a file format can hold this many figures.
 
     Raises
     ------
     RosyError
-        If not.
+        If the suffix is unknown, or the format cannot hold them.
     """
     if path.suffix.lower() not in FIGURE_SUFFIXES:
         raise RosyError(f"{path}: the name of the file must end in {', '.join(FIGURE_SUFFIXES)}")
@@ -268,7 +251,7 @@ def load_drawing() -> ModuleType:
 
 
 def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> None:
-    """Check what a figure is to show.
+    """Check the parts of a figure and the lines over differences.
 
     Raises
     ------
@@ -288,17 +271,33 @@ def _check_parts(comparison: Comparison, parts: Sequence[str], lines: str) -> No
         )
 
 
+def _check_numbers(name: str, **numbers: float) -> None:
+    """Check numbers of a figure against their `LIMITS`.
+
+    Raises
+    ------
+    RosyError
+        If a number is outside its limits. The message begins with `name`.
+    """
+    for key, value in numbers.items():
+        low, high = LIMITS[key]
+        if not low <= value <= high:
+            raise RosyError(
+                f"{name}: {key} is {value:g}: it must be a number from {low:g} to {high:g}"
+            )
+
+
 def _instances(
     name: str,
     fields: Mapping[str, Field],
     color_values: str | Sequence[str | ArrayLike] | None,
 ) -> dict[str, MeshInstance]:
-    """Return the fields in world space with the numbers that are shown as colors, as for `figure`.
+    """Return the fields in world space, with their `color_values`; see `figure`.
 
     Raises
     ------
     RosyError
-        If there is not one set of numbers for each field, or as `corner_numbers`.
+        If there is not one set of numbers for each field, or for the same reasons as `corner_numbers`.
     """
     if color_values is None or isinstance(color_values, str):
         values: Sequence[str | ArrayLike | None] = [color_values] * len(fields)
@@ -317,7 +316,7 @@ def _instances(
 def _figure_look(
     look: Look, fields: Mapping[str, Field], instances: Iterable[MeshInstance], scale: float
 ) -> Look:
-    """Return the look of all panels: its lengths in pixels, and common ranges of the color map."""
+    """Return the look of all panels, with lengths in pixels and common ranges of the color map."""
     look = scaled_look(look, scale)
     look = replace(look, singularity_size=float(np.clip(look.singularity_size * scale, 1, 256)))
     if colors_values(look):
@@ -328,16 +327,18 @@ def _figure_look(
     return look
 
 
-def _aspect(points: NDArray[np.float64], view: tuple[float, float]) -> float:
-    """Return the height of the panels relative to their width, so that they fit what they show."""
+def _panel_camera(
+    points: NDArray[np.float64], view: tuple[float, float], width: int, *, perspective: bool
+) -> Camera:
+    """Return the camera of all panels, whose height fits what they show."""
     right, up, _ = orbit_basis(*view) @ points.T
-    return float(np.clip(np.ptp(up) / max(float(np.ptp(right)), 1e-30), MIN_ASPECT, MAX_ASPECT))
+    aspect = np.clip(np.ptp(up) / max(float(np.ptp(right)), 1e-30), MIN_ASPECT, MAX_ASPECT)
+    height = max(round(width * float(aspect)), 1)
+    return orbit_camera(points, *view, width, height, perspective=perspective, margin=MARGIN)
 
 
 def _color_bar(look: Look, label: str) -> ColorBar | None:
-    """Return the color bar of the fields; None if neither magnitudes nor numbers are shown as color."""
-    from ..external.matplotlib_figure import ColorBar
-
+    """Return the color bar of the fields; None if color shows neither magnitudes nor numbers."""
     if not (colors_magnitude(look) or colors_values(look)):
         return None
     return ColorBar(label, *look.color_range, color_stops(look.color_map))
@@ -350,150 +351,3 @@ def _scale_bar(camera: Camera, unit: str, share: float) -> tuple[float, str]:
     """
     length = round_below(share * camera.width / camera.pixels_per_unit)
     return length * camera.pixels_per_unit, f"{length:g} {unit}".strip()
-
-
-@dataclass(frozen=True, eq=False)
-class _Studio:
-    """Draws the panels of a figure: all fields under one camera.
-
-    Attributes
-    ----------
-    comparison : Comparison
-    instances : dict of str to MeshInstance
-        The fields in world space, by their titles.
-    camera : Camera
-    look : Look
-    workers : int
-        As of `draw_picture`.
-    """
-
-    comparison: Comparison
-    instances: dict[str, MeshInstance]
-    camera: Camera
-    look: Look
-    workers: int
-    _cache: Cache = field(default_factory=Cache)
-
-    def _rgba(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
-        """Return the picture of an instance as `Picture.rgba`, without singularities."""
-        look = replace(self.look, singularity_dots="none", **changes)
-        view = ViewInput((instance,), self.camera, look)
-        return draw_picture(view, self._cache, keep_gbuffers=False, workers=self.workers).rgba
-
-    @cached_property
-    def _marks(self) -> dict[str, SingularityMarks | None]:
-        """The singularities of each field in its picture; None if the look shows none.
-
-        The dots of very many are smaller, so that they do not hide the lines.
-        """
-        if not shows_singularities(self.look):
-            return dict.fromkeys(self.instances)
-        limit = MAX_DOT_SHARE * self.camera.width * self.camera.height
-        shown: dict[str, SingularityMarks | None] = {}
-        for title, instance in self.instances.items():
-            marks = singularity_marks([instance], self.camera, self.look)
-            area = max(float((np.pi * marks.radius**2).sum()), limit)
-            shown[title] = replace(marks, size=marks.size * np.sqrt(limit / area))
-        return shown
-
-    def field_row(self, titles: Sequence[str], color_bar: ColorBar | None) -> Row:
-        """Return the panels of the fields."""
-        from ..external.matplotlib_figure import Panel, Row
-
-        panels = [
-            Panel(text, to_srgb_uint8(self._rgba(instance)[::-1]), self._marks[title])
-            for text, (title, instance) in zip(titles, self.instances.items(), strict=True)
-        ]
-        return Row(panels, color_bar)
-
-    def difference_row(self, lines: str, largest_angle: float) -> Row:
-        """Return the panels of the differences from the first field, below those of their fields."""
-        from ..external.matplotlib_figure import ColorBar, Row
-
-        reference, first = next(iter(self.comparison.fields.items()))
-        top = largest_angle or 180.0 / first.degree
-        panels = [
-            self._difference_panel(title, lines, top)
-            if title in self.comparison.differences
-            else None
-            for title in self.instances
-        ]
-        legend = f"Angle to \u201c{reference}\u201d\n\u00d7  largest angle"
-        if shows_singularities(self.look):
-            legend += (
-                f"\nOpen circles: singularities of\n\u201c{reference}\u201d; dots: of the other field."
-                "\nLines connect those that match."
-            )
-        stops = map_colors(np.linspace(*DIFFERENCE_ENDS, 33), DIFFERENCE_COLORS)
-        return Row(panels, ColorBar("angle (degrees)", 0.0, top, stops.astype(np.float64)), legend)
-
-    def _difference_panel(self, title: str, lines: str, top: float) -> Panel:
-        """Return the panel of the difference of a field from the first one.
-
-        Parameters
-        ----------
-        title : str
-        lines : {"other", "first", "both"}
-            Whose lines are drawn.
-        top : float
-            The angle at the top of the color map, in degrees.
-        """
-        from ..external.matplotlib_figure import Panel
-
-        reference, first = next(iter(self.instances.items()))
-        other, difference = self.instances[title], self.comparison.differences[title]
-        degrees = np.degrees(difference.angle)
-        values = degrees.astype(np.float32)[first.surface.corner_face]
-        at_zero, at_top = DIFFERENCE_ENDS
-        slope = top / (at_top - at_zero)
-        pictures = [
-            self._rgba(
-                replace(instance, color_values=values),
-                hue="values",
-                magnitude_length=False,
-                color_range=(-slope * at_zero, slope * (1.0 - at_zero)),
-                color_map=DIFFERENCE_COLORS,
-            )
-            for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]
-        ]
-        # The pictures cover the same pixels.
-        rgba = np.mean(pictures, axis=0)
-        mean, p95, largest = (
-            f"{format_degrees(np.degrees(angle))}\u00b0"
-            for angle in (difference.mean, difference.p95, difference.max)
-        )
-        return Panel(
-            f"{title} vs. {reference}",
-            to_srgb_uint8(rgba[::-1]),
-            self._marks[title],
-            self._marks[reference],
-            self._links(title) if shows_singularities(self.look) else None,
-            self._worst_place(difference.worst_face),
-            f"mean {mean}, 95 % {p95}, largest {largest}",
-        )
-
-    def _links(self, title: str) -> NDArray[np.float64]:
-        """Return the (n, 2, 2) ends of lines between singularities that match, if both are visible."""
-        first = next(iter(self.comparison.fields.values())).singularities
-        second = self.comparison.fields[title].singularities
-        matching = self.comparison.matchings[title]
-        ends = np.stack([first.vertex[matching.first], second.vertex[matching.second]], axis=1)
-        place, is_visible = self._projected(ends.ravel())
-        return place.reshape(-1, 2, 2)[is_visible.reshape(-1, 2).all(axis=1)]
-
-    def _worst_place(self, face: int) -> NDArray[np.float64] | None:
-        """Return the place of a face in the picture, (2,) pixels; None if none of its corners is visible."""
-        if face < 0:
-            return None
-        surface = next(iter(self.instances.values())).surface
-        corners = surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]]
-        place, is_visible = self._projected(corners)
-        return place[is_visible].mean(axis=0) if is_visible.any() else None
-
-    def _projected(
-        self, vertices: NDArray[np.integer[Any]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the (n, 2) places of vertices of the first surface in pixels, and which are visible."""
-        first = next(iter(self.instances.values()))
-        projected = project_vertices([first], self.camera, [vertices])
-        return projected.position, projected.is_visible

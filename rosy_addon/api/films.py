@@ -17,19 +17,19 @@ from ..compositor.look import Look, magnitude_range, uses_magnitude
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..field.carry import vectors_on_rest_shape
+from ..field.field import Field
 from ..field.frames import normalize
 from ..field.interpolation import interpolate_fields
 from ..field.polygon_arrays import face_area_vectors
 from ..field.representation import face_representation
 from ..field.rosy_field import RosyField
-from ..field.surface import Surface as PolygonMesh
-from ..field.surface import have_same_polygons
+from ..field.surface import Surface, have_same_polygons
 from ..projection.camera import check_size, framing_points, orbit_camera
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import mesh_instance
 from ..rendering.turntable import Encoder, turntable
 from ..rendering.view_input import ViewInput
-from .field import Field, warn
+from .field import warn
 from .pictures import DEFAULT_VIDEO_SIZE, DEFAULT_VIEW, default_encoder, picture_look
 
 #: The mean angle by which a field may turn from picture to picture, times the half length of streaks and
@@ -64,23 +64,23 @@ def film(
     Parameters
     ----------
     fields : sequence of Field
-        Two or more of the same degree, on one surface or on a surface each. The items are asked for twice:
-        for the camera and the range of magnitudes, and to be drawn. Two are kept at most, so the sequence may
-        read files.
+        Two or more of the same degree, on one surface or on a surface each. Each item is requested twice:
+        for the camera and the range of magnitudes, and to be drawn. At most two are kept, so the sequence
+        may read files.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
     between : int or None
         Pictures between two fields, for which the fields and the vertices are interpolated. The surfaces must
-        then have the same polygons. None: as many as keep streaks steady. Streaks flicker if the field turns by more than a half degree or so from
-        picture to picture.
+        then have the same polygons. None chooses a number that keeps streaks steady: they flicker if the
+        field turns by more than about half a degree from picture to picture.
     loop : bool
         The first field follows the last one again: the film, shown in a loop, has no seam.
     rate : float
         Pictures per second.
     view, size, orthographic, preset, workers, **settings
-        As for `render`.
+        See `render`.
     encode, on_picture
-        As for `turntable`.
+        See `turntable`.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def film(
     ------
     RosyError
         If there is one field only, they differ in their degrees or, with pictures between them, in their
-        polygons; or as of `turntable`.
+        polygons; or for the same reasons as `turntable`.
 
     Examples
     --------
@@ -130,19 +130,19 @@ def film(
 
 
 class _Survey(NamedTuple):
-    """What a film must know about all of its fields before the first picture.
+    """Properties of all fields of a film, which are needed before the first picture.
 
     Attributes
     ----------
     points : (n, 3) float64 ndarray
-        World space; they determine the camera.
+        Points in world space that the camera frames.
     largest_magnitude : float
     turn : float
         Largest mean angle between neighboring fields, in radians.
     keeps_polygons : bool
         Whether all fields have the polygons of the first one.
     rest_vertices : (V, 3) float64 ndarray or None
-        The vertices of the first surface, if the others have the same polygons and other vertices.
+        Vertices of the first surface if the mesh moves, but keeps its polygons.
     """
 
     points: NDArray[np.float64]
@@ -154,26 +154,26 @@ class _Survey(NamedTuple):
 
 @dataclass(eq=False)
 class Film:
-    """The views of the fields of a series, under one camera that frames all of them.
+    """Views of the fields of a series, under one camera that frames all of them.
 
     Parameters
     ----------
     fields : sequence of Field
         See `film`.
     look : Look
-        Of the first picture. If it shows magnitudes and has no range of its own, their range is that of all
-        fields.
+        Look of the first picture. If it shows magnitudes and sets no range, the range covers all fields.
     view_angles : (float, float)
         Azimuth and elevation in degrees, see `orbit_camera`.
     size : (int, int)
         Pixels.
     between : int or None
-        Pictures between two fields. None: as many as keep streaks steady, or 0 if the polygons change.
+        Pictures between two fields. None chooses a number that keeps streaks steady, or 0 if the polygons
+        change.
     loop : bool
         Whether the first field follows the last one.
     perspective : bool
     keeps_anchor : bool
-        Whether the noise is anchored as the look says, even if the mesh moves.
+        Use the anchor of the look even if the mesh moves.
     name : str
         For messages.
 
@@ -193,7 +193,7 @@ class Film:
     perspective: bool = True
     keeps_anchor: bool = False
     name: str = "film"
-    #: What the user should know about the motion after the first view; may be empty.
+    #: A warning about the motion, set before the first view; may be empty.
     advice: str = ""
 
     def __post_init__(self) -> None:
@@ -210,13 +210,13 @@ class Film:
 
     @property
     def picture_count(self) -> int:
-        """The number of views. If it depends on how fast the fields turn, they are looked at first."""
+        """Number of views. It may depend on how fast the fields turn, which needs a pass over all fields."""
         intervals = len(self.fields) - (not self.loop)
         return intervals * (self._between + 1) + (not self.loop)
 
     @property
     def _between(self) -> int:
-        """The number of pictures between two fields."""
+        """Number of pictures between two fields."""
         if self.between is not None:
             return self.between
         survey = self._survey
@@ -228,7 +228,7 @@ class Film:
         Raises
         ------
         RosyError
-            As of `film`. What is wrong with a field is found before the first view.
+            For the same reasons as `film`. All fields are checked before the first view.
         """
         survey, look = self._survey, self.look
         if uses_magnitude(look) and magnitude_range(look) is None:
@@ -240,33 +240,33 @@ class Film:
         self.advice = _advice(survey.turn, self._between, look)
         camera = orbit_camera(survey.points, *self._framing, perspective=self.perspective)
         loop_frames = self.picture_count if self.loop else 0
-        for number, (surface, field, up) in enumerate(self._moments()):
+        for number, (surface, field) in enumerate(self._moments()):
             if rest is not None:
                 vectors = vectors_on_rest_shape(surface, rest, field.vectors)
                 field = replace(field, vectors=vectors, source_directions=None)
-                surface = replace(surface, rest_vertices=rest)
+                surface = surface.with_parts(rest_vertices=rest)
             frame_look = flow_at(look, number, loop_frames)
-            yield ViewInput((mesh_instance(surface, field, up),), camera, frame_look)
+            yield ViewInput((mesh_instance(surface, field),), camera, frame_look)
 
-    def _moments(self) -> Iterator[tuple[PolygonMesh, RosyField, str]]:
-        """Yield the meshes and fields of the pictures, with their upward axes."""
+    def _moments(self) -> Iterator[tuple[Surface, RosyField]]:
+        """Yield the meshes and fields of the pictures."""
         count, stop = len(self.fields), self._between + 1
         previous = self.fields[0]
         for number in range(1, count + self.loop):
             field = self.fields[number % count]
-            start = previous.surface.mesh, previous.rosy
-            yield *start, previous.surface.up
+            start = previous.surface, previous
+            yield start
             for index in range(1, stop):
-                share, end = index / stop, (field.surface.mesh, field.rosy)
+                share, end = index / stop, (field.surface, field)
                 mesh = _mesh_between(start[0], end[0], share)
-                yield mesh, interpolate_fields(start, end, share, mesh), previous.surface.up
+                yield mesh, interpolate_fields(start, end, share, mesh)
             previous = field
         if not self.loop:
-            yield previous.surface.mesh, previous.rosy, previous.surface.up
+            yield previous.surface, previous
 
     @cached_property
     def _survey(self) -> _Survey:
-        """What all fields have in common. They are looked at once."""
+        """Properties of all fields, computed once."""
         points, largest, turn = np.zeros((0, 3)), 0.0, 0.0
         first = previous = self.fields[0]
         keeps_polygons, moves = True, False
@@ -274,20 +274,20 @@ class Film:
             field = previous if number == 0 else self.fields[number]
             has_same = self._check(number, field, previous)
             keeps_polygons &= has_same
-            mesh = field.surface.mesh
-            if keeps_polygons and mesh is not first.surface.mesh:
-                moves |= not np.array_equal(mesh.vertices, first.surface.mesh.vertices)
+            mesh = field.surface
+            if keeps_polygons and mesh is not first.surface:
+                moves |= not np.array_equal(mesh.vertices, first.surface.vertices)
             if has_same:
                 turn = max(turn, _mean_turn(previous, field))
             largest = max(largest, float(field.magnitude.max()))
-            if number == 0 or mesh is not previous.surface.mesh:
-                instance = mesh_instance(mesh, field.rosy, field.surface.up)
+            if number == 0 or mesh is not previous.surface:
+                instance = mesh_instance(mesh, field)
                 points = np.concatenate([points, instance.face_points()])
                 points = framing_points(points, *self._framing, perspective=self.perspective)
             previous = field
         if self.loop and self._check(0, first, previous):
             turn = max(turn, _mean_turn(previous, first))
-        rest = first.surface.mesh.vertices if keeps_polygons and moves else None
+        rest = first.surface.vertices if keeps_polygons and moves else None
         return _Survey(points, largest, turn, keeps_polygons, rest)
 
     def _check(self, number: int, field: Field, previous: Field) -> bool:
@@ -303,7 +303,7 @@ class Film:
             raise RosyError(
                 f"{name} has degree {field.degree}, but the one before it {previous.degree}"
             )
-        mesh, other = field.surface.mesh, previous.surface.mesh
+        mesh, other = field.surface, previous.surface
         has_same = mesh is other or have_same_polygons(mesh, other)
         if self.between and not has_same:
             raise RosyError(
@@ -313,19 +313,19 @@ class Film:
         return has_same
 
 
-def _mesh_between(first: PolygonMesh, second: PolygonMesh, share: float) -> PolygonMesh:
-    """Return a mesh between two with the same polygons. Fans and triangles are those of the first."""
+def _mesh_between(first: Surface, second: Surface, share: float) -> Surface:
+    """Interpolate two meshes with the same polygons. The result has the fans and triangles of the first."""
     if first is second:
         return first
     vertices = (1 - share) * first.vertices + share * second.vertices
     normal = normalize((1 - share) * first.corner_normal + share * second.corner_normal)
-    return replace(first, vertices=vertices, corner_normal=normal)
+    return first.with_parts(vertices=vertices, corner_normal=normal)
 
 
 def _mean_turn(first: Field, second: Field) -> float:
     """Return the mean angle in radians between two fields on the same polygons, weighted by area."""
-    mesh = second.surface.mesh
-    z, other = (face_representation(field.surface.mesh, field.rosy) for field in (first, second))
+    mesh = second.surface
+    z, other = (face_representation(field.surface, field) for field in (first, second))
     vectors = face_area_vectors(mesh.vertices, mesh.corner_vertex, mesh.face_start)
     weight = np.linalg.norm(vectors, axis=1) * ((z != 0) & (other != 0))
     angle = np.abs(np.angle(z * other.conj())) / first.degree

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.errors import RosyError, counted
+from ..field.field import Field, check_same_surface
 from ..field.formats.sings import read_sings
 from ..field.generate import GeneratorSettings, generate
-from ..field.surface import orientation_warning
-from .field import Field, check_same_surface, warn
-from .surface import Surface
+from ..field.surface import Surface, orientation_warning
+from .field import warn
 
 
 def form(surface: Surface, degree: int = 4) -> Field:
@@ -133,7 +133,7 @@ def features(
     --------
     >>> import rosyfields as rf
     >>> torus = rf.Surface("torus.obj")
-    >>> rf.features(torus, edges=torus.faces[:24, :2]).degree
+    >>> rf.features(torus, edges=[[0, 1], [1, 2], [2, 3]]).degree
     4
     """
     settings = GeneratorSettings(
@@ -369,10 +369,10 @@ def uv_map(surface: Surface) -> np.ndarray:
 
 def generated(surface: Surface, settings: GeneratorSettings, degree: int) -> Field:
     """Generate a field, and warn of faces without a direction."""
-    warn(orientation_warning(surface.mesh), stacklevel=4)
-    field = Field(surface, generate(surface.mesh, settings, degree))
+    warn(orientation_warning(surface), stacklevel=4)
+    field = Field.of(surface, generate(surface, settings, degree))
     # Faces without area do not count.
-    has_area = surface.face_normals.any(axis=1)
+    has_area = surface.face_normal.any(axis=1)
     count = int((has_area & ~field.vectors.any(axis=1)).sum())
     if count:
         total = int(has_area.sum())

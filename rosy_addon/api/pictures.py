@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..compositor.look import Look
+from ..compositor.picture import Picture
 from ..core.cache import Cache
 from ..core.color import LUMINANCE_WEIGHTS, luminance, to_linear
 from ..core.errors import RosyError
-from ..image_io.png import png_bytes, read_png, to_srgb_uint8, write_png
+from ..field.field import Field, check_same_surface
+from ..field.surface import Surface
+from ..image_io.png import read_png
 from ..preset_files.store import default_user_folder, load_preset, preset_files, read_preset
 from ..projection.ambient_occlusion import DIRECTION_COUNT
 from ..projection.ambient_occlusion import ambient_occlusion as corner_occlusion
@@ -28,9 +31,7 @@ from ..rendering import turntable as turntable_video
 from ..rendering.draw import draw_picture
 from ..rendering.mesh_view import check_light, mesh_instance, mesh_view
 from ..rendering.turntable import Encoder
-from .field import Field, check_same_surface
 from .generators import form, uv_map
-from .surface import Surface
 
 #: Azimuth and elevation in degrees: from the front left, looking slightly down.
 DEFAULT_VIEW = (-25.0, 20.0)
@@ -38,71 +39,15 @@ DEFAULT_VIEW = (-25.0, 20.0)
 #: Width and height in pixels of pictures, and of the pictures of a turntable.
 DEFAULT_SIZE, DEFAULT_VIDEO_SIZE = (1024, 1024), (512, 512)
 
-#: Samples per pixel along each axis, unless the preset has more: nothing smooths the edges of the
-#: picture later.
+#: Samples per pixel along each axis, unless the preset has more. No renderer smooths the edges later.
 SUPERSAMPLING = 2
 
 #: The tone attribute that is the luminance of the vertex colors, as Blender calls it.
 VERTEX_COLOR = "Color"
 
 
-class Picture:
-    """A picture. A notebook shows it, and `numpy.asarray` makes it an array.
-
-    The array is (H, W, 4) uint8, sRGB with straight alpha, the top row first, as
-    ``matplotlib.pyplot.imshow`` and ``PIL.Image.fromarray`` take it.
-
-    Parameters
-    ----------
-    rgba : (H, W, 4) float32 ndarray
-
-    Attributes
-    ----------
-    rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied, the bottom row first.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import rosyfields as rf
-    >>> picture = rf.render(rf.Surface("torus.obj"), size=(64, 48))
-    >>> np.asarray(picture).shape
-    (48, 64, 4)
-    >>> picture.save("torus.png")
-    """
-
-    def __init__(self, rgba: NDArray[np.float32]) -> None:
-        self.rgba = rgba
-
-    def __repr__(self) -> str:
-        return f"<Picture: {self.rgba.shape[1]} x {self.rgba.shape[0]} pixels>"
-
-    def __array__(
-        self, dtype: np.dtype[Any] | None = None, copy: bool | None = None
-    ) -> NDArray[Any]:
-        if copy is False:
-            raise ValueError("a Picture has no array of display values that could be shared")
-        array = to_srgb_uint8(self.rgba[::-1])
-        return array if dtype is None else array.astype(dtype)
-
-    def _repr_png_(self) -> bytes:
-        return png_bytes(self.rgba)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an 8-bit ``.png`` file.
-
-        Raises
-        ------
-        RosyError
-            If the name does not end in ``.png``, or the file cannot be written.
-        """
-        if Path(path).suffix.lower() != ".png":
-            raise RosyError(f"{path}: the name of the file must end in .png")
-        write_png(path, self.rgba)
-
-
 def list_presets() -> dict[str, str]:
-    """Return the names of all presets with their descriptions: those of RoSy and your own.
+    """Return the descriptions of all presets by name: the presets of RoSy and your own.
 
     Examples
     --------
@@ -124,7 +69,7 @@ def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> ND
     ----------
     surface : Surface
     directions : int
-        Number of directions of light, spread evenly over the sphere.
+        Number of light directions, spread evenly over the sphere.
 
     Returns
     -------
@@ -144,7 +89,7 @@ def ambient_occlusion(surface: Surface, directions: int = DIRECTION_COUNT) -> ND
     >>> rf.ambient_occlusion(square, directions=16)
     array([1., 1., 1., 1.], dtype=float32)
     """
-    return corner_occlusion([mesh_instance(surface.mesh, None, surface.up)], 0, directions)
+    return corner_occlusion([mesh_instance(surface)], 0, directions)
 
 
 def render(
@@ -231,8 +176,7 @@ def render(
         reference_luminance=reference,
         reference_name=name,
     )
-    # Only the pixels are kept, not the layers of the picture.
-    return Picture(draw_picture(picture_view, workers=workers).rgba)
+    return draw_picture(picture_view, workers=workers)
 
 
 def turntable(
@@ -260,7 +204,7 @@ def turntable(
     Parameters
     ----------
     surface, field, size, orthographic, preset, color_values, tone_values, tone_image, workers, **settings
-        As for `render`.
+        See `render`.
     path : path-like
         A ``.gif``, or an ``.mp4`` if there is an encoder.
     pictures : int
@@ -268,11 +212,11 @@ def turntable(
     rate : float
         Pictures per second.
     still : bool
-        Whether the camera stays at the first view. The look then needs `flow`, so that streaks drift.
+        Keep the camera at the first view. The look then needs `flow`, so that streaks drift.
     view : (float, float)
         Azimuth of the first picture, and elevation, in degrees.
     encode : function, optional
-        Encodes an ``.mp4``: see `rendering.turntable.Encoder`. By default ffmpeg, where it is installed.
+        Encodes an ``.mp4``: see `rendering.turntable.Encoder`. By default ffmpeg, if it is installed.
     on_picture : function, optional
         Called with the number of each picture, from 1, before it is drawn.
 
@@ -284,7 +228,7 @@ def turntable(
     Raises
     ------
     RosyError
-        As `render`, or if the video cannot be written.
+        For the same reasons as `render`, or if the video cannot be written.
 
     Examples
     --------
@@ -327,7 +271,7 @@ def picture_look(
     Parameters
     ----------
     name : str
-        Of the surface, for messages.
+        Name of the surface, for messages.
     preset : str or path-like or None
         Name of a preset, or a file.
     settings : mapping
@@ -361,7 +305,7 @@ def default_encoder(path: Path, encode: Encoder | None) -> Encoder | None:
     Raises
     ------
     RosyError
-        If the name of the file is not that of a video.
+        If the file name has no suffix of a video.
     """
     turntable_video.check_video_path(path)
     return find_ffmpeg() if encode is None and path.suffix.lower() == ".mp4" else encode
@@ -385,7 +329,7 @@ def upright_instance(
     """Return a surface with its field in world space, upright."""
     field = form(surface) if field is None else field
     check_same_surface(surface, field)
-    return mesh_instance(surface.mesh, field.rosy, surface.up, tone, color_values)
+    return mesh_instance(surface, field, tone, color_values)
 
 
 def corner_numbers(
@@ -397,7 +341,7 @@ def corner_numbers(
     ----------
     surface : Surface
     color_values : str or (F,), (V,) or (C,) array_like or None
-        As for `render`.
+        See `render`.
 
     Returns
     -------
@@ -410,37 +354,51 @@ def corner_numbers(
     """
     if color_values is None:
         return None
-    mesh = surface.mesh
     if isinstance(color_values, str):
-        # Faces are listed first, and count if vertices have an array of the same name.
+        # An array of faces takes precedence over an array of vertices with the same name.
         data = {**surface.face_data, **surface.vertex_data, **surface.face_data}
         color_values = _named_array(
             surface, color_values, data, "attribute", "attributes of faces or vertices"
         )
-    try:
-        array = np.asarray(color_values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise RosyError(f"{surface.name}: color_values must be numbers") from None
-    counts = surface.face_count, len(surface.vertices), len(mesh.corner_vertex)
-    if array.ndim != 1 or len(array) not in counts:
-        raise RosyError(
-            f"{surface.name}: color_values must be {counts[0]:,} numbers, one for each face, "
-            f"{counts[1]:,}, one for each vertex, or {counts[2]:,}, one for each corner, not an array of "
-            f"shape {array.shape}"
-        )
-    if len(array) == counts[0]:
-        array = array[mesh.corner_face]
-    elif len(array) == counts[1]:
-        array = array[mesh.corner_vertex]
-    numbers: NDArray[np.float32] = array.astype(np.float32)
+    numbers = _at_corners(surface, color_values, "color_values", may_be_of_faces=True)
     numbers[~np.isfinite(numbers)] = np.nan
     return numbers
+
+
+def _at_corners(
+    surface: Surface, values: ArrayLike, name: str, *, may_be_of_faces: bool = False
+) -> NDArray[np.float32]:
+    """Return (C,) numbers of corners, given numbers of faces, vertices or corners.
+
+    Raises
+    ------
+    RosyError
+        If they are not numbers, or their count fits none of these. The message names the argument.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RosyError(f"{surface.name}: {name} must be numbers") from None
+    corners = np.arange(len(surface.corner_vertex))
+    domains = [
+        ("face", surface.face_count, surface.corner_face),
+        ("vertex", len(surface.vertices), surface.corner_vertex),
+        ("corner", len(corners), corners),
+    ][0 if may_be_of_faces else 1 :]
+    for _, count, element in domains:
+        if array.shape == (count,):
+            numbers: NDArray[np.float32] = array[element].astype(np.float32)
+            return numbers
+    expected = ", or ".join(f"{count:,} numbers, one for each {each}" for each, count, _ in domains)
+    raise RosyError(
+        f"{surface.name}: {name} must be {expected}, not an array of shape {array.shape}"
+    )
 
 
 def _named_array(
     surface: Surface, name: str, data: Mapping[str, NDArray[Any]], kind: str, kinds: str
 ) -> NDArray[Any]:
-    """Return an array of a surface; `kind` and `kinds` say what there is, for the errors."""
+    """Return an array of a surface by name. `kind` and `kinds` name such arrays in errors."""
     if name in data:
         return data[name]
     if not data:
@@ -454,22 +412,14 @@ def _surface_tone(
     values: str | ArrayLike | None,
     image: str | os.PathLike[str] | ArrayLike | Picture | None,
 ) -> SurfaceTone | None:
-    """Return the tone of the vertices, or of an image on the UV map, or None."""
+    """Return the tone from values at vertices or corners, or from an image on the UV map; None without."""
     if values is not None:
         if isinstance(values, str):
             values = _named_tone(surface, values)
-        array = np.asarray(values, dtype=np.float64)
-        counts = len(surface.vertices), len(surface.mesh.corner_vertex)
-        if array.ndim != 1 or len(array) not in counts:
-            raise RosyError(
-                f"{surface.name}: tone_values must be {counts[0]:,} numbers, one for each vertex, or "
-                f"{counts[1]:,}, one for each corner, not an array of shape {array.shape}"
-            )
-        if not np.isfinite(array).all():
+        tone = _at_corners(surface, values, "tone_values")
+        if not np.isfinite(tone).all():
             raise RosyError(f"{surface.name}: tone_values has values that are not finite")
-        if len(array) == counts[0]:
-            array = array[surface.mesh.corner_vertex]
-        return SurfaceTone(array[:, None].astype(np.float32))
+        return SurfaceTone(tone[:, None])
     if image is not None:
         return SurfaceTone(uv_map(surface).astype(np.float32), _image_luminance(image))
     return None

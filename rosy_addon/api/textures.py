@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..compositor.look import Look, is_hatched
+from ..compositor.picture import Picture
 from ..compositor.shading import Light
 from ..core.color import to_linear
 from ..core.errors import RosyError
+from ..field.field import Field
 from ..field.frames import unit_direction
+from ..field.surface import Surface
 from ..preset_files.store import default_user_folder, load_preset
 from ..projection.gbuffer import MeshInstance
 from ..surface_texture.draw import (
@@ -24,12 +27,11 @@ from ..surface_texture.draw import (
     check_texture_size,
     draw_texture,
 )
-from .field import Field, warn
+from .field import warn
 from .generators import uv_map
-from .pictures import Picture, corner_numbers, upright_instance
-from .surface import Surface
+from .pictures import corner_numbers, upright_instance
 
-#: What stands for the number of the tile in the name of a file, as in Blender.
+#: Placeholder for the number of the tile in a file name, as in Blender.
 UDIM_TOKEN = "<UDIM>"
 
 
@@ -37,8 +39,8 @@ class Texture:
     """A texture for the UV map of a surface. A notebook shows its first tile.
 
     A texture of hatching does not hold ink, but thresholds: red, green and blue are the fractions of the
-    paper that the first, second and third lines cover when they reach the texel, so that a shader can draw
-    the hatching of any light. They are stored as they are, in a file without a color space.
+    paper that the first, second and third lines cover when they reach the texel. A shader can then draw
+    the hatching for any light. They are stored as they are, in a file without a color space.
 
     Attributes
     ----------
@@ -112,8 +114,8 @@ def texture(
 ) -> Texture:
     """Draw a field as a texture for the UV map of a surface.
 
-    Streamlines run on the surface: no seam shows, and lines are as wide on all charts. The renderer that
-    shows the texture lights it. A texture of hatching has thresholds for a shader; see `Texture`.
+    Streamlines run on the surface: no seam shows, and lines are as wide on all charts. Light is left to the
+    renderer that shows the texture. A texture of hatching has thresholds for a shader; see `Texture`.
 
     Parameters
     ----------
@@ -139,10 +141,11 @@ def texture(
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     color_values : str or (F,), (V,) or (C,) array_like, optional
-        Numbers that the hue of the streaks shows, as for `render`. Hatching shows none.
+        Numbers that the hue of the streaks shows; see `render`. Hatching shows none.
     **settings
-        Settings of the look, after the preset: ``grain=3, seed=3``. A pixel is that of a square with the
-        area of the surface and 1024 pixels on each side, whatever the size of the texture. With
+        Settings of the look, after the preset: ``grain=3, seed=3``. Lengths in
+        pixels refer to a square with the area of the surface and 1024 pixels on each side, independent of
+        the size of the texture. With
         ``unit="world", unit_size=0.002`` it is that many units of length.
 
     Returns

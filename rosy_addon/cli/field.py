@@ -12,12 +12,12 @@ from .. import api
 from ..api.figures import LINES, check_figure_path, load_drawing
 from ..api.generators import GENERATOR_FUNCTIONS
 from ..api.pictures import picture_look
-from ..api.surface import simulation_suffixes
 from ..core.errors import RosyError, counted
 from ..field.convert import Conversion, convert
 from ..field.curvature import MAGNITUDES
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES, WRITE_SUFFIXES
 from ..field.formats.sings import SINGULARITY_SUFFIXES, read_sings
+from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
 from .mesh_field import add_mesh_options, load_mesh_and_field, read_field
@@ -79,7 +79,7 @@ def run_field(options: Options) -> None:
         pair_distance=options.cancel_pairs,
         magnitude=options.magnitude,
     )
-    api.Field(surface, convert(surface.mesh, field.rosy, conversion)).save(options.output)
+    api.Field.of(surface, convert(surface, field, conversion)).save(options.output)
 
 
 def add_info_command(subparsers: Any) -> None:
@@ -178,7 +178,7 @@ def _format_comparison(against: dict[str, Any] | None) -> list[str]:
 def add_compare_command(subparsers: Any) -> None:
     """Add the command `compare`."""
     parser = add_subcommand(subparsers, "compare", run_compare, api.figure)
-    suffixes = [*READERS, *simulation_suffixes()]
+    suffixes = [*READERS, *SIMULATION_READERS]
     parser.add_argument("mesh", type=Path, metavar="MESH", help=", ".join(suffixes))
     parser.add_argument(
         "fields",

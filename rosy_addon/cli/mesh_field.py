@@ -6,12 +6,12 @@ from pathlib import Path
 
 from .. import api
 from ..api.generators import GENERATOR_FUNCTIONS
-from ..api.surface import simulation_suffixes
 from ..core.errors import RosyError
 from ..core.settings import settings_of
 from ..field.field_io import DEFAULT_DEGREE, READ_SUFFIXES
 from ..field.formats.plain import read_guide_strokes
 from ..field.generate import GENERATORS, GeneratorSettings, options_of
+from ..field.mesh_arrays import SIMULATION_READERS
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
 from .options import CommandParser, Options, int_between
@@ -38,7 +38,7 @@ def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> Non
     parser.add_argument(
         "field", type=Path, nargs="?", metavar="FIELD", help=", ".join(READ_SUFFIXES)
     )
-    of_array = ", 1 for an array of vectors" if simulation_suffixes() else ""
+    of_array = ", 1 for an array of vectors" if SIMULATION_READERS else ""
     parser.add_argument(
         "--degree",
         type=int,
@@ -100,9 +100,9 @@ def add_mesh_options(parser: CommandParser, *, allow_scene: bool = False) -> Non
 def _add_simulation_options(parser: CommandParser) -> None:
     """Add the options for files of simulations, if these can be read."""
     parser.set_defaults(array=None, step=None)
-    if not simulation_suffixes():
+    if not SIMULATION_READERS:
         return
-    suffixes = ", ".join(simulation_suffixes())
+    suffixes = ", ".join(SIMULATION_READERS)
     parser.epilog = f"MESH may also be the file of a simulation: {suffixes}."
     parser.add_argument(
         "--array",
@@ -127,7 +127,7 @@ def load_mesh_and_field(options: Options) -> tuple[api.Surface, api.Field]:
         check_degree(options.degree)
     if options.field is not None and options.generate is not None:
         raise RosyError(f"{options.field}: give either a field file or --generate, not both")
-    is_simulation = options.mesh.suffix.lower() in simulation_suffixes()
+    is_simulation = options.mesh.suffix.lower() in SIMULATION_READERS
     names = ("field", "generate", "strokes", "guides", "singularities")
     has_source = options.uv or any(getattr(options, name) is not None for name in names)
     for name in ("array", "step"):

@@ -19,9 +19,9 @@ from ..compositor.look import Look
 from ..core.errors import RosyError
 from ..core.file_io import check_writable
 from ..core.settings import Choice, Number, Numbers, Setting, Switch, settings_of
+from ..field.up_axis import UP_AXIS_MATRIX
 from ..preset_files.store import default_user_folder, find_preset_file, preset_keys, read_preset
 from ..projection.camera import check_size
-from ..projection.up_axis import UP_AXIS_MATRIX
 from .streams import print_line
 
 #: Placeholders of numbers in the help, by their units.

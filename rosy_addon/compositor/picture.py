@@ -1,24 +1,34 @@
-"""The finished picture."""
+"""`Picture`: the finished image of a field."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..annotation.singularity_marks import SingularityMarks
+from ..core.errors import RosyError
+from ..image_io.png import png_bytes, to_srgb_uint8, write_png
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Picture:
-    """An image of a field, rows from the bottom as in Blender.
+    """An image of a field. A notebook shows it, and `numpy.asarray` makes it an array.
+
+    The array is (H, W, 4) uint8, sRGB with straight alpha, the top row first, as
+    ``matplotlib.pyplot.imshow`` and ``PIL.Image.fromarray`` take it.
 
     Attributes
     ----------
     rgba : (H, W, 4) float32 ndarray
-        Linear, not premultiplied. Alpha is the fraction of the pixel in which a field is visible
-        times, if lines are drawn on paper that is not opaque, the opacity of ink and paper.
+        Linear, not premultiplied, the bottom row first, as in Blender. Alpha is the fraction of the
+        pixel in which a field is visible; on paper that is not opaque, times the opacity of ink and
+        paper.
     spread : (H, W) float32 ndarray or None
         If the colors are thresholds of ink: the fourth channel of `ink_thresholds.threshold_pixels`. Alpha
         is the fraction of the pixel in which a field is visible.
@@ -29,13 +39,48 @@ class Picture:
         The singularities that are drawn over it. None if it has no dots.
     line_count : int
         The largest number of lines of its fields through a point; 0 if the picture is from a graphics card.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rosyfields as rf
+    >>> picture = rf.render(rf.Surface("torus.obj"), size=(64, 48))
+    >>> np.asarray(picture).shape
+    (48, 64, 4)
+    >>> picture.save("torus.png")
     """
 
-    rgba: np.ndarray
-    spread: np.ndarray | None = None
+    rgba: NDArray[np.float32]
+    spread: NDArray[np.float32] | None = None
     color_range: tuple[float, float] | None = None
     marks: SingularityMarks | None = None
     line_count: int = 0
+
+    def __repr__(self) -> str:
+        return f"<Picture: {self.rgba.shape[1]} x {self.rgba.shape[0]} pixels>"
+
+    def __array__(
+        self, dtype: np.dtype[Any] | None = None, copy: bool | None = None
+    ) -> NDArray[Any]:
+        if copy is False:
+            raise ValueError("a Picture has no array of display values that could be shared")
+        array = to_srgb_uint8(self.rgba[::-1])
+        return array if dtype is None else array.astype(dtype)
+
+    def _repr_png_(self) -> bytes:
+        return png_bytes(self.rgba)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an 8-bit ``.png`` file.
+
+        Raises
+        ------
+        RosyError
+            If the name does not end in ``.png``, or the file cannot be written.
+        """
+        if Path(path).suffix.lower() != ".png":
+            raise RosyError(f"{path}: the name of the file must end in .png")
+        write_png(path, self.rgba)
 
 
 def common_color_range(ranges: Collection[tuple[float, float]]) -> tuple[float, float] | None:

@@ -1,1 +1,1 @@
-"""What every room may import: errors, progress, settings of looks, files, memory, color."""
+"""Basics that every room may import: errors, progress, settings of looks, files, memory, color."""

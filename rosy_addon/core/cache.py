@@ -64,7 +64,7 @@ class Cache:
     def evict_over_limit(self) -> None:
         """Evict least recently used entries until the rest is within the limit.
 
-        The size of an entry is that of all arrays in its key and its result. Arrays that several
+        The size of an entry is the size of all arrays in its key and its result. Arrays that several
         entries share count once.
         """
         visited: set[int] = set()

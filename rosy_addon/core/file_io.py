@@ -224,7 +224,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     """
     with _system_errors(path, "cannot be written"):
         target = Path(os.path.realpath(path))
-        # From Python 3.14 on, the methods of Path hide errors, such as that of a name that is too long.
+        # From Python 3.14 on, the methods of Path hide errors, such as a name that is too long.
         with suppress(FileNotFoundError, NotADirectoryError):
             os.lstat(target)
         folder = (target if Path(path).is_symlink() else Path(path)).parent

@@ -132,8 +132,8 @@ def _system_memory() -> list[int]:
 def _control_group_memory(root: Path = Path("/")) -> list[int]:
     """Return the bytes that each control group of this process leaves, under a root directory.
 
-    The files of a group are read where they are mounted, and those of the groups that contain it.
-    In a container, the path of the group may not exist; its files are then those of the mount.
+    Read the files of the group and of the groups that contain it. In a container, the path of the group
+    may not exist; the files of the mount are then used.
     Memory that only caches files is free.
     """
     free = []

@@ -1,4 +1,4 @@
-"""How far long work has come: said by the functions that do it, heard by whoever listens.
+"""Progress of long functions, reported to a listener.
 
 A function reports its progress with `report`, from 0 to 1. Where it calls others that report, `progress`
 scales their reports to a part of its own. Nobody need listen: then both cost next to nothing. The listener is a
@@ -17,7 +17,7 @@ Listener = Callable[[float, str], None]
 
 
 class _Part(NamedTuple):
-    """A listener, and the part of its progress that is reported now."""
+    """A listener, and the range of its progress that is reported now."""
 
     listener: Listener
     start: float
@@ -100,7 +100,7 @@ def progress(start: float, stop: float | None = None, label: str | None = None) 
 
 
 def listening(listener: Listener | None) -> _Scope:
-    """Tell a listener what is reported in a ``with`` block; with None, nobody.
+    """Send the reports of a ``with`` block to a listener; with None, to nobody.
 
     A fraction that is less than one before is told as that one: progress stands still, and never goes back.
     """

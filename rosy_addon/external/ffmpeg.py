@@ -13,7 +13,7 @@ from ..worker.program import run_program
 def find_encoder() -> Encoder | None:
     """Return the encoder of .mp4 files, or None if ffmpeg is not installed.
 
-    It is the program on the path, or that of the package imageio-ffmpeg.
+    It uses the program on the path, or the one in the package imageio-ffmpeg.
     """
     program = shutil.which("ffmpeg")
     if program is None:

@@ -24,6 +24,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.textpath import text_to_path
 
+from ..annotation.figure_parts import ColorBar, Panel, Row
 from ..annotation.index_labels import placed_labels
 from ..annotation.round_numbers import MINUS
 from ..annotation.singularity_marks import (
@@ -55,78 +56,6 @@ INK = "#141414"
 
 #: Marks are drawn over the lines between them, which have the order 2, and a cross over marks.
 MARK_ORDER = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """A picture with a title.
-
-    Attributes
-    ----------
-    title : str
-    picture : (H, W, 4) uint8 ndarray
-        sRGB, the top row first.
-    dots : SingularityMarks or None
-        Filled dots, in pixels of the picture.
-    rings : SingularityMarks or None
-        Open circles.
-    links : (n, 2, 2) float64 ndarray
-        Lines between the ends of pairs, in pixels from the lower left.
-    cross : (2,) float64 ndarray or None
-        A place that is marked with a cross, in pixels from the lower left.
-    note : str
-        Below the picture.
-    """
-
-    title: str
-    picture: np.ndarray
-    dots: SingularityMarks | None = None
-    rings: SingularityMarks | None = None
-    links: np.ndarray | None = None
-    cross: np.ndarray | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class ColorBar:
-    """The key of a color map.
-
-    Attributes
-    ----------
-    label : str
-    low, high : float
-        The numbers at its ends.
-    stops : (n, 3) float64 ndarray
-        Display values at even distances from the lower end.
-    """
-
-    label: str
-    low: float
-    high: float
-    stops: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Row:
-    """Panels with one key.
-
-    Attributes
-    ----------
-    panels : sequence of Panel or None
-        None leaves the place of a panel empty.
-    color_bar : ColorBar or None
-    legend : str
-        In the place of the first empty panel.
-    """
-
-    panels: Sequence[Panel | None]
-    color_bar: ColorBar | None = None
-    legend: str = ""
-
-    @property
-    def drawn(self) -> list[Panel]:
-        """The panels without the empty places."""
-        return [panel for panel in self.panels if panel is not None]
 
 
 def encode_figures(figures: Sequence[Figure], suffix: str) -> bytes:
@@ -170,7 +99,7 @@ def panel_width(width: float, columns: int, has_key: bool, dpi: int) -> int:
     Parameters
     ----------
     width : float
-        Of the figure, inches.
+        Width of the figure, inches.
     columns : int
     has_key : bool
         Whether there is a column of keys.
@@ -191,7 +120,7 @@ class NotebookFigure(Figure):
 
 @dataclass(frozen=True, eq=False)
 class Page:
-    """What a figure shows, from top to bottom. Places are in inches from its upper left corner.
+    """Contents of a figure, from top to bottom. Positions are in inches from its upper left corner.
 
     Attributes
     ----------
@@ -203,9 +132,9 @@ class Page:
     scale_bar : (float, str) or None
         Its length in pixels, and its text.
     width : float
-        Inches. The height follows from the contents.
+        Width in inches. The height follows from the contents.
     columns : int
-        Of the grid of panels.
+        Number of columns of the grid of panels.
     dpi : int
         Pixels of pictures in an inch.
     """
@@ -220,7 +149,7 @@ class Page:
 
     @cached_property
     def _figure(self) -> Figure:
-        """The figure that is drawn."""
+        """The matplotlib figure."""
         size = self.width, max(self._height, 0.1)
         return NotebookFigure(figsize=size, dpi=self.dpi)
 
@@ -444,7 +373,7 @@ def _marker_size(diameter: np.ndarray, is_open: bool) -> tuple[np.ndarray, np.nd
     Parameters
     ----------
     diameter : ndarray
-        Of dots without their outlines, in points.
+        Diameters of dots without their outlines, in points.
     is_open : bool
         Whether they are circles around dots.
     """

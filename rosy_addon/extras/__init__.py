@@ -1,4 +1,4 @@
-"""The command line of the Python package, and what it has besides those of the extension for Blender.
+"""The command line of the Python package, with commands that the extension for Blender lacks.
 
 command_line   the commands
 film           the command `film`: the steps of a simulation as a video

@@ -47,7 +47,7 @@ SCRIPT = Path(__file__).resolve().with_name("blender_script.py")
 #: How Blender is started: without the user's settings and add-ons, and without scripts in .blend files.
 BLENDER_OPTIONS = ("-b", "--factory-startup", "--disable-autoexec", "--python-exit-code", "1")
 
-#: Names of Blender on the PATH. The second one is that of Flatpak.
+#: Names of Blender on the PATH. Flatpak uses the second one.
 PROGRAM_NAMES = ("blender", "org.blender.Blender")
 
 #: Where installers and users put Blender, by `sys.platform`. ``%...%`` is an environment variable.
@@ -137,7 +137,7 @@ def _version_text(version: Sequence[int]) -> str:
 def installed_blenders() -> list[str]:
     """Return the programs of Blender on the PATH and in the usual places, newest first in these.
 
-    The numbers in the names of their folders are taken for versions.
+    Numbers in the names of their folders count as versions.
     """
     on_path = filter(None, map(shutil.which, PROGRAM_NAMES))
     found: list[str | None] = []
@@ -160,7 +160,7 @@ def _numbers(path: str) -> list[int]:
 
 
 def _program(path: Path) -> str | None:
-    """Return the program under a path: itself, or that in a folder or in a bundle of macOS."""
+    """Return the program at a path, which may be a folder or an app bundle of macOS; None without."""
     for part in (".", "blender", "blender.exe", "Contents/MacOS/Blender"):
         if os.access(path / part, os.X_OK) and (path / part).is_file():
             return str((path / part).absolute())
@@ -203,7 +203,7 @@ def run_in_blender(
     Parameters
     ----------
     arguments : sequence of str
-        Of the command.
+        Arguments of the command.
     options : Options
         The options of the command.
     command : str
@@ -235,9 +235,9 @@ def run_job(program: str, arguments: Sequence[str]) -> int:
     Parameters
     ----------
     program : str
-        Of Blender.
+        Path of Blender.
     arguments : sequence of str
-        Of the command.
+        Arguments of the command.
 
     Raises
     ------
@@ -298,7 +298,7 @@ def _copy(stream: TextIO | None, default: int, stack: ExitStack) -> int:
 
 
 def _encoding(stream: TextIO | None) -> tuple[str, str]:
-    """Return the encoding of a stream, and what it does with errors."""
+    """Return the encoding of a stream, and its error handler."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return encoding, getattr(stream, "errors", None) or "backslashreplace"
 
@@ -360,7 +360,7 @@ def _stop(process: subprocess.Popen[bytes], report: BinaryIO) -> None:
 
 
 def _report_lines(report: BinaryIO) -> list[bytes]:
-    """Return what the script has reported: that it began, and the exit status of the command."""
+    """Return the words that the script has reported: "begun", then the exit status of the command."""
     report.seek(0)
     return report.read().split()
 
@@ -385,7 +385,7 @@ def blender_encoder(requested: str | None) -> Encoder | None:
     Parameters
     ----------
     requested : str, optional
-        As of `find_blender`.
+        See `find_blender`.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""The script that runs a command of the Python package in a Blender; see `extras.blender`.
+"""Script that runs a command of the Python package in a Blender; see `extras.blender`.
 
 It loads the package from its folder. The folder around the package is not added to the path of
-modules, because what else is installed there is for another Python::
+modules, because other packages there are installed for another Python::
 
     blender -b --factory-startup --python blender_script.py -- JOB
 
@@ -10,7 +10,7 @@ JOB is a JSON object:
 package, folder
     Name of the package, and its folder.
 arguments
-    Of the command.
+    Arguments of the command.
 handles
     Descriptors for the output of the command, for its errors, and for the report: the word "begun",
     and then the exit status. On Windows they are handles.

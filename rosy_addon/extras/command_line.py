@@ -1,4 +1,4 @@
-"""The command line of the Python package: the commands, with what is not in the extension."""
+"""The command line of the Python package, with the commands that the extension lacks."""
 
 from __future__ import annotations
 

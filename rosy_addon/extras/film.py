@@ -12,7 +12,6 @@ import numpy as np
 from .. import api
 from ..api.films import MAX_BETWEEN
 from ..api.pictures import picture_look
-from ..api.surface import MeshArrays
 from ..cli.options import Options, add_subcommand, int_between
 from ..cli.pictures import add_motion_options, video_encoder
 from ..cli.streams import print_line
@@ -22,6 +21,7 @@ from ..external.simulation_files import SUFFIXES, Step, in_order, list_steps
 from ..field.array_field import SurfaceArrays, array_field
 from ..field.field_io import READ_SUFFIXES
 from ..field.formats.polygons import Polygons
+from ..field.mesh_arrays import MeshArrays
 from ..field.mesh_io import READERS
 from ..field.rosy_field import check_degree
 from ..rendering.turntable import check_video_path
@@ -139,14 +139,14 @@ def requested_fields(options: Options) -> SimulationFields | FieldFiles:
 
 @dataclass(eq=False)
 class FieldFiles(Sequence[api.Field]):
-    """The fields of files, on one surface. A file is read each time that its field is asked for.
+    """Fields of files on one surface. An item is read from its file at each access.
 
     Parameters
     ----------
     paths : sequence of Path
     surface : Surface
     degree, nonfinite
-        See `api.read_field`. By default the degree is that of the first field.
+        See `api.read_field`. By default all fields must have the degree of the first one.
     """
 
     paths: Sequence[Path]
@@ -176,7 +176,7 @@ class FieldFiles(Sequence[api.Field]):
 
 @dataclass(eq=False)
 class SimulationFields(Sequence[api.Field]):
-    """The fields of the steps of a simulation. A step is read each time that its field is asked for.
+    """Fields of the steps of a simulation. An item is read from its file at each access.
 
     Parameters
     ----------
@@ -198,15 +198,15 @@ class SimulationFields(Sequence[api.Field]):
         return len(self.steps)
 
     def __getitem__(self, index: Any) -> Any:
-        mesh = self.steps[index].read()
-        # If the mesh is that of the last step, its surface is used again.
+        name, mesh = self.steps[index].name, self.steps[index].read()
+        # If the mesh has not changed since the last step, its surface is used again.
         if self._last is None or not all(map(np.array_equal, mesh.polygons, self._last[0])):
-            arrays = MeshArrays(*mesh.polygons)
-            self._last = mesh.polygons, api.Surface(arrays, name=mesh.name, up=self.up)
+            surface = api.Surface(MeshArrays(*mesh.polygons), name=name, up=self.up)
+            self._last = mesh.polygons, surface
         surface = self._last[1]
-        arrays = SurfaceArrays(mesh.name, surface.mesh, mesh.point_arrays, mesh.cell_arrays)
+        arrays = SurfaceArrays(name, surface, mesh.vertex_data or {}, mesh.face_data or {})
         field = array_field(arrays, self.array, self.degree, self.nonfinite)
-        return api.Field(surface, field)
+        return api.Field.of(surface, field)
 
     def time_text(self, index: int) -> str:
         """Return the time of a step, for the line that is printed; empty if the files state none."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core.errors import RosyError
 from ..core.progress import progress, report
+from .blocks import as_float64
 from .field_io import field_from_raw
 from .formats.polygons import RawField
 from .frames import dot
@@ -21,7 +22,6 @@ from .validate import (
     MAX_OUTLIER_FRACTION,
     TOLERANCE_DEG,
     apply_nonfinite_policy,
-    as_float64,
     tangent_normals,
 )
 

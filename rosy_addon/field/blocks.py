@@ -96,3 +96,9 @@ def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
     result = np.repeat(shift, count)
     result += np.arange(len(result))
     return result
+
+
+def as_float64(values: np.ndarray) -> np.ndarray:
+    """Return a copy of numbers as float64, without a warning for signalling NaN."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -76,7 +76,7 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
     )
     x, y = face_frames(surface)
     mean, deviator = _bounded_curvature(surface, fans, x, y)
-    noisy = replace(surface, vertices=surface.vertices + noise)
+    noisy = surface.with_parts(vertices=surface.vertices + noise)
     normal = noisy.face_normal
     x_noisy = normalize(x - dot(x, normal)[:, None] * normal)
     mean_noisy, deviator_noisy = _bounded_curvature(noisy, fans, x_noisy, np.cross(normal, x_noisy))

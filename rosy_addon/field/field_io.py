@@ -28,7 +28,7 @@ from .formats.sings import SINGULARITY_SUFFIXES, sings_text
 from .formats.text_rows import format_lines
 from .frames import dot, normalize, transport
 from .mesh_io import READERS as MESH_READERS
-from .mesh_io import SHARP_ANGLE, read_mesh
+from .mesh_io import SHARP_ANGLE
 from .rosy_field import RosyField
 from .singularities import find_singularities
 from .surface import Surface, build_surface
@@ -212,7 +212,7 @@ def _source_surface(
 ) -> Surface | None:
     """Return the surface that the rows of a file refer to, if it is not `surface`; None if it is."""
     if mesh is not None:
-        return read_mesh(mesh)
+        return Surface(mesh)
     count = len(raw.values)
     if raw.polygons is not None:
         counts = len(raw.polygons.vertices), raw.polygons.face_count
@@ -227,7 +227,7 @@ def _source_surface(
     mesh_path = next((candidate for candidate in candidates if candidate.is_file()), None)
     if mesh_path is None:
         return None
-    source = read_mesh(mesh_path)
+    source = Surface(mesh_path)
     # The rows may match the vertices of `surface`, but belong to the faces of the mesh file.
     return source if count == source.face_count or infer_domain(surface, count) is None else None
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..core.errors import RosyError
 from ..core.file_io import check_parsing_memory
-from ..core.progress import progress
-from .formats.obj import read_obj
+from .formats.obj import read_obj, read_uv
 from .formats.off import read_off
-from .formats.ply import read_ply
+from .formats.ply import read_ply, read_vertex_values
 from .formats.polygons import Polygons
 from .formats.stl import read_stl
-from .surface import Surface, build_surface
 
 #: The reader of each file name extension.
 READERS: dict[str, Callable[[Path], Polygons]] = {
@@ -35,32 +33,7 @@ BINARY_MEMORY = {".ply": 20, ".stl": 10}
 SHARP_ANGLE = np.radians(60)
 
 
-def read_mesh(path: str | os.PathLike[str]) -> Surface:
-    """Read a mesh from an .obj, .off, .ply or .stl file.
-
-    Edges with an angle above `SHARP_ANGLE` are sharp.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    Surface
-        Its name is the path of the file.
-
-    Raises
-    ------
-    RosyError
-        If the file has another extension, cannot be read or is malformed, or is not a mesh with faces.
-    """
-    with progress(0.0, 0.5):
-        polygons = read_polygons(path)
-    with progress(0.5, 1.0):
-        return build_surface(*polygons, name=str(path), sharp_angle=SHARP_ANGLE)
-
-
-def read_polygons(path: str | os.PathLike[str]) -> Polygons:
+def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = ()) -> Polygons:
     """Read the polygons of an .obj, .off, .ply or .stl file.
 
     Vertices and faces keep the order of the file, because field files refer to them by number.
@@ -69,6 +42,8 @@ def read_polygons(path: str | os.PathLike[str]) -> Polygons:
     Parameters
     ----------
     path : path-like
+    other_suffixes : sequence of str
+        Suffixes of other readers, for the error.
 
     Returns
     -------
@@ -83,9 +58,19 @@ def read_polygons(path: str | os.PathLike[str]) -> Polygons:
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        *suffixes, last = READERS
+        *suffixes, last = (*READERS, *other_suffixes)
         raise RosyError(
             f"{path}: is not a mesh file: its name must end in {', '.join(suffixes)} or {last}"
         )
     check_parsing_memory(path, BINARY_MEMORY.get(path.suffix.lower(), 1))
     return reader(path)
+
+
+def read_uv_map(path: Path) -> np.ndarray | None:
+    """Return the (C, 2) texture coordinates in a mesh file; None if it has none. Only .obj files have."""
+    return read_uv(path) if path.suffix.lower() == ".obj" else None
+
+
+def read_vertex_data(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of vertices in a mesh file by their names. Only .ply files have any."""
+    return read_vertex_values(path) if path.suffix.lower() == ".ply" else {}

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from .blocks import by_rows
-from .frames import dot, normalize
-from .polygon_arrays import face_blocks, next_corners
+from .frames import dot
 from .rosy_field import RosyField
 from .surface import Surface
+from .surface import face_frames as face_frames
 
 
 def power(base: np.ndarray, degree: int) -> np.ndarray:
@@ -87,30 +87,6 @@ def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
     """
     rho, angle = np.abs(z)[..., None], (np.angle(z) / degree)[..., None]
     return rho * (np.cos(angle) * x + np.sin(angle) * y)
-
-
-def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Return the tangent frame x, y of each face.
-
-    Returns
-    -------
-    x, y : (F, 3) ndarray
-        Unit tangents. x runs along the first edge of nonzero length, y is the cross product of the
-        normal and x. Both are zero for faces without area, so that representations are zero there.
-    """
-    normal = surface.face_normal
-    x = np.empty_like(normal)
-    for faces, corners, starts in face_blocks(surface.face_start):
-        points = surface.vertices.take(surface.corner_vertex[corners], axis=0)
-        corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
-        edge = points[next_corners(starts)] - points
-        edge -= dot(edge, corner_normal)[:, None] * corner_normal
-        length = np.sqrt(dot(edge, edge))
-        last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
-        candidate = np.where(length > 0, np.arange(len(length)), last_corner)
-        x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
-    x[~normal.any(axis=1)] = 0.0
-    return x, np.cross(normal, x)
 
 
 def face_representation(surface: Surface, field: RosyField) -> np.ndarray:

@@ -17,16 +17,6 @@ from .rosy_field import RosyField
 from .surface import Surface
 
 
-def euler_characteristic(surface: Surface) -> int:
-    """Return the Euler characteristic V - E + F: 2 for a sphere, 0 for a torus.
-
-    Vertices without a face are not counted.
-    """
-    edges = build_edges(surface.corner_vertex, surface.face_start)
-    used = len(surface.used_vertices)
-    return used - len(edges.face_count) + surface.face_count
-
-
 def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.ndarray]:
     """Find the singular vertices of a field, and their indices.
 

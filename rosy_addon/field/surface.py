@@ -2,27 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..core.cache import content_hash
 from ..core.errors import RosyError, counted
 from .blocks import mask, row_blocks
 from .connectivity import build_edges, smooth_fans
 from .frames import dot, normalize
+from .mesh_arrays import mesh_arrays
+from .mesh_io import SHARP_ANGLE, read_uv_map, read_vertex_data
 from .polygon_arrays import (
     BLOCK_ELEMENTS,
     box_corners,
     corner_faces,
     face_area_vectors,
+    face_blocks,
     fan_normals,
     mean_per_face,
     next_corners,
     sum_per_fan,
 )
 from .triangulate import triangulate
+from .up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 #: Largest coordinate and smallest extent of a mesh. Beyond them, squares and products of lengths
 #: leave the range of floating-point numbers.
@@ -32,12 +41,37 @@ MAX_COORDINATE, MIN_EXTENT = 1e12, 1e-12
 NORMAL_TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Surface:
-    """A polygon mesh: V vertices, F faces, C corners (face-vertex pairs), T triangles.
+    """A polygon mesh, on which fields are made and drawn.
 
-    The corners of face f are ``face_start[f] .. face_start[f + 1] - 1``, counter-clockwise about
-    the outward normal, as in Blender. Use `build_surface` to make a surface.
+    It has V vertices, F faces, C corners (face-vertex pairs) and T triangles. The corners of face f are
+    ``face_start[f] .. face_start[f + 1] - 1``, counter-clockwise about the outward normal, as in
+    Blender. `build_surface` makes a surface from such flat arrays.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array_like, path-like or mesh
+        Positions; (V, 2) for a flat mesh. Or, without `faces`, a file (``.obj``, ``.off``, ``.ply``,
+        ``.stl``, or a file of a simulation, such as ``.vtu``), or a mesh of meshio, PyVista, trimesh
+        (or its scene) or Open3D.
+    faces : (F, k) array_like of int, or sequence of sequences of int, optional
+        Vertices of each face, counter-clockwise about the outward normal.
+    name : str, optional
+        For messages; by default the path of the file, or "surface".
+    up : {"y", "z"}, optional
+        The axis that points up in pictures. By default "y" for ``.obj`` and ``.off`` files, otherwise
+        "z".
+    uv : (V, 2) or (C, 2) array_like, optional
+        Texture coordinates of the vertices, or of the corners, face by face. Files in ``.obj`` format
+        and meshes of trimesh, PyVista and Open3D can have their own.
+    sharp_angle : float, optional
+        Angle in radians between the normals of two faces above which their edge is sharp. Field values
+        and normals do not mix across sharp edges. By default 60 degrees.
+    sharp_edges : (E, 2) array_like of int, optional
+        Pairs of vertices, further sharp edges.
+    step : int, optional
+        Number of the step in the file of a simulation with several, from 1. By default the last one.
 
     Attributes
     ----------
@@ -60,6 +94,29 @@ class Surface:
         field values are averaged over them. Sharp edges and flat faces separate fans.
     rest_vertices : (V, 3) float64 ndarray or None
         Positions before deformation, which field vectors refer to; None if not deformed.
+    up : {"y", "z"}
+        The axis that points up in pictures.
+
+    Warns
+    -----
+    RosyWarning
+        If a file has several steps, and `step` is not given.
+
+    Raises
+    ------
+    RosyError
+        If there is no face, an index is out of range, a coordinate is not finite, or a file cannot be
+        read. Files of simulations need ``pip install rosyfields[io]``.
+
+    Examples
+    --------
+    >>> import rosyfields as rf
+    >>> surface = rf.Surface([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
+    >>> surface
+    <Surface 'surface': 1 face, 4 vertices>
+    >>> bunny = rf.Surface("bunny.obj")  # doctest: +SKIP
+    >>> flow = rf.Surface("flow.vtu")  # doctest: +SKIP
+    >>> grid = rf.Surface(pyvista.read("flow.vtu"))  # doctest: +SKIP
     """
 
     name: str
@@ -71,11 +128,96 @@ class Surface:
     corner_normal: np.ndarray
     corner_fan: np.ndarray
     rest_vertices: np.ndarray | None = None
+    up: str = "z"
+
+    #: The file that it was read from. Like `uv` and the arrays below, it is no field of the dataclass, so
+    #: other processes do not get it.
+    _path = None
+
+    def __init__(
+        self,
+        vertices: ArrayLike | str | os.PathLike[str] | Any,
+        faces: ArrayLike | Sequence[Sequence[int]] | None = None,
+        *,
+        name: str | None = None,
+        up: str | None = None,
+        uv: ArrayLike | None = None,
+        sharp_angle: float | None = None,
+        sharp_edges: ArrayLike | None = None,
+        step: int | None = None,
+    ) -> None:
+        is_path = faces is None and isinstance(vertices, (str, os.PathLike))
+        name = name or (str(vertices) if is_path else "surface")
+        up = up or (UP_AXIS_BY_SUFFIX.get(Path(vertices).suffix.lower(), "z") if is_path else "z")
+        if up not in UP_AXIS_MATRIX:
+            raise RosyError(f"{name}: up is {up!r}: choose 'y' or 'z'")
+        arrays = mesh_arrays(vertices, faces, name, uv, step)
+        built = build_surface(
+            arrays.vertices,
+            arrays.corner_vertex,
+            arrays.face_start,
+            name=name,
+            sharp_angle=SHARP_ANGLE if sharp_angle is None else sharp_angle,
+            sharp_edges=None if sharp_edges is None else np.asarray(sharp_edges),
+        )
+        own = vars(self)
+        own.update(vars(built), up=up, _path=Path(vertices) if is_path else None)
+        given = {"uv": arrays.uv, "vertex_data": arrays.vertex_data, "face_data": arrays.face_data}
+        own.update((key, value) for key, value in given.items() if value is not None)
+
+    def __repr__(self) -> str:
+        faces = counted(self.face_count, "face")
+        return (
+            f"<Surface {self.name!r}: {faces}, {counted(len(self.vertices), 'vertex', 'vertices')}>"
+        )
+
+    def with_parts(self, **parts: Any) -> Surface:
+        """Return the surface with other values of some attributes, which must fit the rest."""
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        return _surface_of_parts(**{**own, **parts})
 
     @property
     def face_count(self) -> int:
         """F, the number of faces."""
         return len(self.face_start) - 1
+
+    @property
+    def faces(self) -> np.ndarray | list[np.ndarray]:
+        """(F, k) int32: the vertices of each face; a list of arrays if faces have different sizes."""
+        sizes = np.diff(self.face_start)
+        if (sizes == sizes[0]).all():
+            return self.corner_vertex.reshape(-1, sizes[0])
+        return np.split(self.corner_vertex, self.face_start[1:-1])
+
+    @cached_property
+    def uv(self) -> np.ndarray | None:
+        """(C, 2) float64: texture coordinates of the corners, face by face; None without a UV map."""
+        return None if self._path is None else read_uv_map(self._path)
+
+    @cached_property
+    def vertex_data(self) -> Mapping[str, np.ndarray]:
+        """Arrays of V rows by their names, from a ``.ply`` file, a simulation or the mesh of a library."""
+        return {} if self._path is None else read_vertex_data(self._path)
+
+    @cached_property
+    def face_data(self) -> Mapping[str, np.ndarray]:
+        """Arrays of F rows by their names, from the file of a simulation or the mesh of a library."""
+        return {}
+
+    @cached_property
+    def face_frames(self) -> tuple[np.ndarray, np.ndarray]:
+        """The tangent frame of each face: x along its first edge, and y, a quarter turn from it.
+
+        Both are (F, 3) float64. `Field.angles` are measured from x. The frames are those of
+        ``igl.local_basis``.
+        """
+        return face_frames(self)
+
+    @property
+    def euler_characteristic(self) -> int:
+        """V - E + F: 2 for a sphere, 0 for a torus. Vertices without a face do not count."""
+        edges = build_edges(self.corner_vertex, self.face_start)
+        return len(self.used_vertices) - len(edges.face_count) + self.face_count
 
     def in_rest_shape(self) -> Surface:
         """Return the surface before deformation, to which field vectors refer."""
@@ -88,7 +230,7 @@ class Surface:
 
         The normals stay as they are.
         """
-        return replace(self, vertices=vertices, rest_vertices=None)
+        return self.with_parts(vertices=vertices, rest_vertices=None)
 
     @cached_property
     def rest_shape_key(self) -> bytes:
@@ -218,7 +360,7 @@ def build_surface(
         )
     if corner_normal is None:
         corner_normal = fan_normals(vertices, corner_vertex, face_start, corner_fan)
-    return Surface(
+    return _surface_of_parts(
         name=name,
         vertices=vertices,
         corner_vertex=corner_vertex,
@@ -233,9 +375,40 @@ def build_surface(
     )
 
 
+def _surface_of_parts(**parts: Any) -> Surface:
+    """Return a surface with these attributes."""
+    surface = object.__new__(Surface)
+    vars(surface).update(parts)
+    return surface
+
+
 def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
     """Return (n,) intp, the vertices that a corner refers to, in ascending order."""
     return np.flatnonzero(mask(vertex_count, corner_vertex))
+
+
+def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tangent frame x, y of each face.
+
+    Returns
+    -------
+    x, y : (F, 3) ndarray
+        Unit tangents. x runs along the first edge of nonzero length, y is the cross product of the
+        normal and x. Both are zero for faces without area, so that representations are zero there.
+    """
+    normal = surface.face_normal
+    x = np.empty_like(normal)
+    for faces, corners, starts in face_blocks(surface.face_start):
+        points = surface.vertices.take(surface.corner_vertex[corners], axis=0)
+        corner_normal = np.repeat(normal[faces], np.diff(starts), axis=0)
+        edge = points[next_corners(starts)] - points
+        edge -= dot(edge, corner_normal)[:, None] * corner_normal
+        length = np.sqrt(dot(edge, edge))
+        last_corner = np.repeat(starts[1:] - 1, np.diff(starts))
+        candidate = np.where(length > 0, np.arange(len(length)), last_corner)
+        x[faces] = normalize(edge[np.minimum.reduceat(candidate, starts[:-1])])
+    x[~normal.any(axis=1)] = 0.0
+    return x, np.cross(normal, x)
 
 
 def count_inconsistent_edges(surface: Surface) -> int:

@@ -352,9 +352,3 @@ def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfini
             f"{domain} {int(np.argmax(unusable))}: correct them, or choose to treat them as undefined"
         )
     values[unusable] = 0.0
-
-
-def as_float64(values: np.ndarray) -> np.ndarray:
-    """Return a copy of numbers as float64, without a warning for signalling NaN."""
-    with np.errstate(invalid="ignore"):
-        return values.astype(np.float64)

@@ -1,35 +1,20 @@
-"""`ImageData`: a picture as an image of Blender stores it."""
+"""`ImageData`: the contents of an image of Blender, a PNG file or pixels in single precision."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import struct
+from typing import TypeAlias
 
 import numpy as np
 
 from .png import png_bytes
 
-
-class ImageData(NamedTuple):
-    """A picture as an image of Blender stores it: the bytes of a file, or pixels.
-
-    Attributes
-    ----------
-    width, height : int
-        Pixels.
-    png : bytes or None
-        The file of an 8-bit image.
-    pixels : (H, W, 4) float32 ndarray or None
-        Linear values of an image in single precision.
-    """
-
-    width: int
-    height: int
-    png: bytes | None = None
-    pixels: np.ndarray | None = None
+#: The bytes of a PNG file for an 8-bit image, or (H, W, 4) float32 linear values, rows from the bottom.
+ImageData: TypeAlias = bytes | np.ndarray
 
 
 def image_of_pixels(pixels: np.ndarray, as_float: bool, *, is_color: bool) -> ImageData:
-    """Convert pixels for a Blender image as they are.
+    """Return the contents of an image with these pixels.
 
     Parameters
     ----------
@@ -40,7 +25,14 @@ def image_of_pixels(pixels: np.ndarray, as_float: bool, *, is_color: bool) -> Im
     is_color : bool
         Whether 8-bit values are colors (sRGB), and not data.
     """
-    height, width = pixels.shape[:2]
-    if as_float:
-        return ImageData(width, height, pixels=pixels)
-    return ImageData(width, height, png=png_bytes(pixels, is_color=is_color))
+    return pixels if as_float else png_bytes(pixels, is_color=is_color)
+
+
+def image_size(contents: ImageData) -> tuple[int, int]:
+    """Return the width and the height of an image in pixels."""
+    if isinstance(contents, bytes):
+        width, height = struct.unpack_from(
+            ">II", contents, 16
+        )  # after the header of the first chunk
+        return width, height
+    return contents.shape[1], contents.shape[0]

@@ -11,9 +11,9 @@ import numpy as np
 from ..core.cache import BAKE_CACHE
 from ..core.progress import progress
 from ..field.frames import dot
+from ..field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from ..projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from .pipeline import LightSource, StrokeDrawing, draw_instances
 from .polyline_files import polyline_file, simplify_strokes
 from .stroke_set import Strokes

@@ -186,8 +186,7 @@ def with_vertices_of_fans(instance: MeshInstance) -> MeshInstance:
         Vertex k is fan k; faces, corners and triangles are the same.
     """
     surface = instance.surface
-    split = replace(
-        surface,
+    split = surface.with_parts(
         vertices=surface.vertices[fan_vertices(surface)],
         corner_vertex=surface.corner_fan,
         rest_vertices=None,

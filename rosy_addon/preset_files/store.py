@@ -267,8 +267,8 @@ def save_preset(preset: Preset, user_folder: Path, *, replace: bool = False) -> 
     Raises
     ------
     RosyError
-        If the name or the description is not allowed, the name is that of a shipped preset or,
-        unless `replace` is set, of another preset of the user, or if a file cannot be written.
+        If the name or the description is not allowed, a shipped preset or, unless
+        `replace` is set, another preset of the user has the name, or if a file cannot be written.
     """
     path = _target_path(_validated(preset), user_folder, replace)
     make_folder(user_folder)
@@ -357,7 +357,7 @@ def _target_path(preset: Preset, user_folder: Path, replace: bool) -> Path:
 
 
 def _user_file(key: str, user_folder: Path) -> Path:
-    """Return the file of one of the user's own presets. Raise RosyError if it is none of them."""
+    """Return the file of one of the user's own presets. Raise RosyError if there is none with this key."""
     path = preset_files(user_folder).get(key)
     if path is None or path.parent != user_folder:
         raise RosyError(f"'{key}' is not one of your presets")

@@ -1,4 +1,4 @@
-"""The input of a renderer for a mesh that is not part of a scene, such as one from a file."""
+"""The input of a renderer for a mesh that is not in a scene, such as a mesh from a file."""
 
 from __future__ import annotations
 
@@ -9,32 +9,29 @@ from ..compositor.target_tone import ReferenceRender
 from ..core.errors import RosyError
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
+from ..field.up_axis import UP_AXIS_MATRIX
 from ..projection.camera import orbit_camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
-from ..projection.up_axis import UP_AXIS_MATRIX
 from .view_input import ViewInput
 
 
 def mesh_instance(
     surface: Surface,
-    field: RosyField | None,
-    up: str,
+    field: RosyField | None = None,
     tone: SurfaceTone | None = None,
     color_values: np.ndarray | None = None,
 ) -> MeshInstance:
-    """Return a mesh in world space, upright.
+    """Return a mesh in world space, where z points up.
 
     Parameters
     ----------
     surface : Surface
-    field : RosyField or None
-    up : {"y", "z"}
-        The mesh's upward axis.
+    field : RosyField, optional
     tone : SurfaceTone, optional
     color_values : (C,) float32 ndarray, optional
     """
-    return MeshInstance(surface, UP_AXIS_MATRIX[up], field, tone, color_values)
+    return MeshInstance(surface, UP_AXIS_MATRIX[surface.up], field, tone, color_values)
 
 
 def mesh_view(

@@ -21,10 +21,10 @@ BLOCK_ROWS = 64
 #: Label of all steps.
 STEP_LABEL = "converting the picture"
 
-#: Shown where there is no picture: the linear value of mid gray on screen.
+#: Color outside of the picture: the linear value of mid gray on screen.
 NEUTRAL_GRAY = float(to_linear(np.array(0.5, dtype=np.float32)))
 
-#: Share of the time for a picture after which it is converted.
+#: Fraction of the progress at which the conversion starts.
 CONVERSION_START = 0.95
 
 

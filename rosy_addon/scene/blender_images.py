@@ -10,7 +10,7 @@ import bpy
 
 from ..core.errors import RosyError
 from ..core.file_io import check_writable, make_folder, replacing, write_bytes
-from ..image_io.image_data import ImageData
+from ..image_io.image_data import ImageData, image_size
 
 
 def new_image(
@@ -28,7 +28,7 @@ def new_image(
     name : str
         Name of the datablock.
     image_data : ImageData
-        With a PNG file for 8 bits, with pixels for single precision.
+        A PNG file for 8 bits, pixels for single precision.
     as_float : bool
         Whether linear values are stored in single precision.
     is_color : bool
@@ -41,21 +41,19 @@ def new_image(
     RosyError
         If the file cannot be written. The image is deleted in this case.
     """
-    image = bpy.data.images.new(
-        name, image_data.width, image_data.height, alpha=True, float_buffer=as_float
-    )
+    image = bpy.data.images.new(name, *image_size(image_data), alpha=True, float_buffer=as_float)
     try:
         image.alpha_mode = "CHANNEL_PACKED"
         image.colorspace_settings.name = "sRGB" if is_color and not as_float else "Non-Color"
         if as_float:
-            image.pixels.foreach_set(image_data.pixels.ravel())
+            image.pixels.foreach_set(image_data.ravel())
             image.update()
         if stem is not None:
-            _save_image(image, image_data.png, stem)
+            _save_image(image, None if as_float else image_data, stem)
         elif as_float:
             image.pack()
         else:
-            image.pack(data=image_data.png, data_len=len(image_data.png))
+            image.pack(data=image_data, data_len=len(image_data))
             image.source = "FILE"
     except BaseException:
         bpy.data.images.remove(image)
@@ -151,17 +149,15 @@ def write_frame(path: Path, image_data: ImageData) -> None:
     """
     make_folder(path.parent)
     check_writable(path)
-    if image_data.png is not None:
-        write_bytes(path, image_data.png)
+    if isinstance(image_data, bytes):
+        write_bytes(path, image_data)
         return
-    image = bpy.data.images.new(
-        path.stem, image_data.width, image_data.height, alpha=True, float_buffer=True
-    )
+    image = bpy.data.images.new(path.stem, *image_size(image_data), alpha=True, float_buffer=True)
     # Blender takes the output format from a scene. A temporary one leaves the user's unchanged.
     scene = bpy.data.scenes.new(path.stem)
     try:
         image.colorspace_settings.name = "Non-Color"
-        image.pixels.foreach_set(image_data.pixels.ravel())
+        image.pixels.foreach_set(image_data.ravel())
         image_settings = scene.render.image_settings
         image_settings.file_format, image_settings.color_mode, image_settings.color_depth = (
             "OPEN_EXR",

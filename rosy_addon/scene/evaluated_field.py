@@ -12,12 +12,12 @@ import numpy as np
 from ..core.cache import Cache, content_hash
 from ..core.errors import RosyError
 from ..core.progress import report
+from ..field.blocks import as_float64
 from ..field.frames import dot, normalize, transport
 from ..field.rosy_field import RosyField
 from ..field.surface import Surface
 from ..field.validate import (
     apply_nonfinite_policy,
-    as_float64,
     project_to_tangent,
     tangent_normals,
 )

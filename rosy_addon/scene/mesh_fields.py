@@ -8,14 +8,15 @@ import numpy as np
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
 from ..core.progress import progress, report
+from ..field.blocks import as_float64
 from ..field.directional_field import field_directions
 from ..field.frames import dot, normalize, tangent_frame
+from ..field.polygon_arrays import mean_per_face
 from ..field.representation import face_frames, from_representation, to_representation
 from ..field.rosy_field import MAX_DEGREE, RosyField, check_degree
-from ..field.surface import Surface, mean_per_face
+from ..field.surface import Surface
 from ..field.validate import (
     apply_nonfinite_policy,
-    as_float64,
     project_to_tangent,
     validated_directions,
     validated_field,

@@ -24,7 +24,7 @@ from ..compositor.picture import Picture
 from ..compositor.picture_key import picture_key
 from ..core.errors import RosyError
 from ..core.file_io import check_folder
-from ..image_io.image_data import ImageData
+from ..image_io.image_data import ImageData, image_size
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
 from .bake_records import (
@@ -259,7 +259,7 @@ def apply_picture(
         material,
         source,
         {None: state},
-        size=image_data[:2],
+        size=image_size(image_data),
         key=picture_key(view.look, picture),
     )
     _show_on_objects(node_groups)
@@ -386,7 +386,7 @@ def apply_texture(
         material = new_texture_material(name, image, uv_map, add_shader)
         created.append(material)
         node_groups = _new_groups(material, {obj: None}, created)
-    size = first.width, first.height
+    size = image_size(first)
     store_record(scene, obj.name, image, material, obj, {None: state}, size=size, is_texture=True)
     # The object keeps its pictures, but no other texture.
     _show_on_objects(node_groups, keep_textures=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 
 import bpy
@@ -471,7 +471,7 @@ class SceneReader:
         rest = np.asarray(rest, dtype=np.float64)
         key = surface_key(surface, "rest", rest)
         return self.cache.get_or_create(
-            key, lambda: (surface, replace(surface, rest_vertices=rest))
+            key, lambda: (surface, surface.with_parts(rest_vertices=rest))
         )[1]
 
 

@@ -1,6 +1,11 @@
 """Helper processes: long numeric work beside Blender, and large pictures on several cores.
 
-`job` describes work that reads, has something computed, and applies it; `step_runner` runs it bit by bit. A `helper` is a
-process that computes: this package, started as a program (`__main__`). A `pool` shares calls among several. They talk
-through a `channel`. `start` starts all processes, and sees to it that none outlives this one; `program` runs others.
+job            jobs: read, have results computed, apply them
+step_runner    runs the steps of a job one by one
+helper         a process that makes calls: this package, started as a program (`__main__`)
+pool           several helpers that share calls
+channel        messages between processes
+start          starts processes that end with this one
+program        other programs, as parts of jobs
+frame_workers  a command for many frames, in several processes
 """

@@ -1,4 +1,4 @@
-"""The program of a helper: it calls the functions that are sent to it until the other process ends."""
+"""The program of a helper process: it makes the calls that are sent to it until the other process ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .channel import Channel
 from .pool import POOL
 from .start import own_end
 
-#: Seconds without work after which memory is given back.
+#: Seconds without a call after which caches are cleared.
 IDLE_SECONDS = 120.0
 
 #: Seconds between two reports. The end of the other process is noticed at one of them.
@@ -24,7 +24,7 @@ REPORT_SECONDS = 0.05
 
 
 class _Reporter:
-    """Tells the other process how far a call has come, and ends this one if the other has ended."""
+    """Send the progress of a call to the other process, and end this one if the other has ended."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel, self._next_time = channel, 0.0
@@ -49,7 +49,7 @@ def main(handle: str, package: str) -> None:
     Parameters
     ----------
     handle : str
-        Of this end of the connection.
+        Handle of this end of the connection.
     package : str
         The name of this package in the other process.
     """
@@ -77,7 +77,7 @@ def main(handle: str, package: str) -> None:
 def _answer(
     function: Callable[..., Any], arguments: tuple[Any, ...], reporter: _Reporter
 ) -> tuple[Any, ...]:
-    """Call a function, and return the message with what it returns or raises."""
+    """Call a function, and return the message with its result or error."""
     try:
         with listening(reporter):
             return "result", function(*arguments)

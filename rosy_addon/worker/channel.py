@@ -1,7 +1,7 @@
 """Messages between a process and its helper: pickles whose large arrays are not copied.
 
-Meshes and fields are sent once. Later messages name them, so that a picture with another look costs some
-kilobytes, and so that caches, which compare meshes by identity, find them again.
+Meshes and fields are sent once. Later messages refer to them by number, so that a picture with another look
+costs a few kilobytes, and caches, which compare meshes by identity, find them again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..projection.gbuffer import MeshInstance
 from ..projection.surface_tone import SurfaceTone
 from .start import PACKAGE
 
-#: Immutable classes whose instances the other process keeps: they are large, and used again.
+#: Immutable classes of large, reused objects, which the other process keeps.
 KEPT_CLASSES = (GuidedSystem, MeshInstance, ReferenceRender, RosyField, Surface, SurfaceTone)
 
 #: Bytes of an array that are written at a time.
@@ -44,21 +44,21 @@ class Channel:
     def __init__(self, connection: Connection, package: str) -> None:
         self.connection = connection
         self._package = package
-        #: What the other process keeps: its number there and the object, by its id.
+        #: Objects that the other process keeps, with their numbers there, by id.
         self._sent: dict[int, tuple[int, Any]] = {}
         self._last_number = 0
-        #: What this process keeps for the other one, by number.
+        #: Objects that this process keeps for the other one, by number.
         self._kept: dict[int, Any] = {}
-        #: The message that is being received, and the same once it is complete.
+        #: The message that is being received, and the message once it is complete.
         self._parts = _message_parts(connection)
         self._message: tuple[list[int], bytes, list[np.ndarray]] | None = None
 
     def poll(self, timeout: float = 0.0) -> bool:
-        """Return whether there is something to receive, an end of the connection included."""
+        """Return whether there is a message to receive, or the connection has ended."""
         return self.connection.poll(timeout)
 
     def has_received(self, seconds: float) -> bool:
-        """Receive parts of the next object that are there, for some seconds. Return whether it is complete.
+        """Receive available parts of the next object for some seconds. Return whether it is complete.
 
         Raises
         ------
@@ -73,7 +73,7 @@ class Channel:
         return self._message is not None
 
     def send(self, message: Any) -> None:
-        """Send an object. What the last message had and this one has not is no longer kept.
+        """Send an object. Objects of the last message that are not in this one are no longer kept.
 
         Raises
         ------
@@ -128,7 +128,7 @@ def _message_parts(
     Returns
     -------
     forgotten : list of int
-        Numbers of what is no longer kept.
+        Numbers of objects that are no longer kept.
     stream : bytes
         The pickle.
     buffers : list of (n,) uint8 ndarray
@@ -147,12 +147,12 @@ def _message_parts(
 
 
 class _Pickler(pickle.Pickler):
-    """Names what the other process keeps, and sends the rest.
+    """Pickle kept objects as numbers, and send the rest.
 
     Attributes
     ----------
     used : dict of int to object
-        What the message has of `KEPT_CLASSES`, by number.
+        Objects of `KEPT_CLASSES` in the message, by number.
     last_number : int
     """
 
@@ -176,14 +176,14 @@ class _Pickler(pickle.Pickler):
         return number
 
     def _use(self, number: int, obj: Any) -> None:
-        """Note that an object is used, with the objects that it has."""
+        """Record that an object is used, with the kept objects in it."""
         self.used[number] = obj
         for value in vars(obj).values():
             if isinstance(value, KEPT_CLASSES):
                 self.persistent_id(value)
 
     def reducer_override(self, obj: Any) -> Any:
-        """Send the fields of an object that the other process is to keep, without cached properties."""
+        """Send the fields of an object to keep, without cached properties."""
         if not isinstance(obj, KEPT_CLASSES):
             return NotImplemented
         self.last_number += 1
@@ -193,7 +193,7 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
-    """Finds what is kept, and the classes of this package by the name that it has here."""
+    """Find kept objects, and classes of this package under its name in this process."""
 
     def __init__(
         self, stream: bytes, buffers: list[np.ndarray], kept: dict[int, Any], package: str

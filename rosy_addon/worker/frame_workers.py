@@ -1,8 +1,7 @@
-"""Frame ranges, and running a command for many frames in several processes.
+"""Frame ranges, and a command for many frames in several processes.
 
-Each worker runs the same command that a user would run for some of the frames. The command may be
-run again, or twice at the same time, without harm. This module does not depend on what the command
-does.
+Each worker runs the command of the user for some of the frames. The command must allow to be run again,
+or twice at the same time. This module does not depend on what the command does.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from .start import Guarded, GuardedFolder
 #: Largest number of a frame in Blender.
 MAX_FRAME = 1_048_574
 
-#: Seconds between two looks at what processes have printed.
+#: Seconds between two reads of the output of processes.
 POLL_SECONDS = 0.05
 
 #: Seconds that a process has to end before it is killed.

@@ -20,7 +20,7 @@ RECEIVE_SECONDS = 0.03
 
 
 class HelperLostError(Exception):
-    """A helper has ended before its work was done, or cannot be started.
+    """Raised if a helper has ended before its work was done, or cannot be started.
 
     Attributes
     ----------
@@ -37,13 +37,13 @@ class HelperLostError(Exception):
 
 
 class _RemoteTracebackError(Exception):
-    """The traceback of an error in a helper, as text. The cause of that error here."""
+    """The traceback of an error in a helper as text, set as the cause of the error in this process."""
 
 
 class Helper:
-    """A process that computes for this one, a call at a time.
+    """A process that makes calls for this one, one at a time.
 
-    It ends when this object is closed, and when this process ends, however it ends.
+    It ends when this object is closed, and when this process ends for any reason.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ class Helper:
     is_usable : bool
         Whether a process may be started. It is False once that has failed.
     fraction : float
-        How far the last call has come.
+        Progress of the last call, 0 to 1.
     label : str
-        What is being done.
+        Label of the present step.
     """
 
     def __init__(self, environment: Mapping[str, str] | None = None) -> None:
@@ -68,7 +68,7 @@ class Helper:
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._is_ready, self._start_time = False, 0.0
-        #: A call that is not sent yet.
+        #: A call that has not been sent.
         self._call: tuple[Callable[..., Any], tuple[Any, ...]] | None = None
 
     def start(self) -> None:
@@ -94,12 +94,12 @@ class Helper:
         self._is_ready, self._start_time = False, time.monotonic()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Let the process call a function of this package.
+        """Send a call of a function of this package to the process.
 
         Parameters
         ----------
         function : function
-            Of a module that needs no Blender.
+            A function of a module that needs no Blender.
         *arguments
             Anything that can be pickled.
 
@@ -117,12 +117,12 @@ class Helper:
             raise self._lost() from None
 
     def poll(self) -> Callable[[], Any] | None:
-        """Hear what the process says, without waiting.
+        """Read messages of the process, without waiting.
 
         Returns
         -------
         callable or None
-            Once the call is done: returns what the function has returned, or raises what it has raised.
+            Once the call is done: returns the result of the function, or raises its error.
 
         Raises
         ------
@@ -145,7 +145,7 @@ class Helper:
         return None
 
     def take(self, user: object) -> bool:
-        """Reserve the process for one of several users, and return whether nobody else has it."""
+        """Reserve the process for a user. Return whether it was free, or is already theirs."""
         if self._user is None:
             self._user = user
         return self._user is user
@@ -156,7 +156,7 @@ class Helper:
             self._user = None
 
     def close(self) -> None:
-        """End the process, whatever it does."""
+        """End the process, even during a call."""
         process, channel = self._process, self._channel
         self._process = self._channel = None
         if process is not None:
@@ -166,18 +166,18 @@ class Helper:
             channel.close()
 
     def wait(self, seconds: float) -> None:
-        """Wait until the process has something to say, or ends, at most for some time."""
+        """Wait for a message of the process or its end, at most for some seconds."""
         if self.connection is not None:
             wait([self.connection], seconds)
 
     @property
     def connection(self) -> Connection | None:
-        """What becomes readable when the process has something to say, or ends."""
+        """Connection that becomes readable when the process has sent a message, or has ended."""
         return None if self._channel is None else self._channel.connection
 
     @property
     def pid(self) -> int | None:
-        """Of the process, if it runs."""
+        """ID of the process, if it runs."""
         return None if self._process is None else self._process.pid
 
     def _send_call(self) -> bool:
@@ -193,7 +193,7 @@ class Helper:
         return self._call is None
 
     def _lost(self) -> HelperLostError:
-        """End what is left of the process, and return what is wrong."""
+        """End the process, and return the error that says why it is lost."""
         has_started, process = self._is_ready, self._process
         self.close()
         status = "" if process is None else f" (status {process.returncode})"

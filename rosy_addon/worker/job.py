@@ -1,7 +1,7 @@
-"""Jobs: work that reads, has something computed, and applies it, whoever computes.
+"""Jobs: work that reads data, has results computed, and applies them.
 
-A job is a generator. It yields each `Call` that takes long, and gets its result. A script runs it in place
-(`run`). In a window, an operator has its calls made by a helper, so that Blender stays responsive.
+A job is a generator. It yields each long computation as a `Call` and receives its result. A script makes the
+calls in place (`run`). In a window, a helper process makes them, so that Blender stays responsive.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ class Call(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A pause of a job that works in Blender's process: with the graphics card, or from frame to frame.
+    """A pause of a job that works in Blender's process, with the graphics card or between frames.
 
     Attributes
     ----------
     fraction : float
-        How far the job has come.
+        Progress of the job, 0 to 1.
     label : str
-        What is done next.
+        Label of the next step.
     """
 
     fraction: float
     label: str
 
 
-#: What a job yields is computed or reported, and the results are sent to it. Closing it cancels the job.
+#: A job: it yields calls and steps, and results are sent to it. Closing the generator cancels the job.
 Steps = Generator[Call | Step, Any, Result]
 
 
@@ -129,7 +129,7 @@ class Job(Generic[Arguments, Result]):
 
 
 def job(begin: Callable[Arguments, Steps[Result]]) -> Job[Arguments, Result]:
-    """Make a generator of steps a function that runs them in place; see `Job`.
+    """Turn a generator of steps into a function that runs them in place; see `Job`.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""`Pool`: the helpers that a large picture is divided among."""
+"""`Pool`: helper processes that share the strips of a large picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .helper import Helper, HelperLostError
 #: Environment of the helpers. Each has one core.
 ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
-#: Seconds without news after which helpers are asked again.
+#: Seconds between two polls of helpers that send nothing.
 WAIT_SECONDS = 0.5
 
 
@@ -27,7 +27,7 @@ def core_count() -> int:
 
 
 class Pool:
-    """Helpers of this process. They are started when they are first needed, and stay for the next call.
+    """Helper processes, which are started when they are first needed and reused for later calls.
 
     Attributes
     ----------
@@ -46,12 +46,12 @@ class Pool:
     ) -> list[Any]:
         """Call a function with each of several tuples of arguments, in several processes.
 
-        This process is one of them. What a helper does not finish is done here.
+        This process is one of them, and makes the calls of helpers that are lost.
 
         Parameters
         ----------
         function : function
-            Of a module that needs no Blender, as `Helper.submit`.
+            A function of a module that needs no Blender; see `Helper.submit`.
         arguments : sequence of tuple
         count : int
             Number of processes; 0 is one for each core.
@@ -77,7 +77,7 @@ class Pool:
 
 
 class _SharedCalls:
-    """Calls that this process and some helpers make together."""
+    """Calls that are shared between this process and some helpers."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class _SharedCalls:
         self._function, self._arguments = function, arguments
         self._function_here = function_here
         self._results: list[Any] = [None] * len(arguments)
-        #: Numbers of the calls that nobody makes yet, and of those that helpers make.
+        #: Numbers of the calls that have not started, and the number of the call of each busy helper.
         self._waiting = deque(range(len(arguments)))
         self._given: dict[Helper, int] = {}
         self._free = list(helpers)
@@ -114,13 +114,13 @@ class _SharedCalls:
         return self._results
 
     def _hear(self, fraction: float, label: str) -> None:
-        """Report the work of this process, and attend to the helpers."""
+        """Report the progress of this process, and serve the helpers."""
         self._attend_to_helpers()
         done = len(self._arguments) - len(self._waiting) - len(self._given) - 1
         self._report((done + fraction) / len(self._arguments), label)
 
     def _attend_to_helpers(self) -> None:
-        """Take what helpers have done, and give them what waits. The calls of lost ones wait again."""
+        """Take results of helpers and give them waiting calls. The calls of lost helpers wait again."""
         for helper, number in list(self._given.items()):
             try:
                 outcome = helper.poll()

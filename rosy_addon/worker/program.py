@@ -1,4 +1,4 @@
-"""Running another program as part of a job."""
+"""`run_program`: another program as part of a job."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def run_program(command: Sequence[str], label: str) -> Steps[tuple[int, str]]:
     status : int
         Exit status.
     output : str
-        What the program printed, errors included.
+        Standard output and errors of the program.
     """
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen(

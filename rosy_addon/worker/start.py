@@ -1,8 +1,8 @@
-"""Starting processes, none of which outlives the one that started it.
+"""Processes that end with the process that started them.
 
-A module of this package is started with one end of a connection, and ends with it (`start_module`). Other programs
-and temporary folders are guarded: if this process ends, however it ends, a process that it has told of them
-kills them and removes them.
+A module of this package is started with one end of a connection, and ends when the connection closes
+(`start_module`). Other programs and temporary folders are guarded: a guard process kills or removes them when
+this process ends for any reason.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-#: The name of this package, which differs between Blender, a helper and an installed wheel.
+#: Name of this package in this process. It differs between Blender, a helper and an installed wheel.
 PACKAGE = __package__.rpartition(".")[0]
 
-#: The same where a module of it is started.
+#: Name of this package in processes that `start_module` starts.
 STARTED_PACKAGE = PACKAGE.rpartition(".")[2]
 
 
@@ -37,9 +37,9 @@ def start_module(
     module : str
         Relative to this package.
     *arguments : str
-        Of the program, after the handle of its end of the connection; see `own_end`.
+        Further arguments of the program. The first is the handle of its end of the connection; see `own_end`.
     environment : mapping of str to str, optional
-        Added to that of this process.
+        Variables that are added to the environment of this process.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def own_end(handle: str) -> Connection:
 
 
 class Guarded:
-    """A ``with`` block in which a process is killed if this one ends, however it ends.
+    """A ``with`` block during which a process is killed if this one ends for any reason.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Guarded:
 
 
 class GuardedFolder(TemporaryDirectory[str]):
-    """A temporary folder that is removed, too, if this process is killed."""
+    """A temporary folder that is removed even if this process is killed."""
 
     def __init__(self) -> None:
         super().__init__(prefix="rosy-")
@@ -117,12 +117,12 @@ class GuardedFolder(TemporaryDirectory[str]):
         _tell_guard("leave", self.name)
 
 
-#: The connection to the process that watches others, once there are any.
+#: The connection to the guard process; None before there is one.
 _guard: Connection | None = None
 
 
 def _tell_guard(what: str, item: int | str) -> None:
-    """Tell the guard of a process or a folder. It is started when it is first needed, and ends with this process."""
+    """Send a message about a process or a folder to the guard, which is started when it is first needed."""
     global _guard
     with suppress(OSError):  # without a guard, signals that can be handled still end what there is
         if _guard is None:
@@ -131,7 +131,7 @@ def _tell_guard(what: str, item: int | str) -> None:
 
 
 def _watch(guard: Connection) -> None:
-    """Be told of processes and folders until the other process ends, and remove those that are left."""
+    """Receive processes and folders until the other process ends; then kill and remove what is left."""
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     watched: set[int | str] = set()

@@ -1,4 +1,4 @@
-"""`StepRunner`: runs the steps of a job bit by bit; a helper process makes their calls."""
+"""`StepRunner`: runs the steps of a job one by one, with their calls in a helper process."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .job import Call, Step, Steps
 
 
 class StepRunner:
-    """Runs steps bit by bit: calls in a helper process, the rest in this process.
+    """Run steps one by one: calls in a helper process, the rest in this process.
 
     Several runners may share a helper, which makes one call at a time. A call whose helper is lost is made
     once more by another one; if none can be started, it is made in this process.
@@ -26,7 +26,7 @@ class StepRunner:
     Attributes
     ----------
     step : Step or None
-        How far the steps have come; None before the first one.
+        Progress of the steps; None before the first one.
     helper_seconds : float
         Seconds of work of the helper so far.
     is_done : bool
@@ -42,16 +42,16 @@ class StepRunner:
         #: A call that the steps wait for, and what returns or raises its result.
         self._call: Call | None = None
         self._outcome: Callable[[], Any] | None = None
-        #: Whether the helper makes the call, since when (seconds, monotonic), and whether it does once more.
+        #: Whether the helper has the call, since when (seconds, monotonic), and whether it is the second try.
         self._is_submitted, self._call_time, self._is_repeated = False, 0.0, False
 
     @property
     def has_answer(self) -> bool:
-        """Whether the helper has made a call, and the steps have not gone on yet."""
+        """Whether the result of a call is there, and the steps have not continued with it."""
         return self._outcome is not None
 
     def poll(self) -> bool:
-        """Return whether the steps can go on. Otherwise the helper is at work."""
+        """Return whether the steps can continue. Otherwise the helper is at work."""
         if self._call is None or self._outcome is not None:
             return True
         try:
@@ -84,7 +84,7 @@ class StepRunner:
         return True
 
     def advance(self) -> Step:
-        """Go on to the next step and return it. Call it only when the steps can go on.
+        """Run to the next step and return it. Call it only after `poll` has returned True.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class StepRunner:
         return self.step
 
     def _continued(self, outcome: Callable[[], Any]) -> Call | Step:
-        """Send the steps the result or the error of their call."""
+        """Send the result or the error of the call to the steps."""
         try:
             answer = outcome()
         except Exception as error:

@@ -17,14 +17,12 @@ from rosy_addon.api.films import Film
 from rosy_addon.cli.parser import main as cli_main
 from rosy_addon.compositor.look import Look
 from rosy_addon.external.simulation_files import (
-    SimulationMesh,
     list_steps,
     read_simulation,
 )
 from rosy_addon.extras.film import SimulationFields
 from rosy_addon.field.array_field import SurfaceArrays, array_field
-from rosy_addon.field.mesh_io import SHARP_ANGLE
-from rosy_addon.field.surface import build_surface
+from rosy_addon.field.mesh_arrays import SIMULATION_READERS, MeshArrays
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.mesh_view import mesh_instance, mesh_view
 
@@ -104,7 +102,8 @@ def test_errors(rosy, files, words, message, monkeypatch):
 
 def test_the_extension_has_none_of_it(files, capfd, monkeypatch):
     """Without the extras, --array and film are unknown, and the files are no mesh files."""
-    monkeypatch.setitem(sys.modules, "rosy_addon.external.simulation_files", None)
+    for suffix in list(SIMULATION_READERS):
+        monkeypatch.delitem(SIMULATION_READERS, suffix)
     for words, message in (
         (("render", "a.ply", "--array", "x", "-o", "a.png"), "unrecognized arguments: --array"),
         (("film", "a.vtu", "-o", "a.gif"), "invalid choice: 'film'"),
@@ -181,9 +180,9 @@ def test_film_has_one_camera_and_one_range(growing):
     fields = [view.instances[0].field for view in views]
     assert {view.look.color_range for view in views} == {(0.0, fields[0].magnitude.max())}
     mesh = read_simulation(steps[0].paths[0])
-    surface = build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
-    arrays = SurfaceArrays(mesh.name, surface, mesh.point_arrays, mesh.cell_arrays)
-    instance = mesh_instance(surface, array_field(arrays), "z")
+    surface = rf.Surface(mesh, name=steps[0].name)
+    arrays = SurfaceArrays(surface.name, surface, mesh.vertex_data, mesh.face_data)
+    instance = mesh_instance(surface, array_field(arrays))
     look = views[0].look
     expected = mesh_view(instance, look, (30.0, 20.0), (60, 50))
     assert views[0].camera.view == pytest.approx(expected.camera.view, abs=1e-12)
@@ -196,8 +195,8 @@ def test_film_has_one_camera_and_one_range(growing):
 
 def test_film_keeps_one_step_in_memory(growing):
     for _ in Film(SimulationFields(list_steps(growing)), Look(), (0.0, 0.0), (60, 50)).views():
-        meshes = [found for found in gc.get_objects() if isinstance(found, SimulationMesh)]
-        assert sum(bool(mesh.point_arrays) for mesh in meshes) <= 1
+        meshes = [found for found in gc.get_objects() if isinstance(found, MeshArrays)]
+        assert sum(bool(mesh.vertex_data) for mesh in meshes) <= 1
 
 
 def test_film_errors(rosy, growing, tmp_path):

@@ -8,20 +8,14 @@ import pytest
 import pyvista as pv
 from extras.rotations import rotation
 
-from rosy_addon.external.simulation_files import SimulationMesh, read_simulation
-from rosy_addon.field.mesh_io import SHARP_ANGLE
+from rosy_addon.external.simulation_files import read_simulation
 from rosy_addon.field.polygon_arrays import face_area_vectors
-from rosy_addon.field.surface import Surface, build_surface
-
-
-def surface_of(mesh: SimulationMesh) -> Surface:
-    """Return the surface of a mesh, with sharp edges as those of other mesh files."""
-    return build_surface(*mesh.polygons, name=mesh.name, sharp_angle=SHARP_ANGLE)
+from rosy_addon.field.surface import Surface
 
 
 def triangles_of(mesh):
-    assert set(np.diff(mesh.polygons.face_start)) == {3}
-    return mesh.polygons.corner_vertex.reshape(-1, 3)
+    assert set(np.diff(mesh.face_start)) == {3}
+    return mesh.corner_vertex.reshape(-1, 3)
 
 
 def total_area(mesh):
@@ -57,10 +51,10 @@ def test_surfaces(name, tmp_path, sphere):
     WRITERS[name](tmp_path / name, sphere)
     mesh = read_simulation(tmp_path / name)
     tolerance = 1e-5 if name == "text.vtk" else 0.0
-    assert np.allclose(mesh.polygons.vertices, sphere.points, rtol=0, atol=tolerance)
+    assert np.allclose(mesh.vertices, sphere.points, rtol=0, atol=tolerance)
     assert np.array_equal(triangles_of(mesh), sphere.regular_faces)
-    assert np.allclose(mesh.point_arrays["rotation"], sphere["rotation"], rtol=0, atol=tolerance)
-    assert mesh.name == str(tmp_path / name) and not mesh.note
+    assert np.allclose(mesh.vertex_data["rotation"], sphere["rotation"], rtol=0, atol=tolerance)
+    assert not mesh.note
 
 
 def test_boundary_of_a_volume(tmp_path, box):
@@ -69,12 +63,12 @@ def test_boundary_of_a_volume(tmp_path, box):
     assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0).all(), "the cells are inside out"
     box.save(tmp_path / "box.vtu")
     mesh = read_simulation(tmp_path / "box.vtu")
-    surface = surface_of(mesh)
+    surface = Surface(mesh)
     assert surface.face_count == 6 * 9 * 2 and len(surface.vertices) == 4**3 - 2**3
     assert total_area(mesh) == pytest.approx(6)
     assert ((surface.face_center - 0.5) * surface.face_normal).sum(axis=1) == pytest.approx(0.5)
-    tetrahedra = box.cells_dict[pv.CellType.TETRA][mesh.cell_arrays["number"]]
-    of_face = mesh.polygons.vertices[triangles_of(mesh)]
+    tetrahedra = box.cells_dict[pv.CellType.TETRA][mesh.face_data["number"]]
+    of_face = mesh.vertices[triangles_of(mesh)]
     of_cell = np.asarray(box.points)[tetrahedra]
     assert (of_face[:, :, None] == of_cell[:, None]).all(axis=3).any(axis=2).all()
 
@@ -97,7 +91,7 @@ def test_second_order_volume(tmp_path, box):
     box.save(tmp_path / "b.vtu")
     second, first = (read_simulation(tmp_path / name) for name in ("a.vtu", "b.vtu"))
     assert all(map(np.array_equal, second.polygons, first.polygons))
-    assert np.array_equal(second.cell_arrays["number"], first.cell_arrays["number"])
+    assert np.array_equal(second.face_data["number"], first.face_data["number"])
 
 
 def test_second_order_surface(tmp_path):
@@ -105,9 +99,9 @@ def test_second_order_surface(tmp_path):
     cells = [("triangle6", [[0, 1, 2, 4, 5, 6]]), ("quad8", [[0, 1, 2, 3, 4, 5, 7, 8]])]
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(points, cells, point_data={"x": points[:, 0]}))
     mesh = read_simulation(tmp_path / "a.vtu")
-    assert mesh.polygons.face_start.tolist() == [0, 3, 7]
-    assert mesh.polygons.corner_vertex.tolist() == [0, 1, 2, 0, 1, 2, 3]
-    assert mesh.point_arrays["x"].tolist() == [0, 2, 2, 0]
+    assert mesh.face_start.tolist() == [0, 3, 7]
+    assert mesh.corner_vertex.tolist() == [0, 1, 2, 0, 1, 2, 3]
+    assert mesh.vertex_data["x"].tolist() == [0, 2, 2, 0]
 
 
 def test_polygons_and_strips(tmp_path):
@@ -122,7 +116,7 @@ def test_polygons_and_strips(tmp_path):
     strips.clear_data()
     strips.save(tmp_path / "strips.vtp")
     mesh = read_simulation(tmp_path / "strips.vtp")
-    surface = surface_of(mesh)
+    surface = Surface(mesh)
     assert len(triangles_of(mesh)) == sphere.n_cells
     assert ((surface.face_center * surface.face_normal).sum(axis=1) > 0.9).all()
     assert total_area(mesh) == pytest.approx(sphere.area, rel=1e-5)
@@ -134,7 +128,7 @@ def test_images_and_structured_grids(tmp_path):
     image.save(tmp_path / "image.vti")
     image.cast_to_structured_grid().save(tmp_path / "grid.vts")
     for name in ("image.vti", "grid.vts"):
-        surface = surface_of(read_simulation(tmp_path / name))
+        surface = Surface(read_simulation(tmp_path / name))
         assert surface.face_count == 6 and (surface.face_normal == [0, 0, 1]).all()
 
 
@@ -150,8 +144,8 @@ def test_surface_cells_go_before_volume_cells(tmp_path, box):
     meshio.write(tmp_path / "a.vtu", meshio.Mesh(points, cells, cell_data=data))
     mesh = read_simulation(tmp_path / "a.vtu")
     assert triangles_of(mesh).tolist() == [[0, 1, 2], [2, 4, 3]]
-    assert np.array_equal(mesh.polygons.vertices, points[5:10])
-    assert mesh.cell_arrays["part"].tolist() == [2, 2]
+    assert np.array_equal(mesh.vertices, points[5:10])
+    assert mesh.face_data["part"].tolist() == [2, 2]
 
 
 PVTU = """<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid GhostLevel="0">
@@ -173,7 +167,7 @@ def test_parts_are_joined(name, tmp_path):
     mesh = read_simulation(tmp_path / name)
     assert mesh.polygons.face_count == 2 * 16 + 4 * 32
     assert total_area(mesh) == pytest.approx(2 + 8)
-    assert np.array_equal(mesh.point_arrays["U"], rotation(mesh.polygons.vertices))
+    assert np.array_equal(mesh.vertex_data["U"], rotation(mesh.vertices))
 
 
 def test_abaqus(tmp_path, box):
@@ -185,7 +179,7 @@ def test_abaqus(tmp_path, box):
 def test_normals_and_texture_coordinates_are_no_arrays(tmp_path):
     pv.Sphere().save(tmp_path / "a.vtp")
     assert pv.read(tmp_path / "a.vtp").array_names == ["Normals"]
-    assert not read_simulation(tmp_path / "a.vtp").point_arrays
+    assert not read_simulation(tmp_path / "a.vtp").vertex_data
 
 
 SUFFIXES = ("vtk", "vtu", "vtp", "vtm", "pvtu", "xdmf", "exo", "msh", "med", "inp", "pvd", "vtu.series")  # fmt: skip

@@ -20,7 +20,7 @@ def test_arrays_at_the_boundary_of_a_volume(kind, box, tmp_path):
     surface = rf.Surface(path if kind == "file" else pv.read(path))
     assert surface.up == "z" and surface.name == (str(path) if kind == "file" else "surface")
     assert surface.face_count == 108 and len(surface.vertices) == 4**3 - 2**3
-    normal = surface.face_normals
+    normal = surface.face_normal
     tangential = velocity - (normal @ velocity)[:, None] * normal
     for name in ("U", "V"):
         field = rf.from_array(surface, name)

@@ -58,7 +58,7 @@ def rooms(package: str = "rosy_addon") -> SimpleNamespace:
         orbit_camera=of("projection.camera").orbit_camera,
         project=of("projection.project").project,
         run=of("worker.job").run,
-        read_mesh=of("field.mesh_io").read_mesh,
+        Surface=of("field.surface").Surface,
     )
 
 
@@ -257,7 +257,7 @@ def surface_of_shape(rosy: SimpleNamespace, name: str, data: Path | None = None)
     if name not in FILES:
         return blender_surface(rosy, name)
     path = None if data is None else data / "meshes" / FILES[name]
-    return rosy.read_mesh(path) if path is not None and path.is_file() else None
+    return rosy.Surface(path) if path is not None and path.is_file() else None
 
 
 def camera_of_shape(rosy: SimpleNamespace, name: str, surface: Any, size: int) -> Any:

@@ -63,7 +63,7 @@ def test_pyvista_strips_grids_and_texture_coordinates():
     surface = rf.Surface(plane)
     assert surface.face_count == 6
     np.testing.assert_array_equal(
-        surface.uv, plane.active_texture_coordinates[surface.mesh.corner_vertex]
+        surface.uv, plane.active_texture_coordinates[surface.corner_vertex]
     )
     strips = plane.triangulate().strip()
     assert strips.n_strips and rf.Surface(strips).face_count == 12

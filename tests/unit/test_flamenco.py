@@ -41,59 +41,60 @@ function compiled(settings) {
 DEFAULTS = {"folder": "/out", "blendfile": "/a b/scene.blend", "preset": "", "cameras": ""}
 
 
-def compiled_tasks(**settings):
+#: The keys of settings that the manager knows.
+KEYS = {
+    "key",
+    "type",
+    "subtype",
+    "required",
+    "eval",
+    "evalInfo",
+    "default",
+    "description",
+    "visible",
+}
+
+
+def result_of(expression):
+    """Evaluate JavaScript after the manager's functions and the job type."""
     engine = quickjs.Context()
     script = (ROOT / "farm" / "flamenco" / "rosy_bake.js").read_text()
     engine.eval(MANAGER + script.replace("const JOB_TYPE", "var JOB_TYPE"))
-    return json.loads(engine.eval(f"compiled({json.dumps({**DEFAULTS, **settings})})"))
+    return json.loads(engine.eval(expression))
 
 
-def command_args(tasks):
-    for task in tasks:
-        assert task["type"] == "blender" and len(task["commands"]) == 1
-        (command,) = task["commands"]
-        assert command["name"] == "exec" and command["parameters"]["exe"] == "{blender}"
-        yield command["parameters"]["args"]
+def arguments_of(**settings):
+    """Return the arguments of Blender in each task of a job."""
+    tasks = result_of(f"compiled({json.dumps({**DEFAULTS, **settings})})")
+    assert all(task["type"] == "blender" for task in tasks)
+    commands = [command for task in tasks for command in task["commands"]]
+    assert {(each["name"], each["parameters"]["exe"]) for each in commands} == {
+        ("exec", "{blender}")
+    }
+    return [each["parameters"]["args"] for each in commands]
 
 
 def test_each_chunk_is_one_command():
-    args = list(command_args(compiled_tasks(frames="1-25", chunk_size=10)))
     start = ["-b", "/a b/scene.blend", "--command", "rosy", "bake", "--out", "/out"]
-    assert args == [[*start, f"--frames={chunk}"] for chunk in ("1-10", "11-20", "21-25")]
+    expected = [[*start, f"--frames={chunk}"] for chunk in ("1-10", "11-20", "21-25")]
+    assert arguments_of(frames="1-25", chunk_size=10) == expected
 
 
 def test_each_camera_has_its_own_sequence():
-    tasks = compiled_tasks(frames="3, 5-8", chunk_size=3, cameras="Close, -Far ", preset="plaid")
-    args = list(command_args(tasks))
-    assert [each[-2:] for each in args] == [
-        [f"--camera={name}", "--preset=plaid"] for name in ("Close", "Close", "-Far", "-Far")
+    """The command line reads frames in the form that the manager writes."""
+    jobs = arguments_of(frames="3, 5-8", chunk_size=3, cameras="Close, -Far ", preset="plaid")
+    assert [each[7:] for each in jobs] == [
+        [f"--frames={frames}", f"--camera={name}", "--preset=plaid"]
+        for name in ("Close", "-Far")
+        for frames in ("3,5,6", "7-8")
     ]
-    assert [each[7] for each in args] == ["--frames=3,5,6", "--frames=7-8"] * 2
-    assert [task["name"] for task in tasks] == [
-        "Close 3,5,6", "Close 7-8", "-Far 3,5,6", "-Far 7-8",
-    ]  # fmt: skip
-    # The command line accepts the frames in the form that the manager writes.
     assert list(parse_frames("3,5,6")) == [3, 5, 6] and list(parse_frames("7-8")) == [7, 8]
 
 
 def test_settings_have_only_keys_that_the_manager_knows():
-    engine = quickjs.Context()
-    script = (ROOT / "farm" / "flamenco" / "rosy_bake.js").read_text()
-    engine.eval(MANAGER + script.replace("const JOB_TYPE", "var JOB_TYPE"))
-    job_type = json.loads(engine.eval("JSON.stringify(JOB_TYPE)"))
-    known = {
-        "key",
-        "type",
-        "subtype",
-        "required",
-        "eval",
-        "evalInfo",
-        "default",
-        "description",
-        "visible",
-    }
-    for setting in job_type["settings"]:
-        assert set(setting) <= known and setting["type"] in ("string", "int32", "bool", "float")
+    settings = result_of("JSON.stringify(JOB_TYPE)")["settings"]
+    for setting in settings:
+        assert set(setting) <= KEYS and setting["type"] in ("string", "int32", "bool", "float")
         assert setting.get("required") or "default" in setting
-    keys = [setting["key"] for setting in job_type["settings"]]
+    keys = [setting["key"] for setting in settings]
     assert keys == ["frames", "chunk_size", "cameras", "folder", "preset", "blendfile"]

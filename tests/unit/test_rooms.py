@@ -14,65 +14,25 @@ from conftest import ROOT
 
 PACKAGE = ROOT / "rosy_addon"
 
-#: What each room may import besides `core` and itself.
-MAY_IMPORT = {
-    "core": set(),
-    "field": set(),
-    "projection": {"field"},
-    "annotation": {"field", "projection"},
-    "compositor": {"field", "projection", "annotation"},
-    "line_drawing": {"field", "projection", "annotation"},
-    "image_io": set(),
-    "surface_texture": {"field", "projection", "compositor", "line_drawing", "image_io"},
-    "worker": {"field", "projection", "compositor"},
-    "rendering": {"field", "projection", "annotation", "compositor", "worker", "image_io"},
-    "preset_files": {"field", "projection", "compositor", "image_io"},
-    "gpu": {"field", "projection", "compositor", "rendering", "worker", "image_io"},
-    "scene": {
-        *("field", "projection", "annotation", "compositor", "line_drawing", "surface_texture"),
-        *("worker", "rendering", "image_io", "preset_files"),
-    },
-    "jobs": {
-        *("field", "projection", "annotation", "compositor", "line_drawing", "surface_texture"),
-        *("worker", "rendering", "image_io", "scene", "gpu"),
-    },
-    "viewport": {
-        *("field", "projection", "annotation", "compositor", "rendering", "worker", "scene", "gpu"),
-    },
-    "ui": {
-        *("preset_files", "field", "projection", "compositor", "line_drawing", "surface_texture"),
-        *("worker", "scene", "gpu", "jobs", "viewport"),
-    },
-    "external": {"field", "annotation", "worker", "rendering"},
-    "api": {
-        *("field", "projection", "annotation", "compositor", "line_drawing", "surface_texture"),
-        *("worker", "rendering", "image_io", "preset_files", "external"),
-    },
-    "cli": {
-        *("api", "field", "projection", "compositor", "line_drawing", "surface_texture"),
-        *("scene", "gpu", "rendering", "worker", "jobs", "ui", "image_io", "preset_files"),
-    },
-    "extras": {
-        *("field", "projection", "compositor", "rendering", "external", "api", "cli", "worker"),
-    },
-    "__main__": {"extras"},
-    "__init__": {"api"},
-}
-NUMPY_ROOMS = (
-    "core",
-    "field",
-    "projection",
-    "compositor",
-    "line_drawing",
-    "surface_texture",
-    "image_io",
-    "preset_files",
-    "worker",
-    "rendering",
+#: A room imports only from the layers above it, and from no other room of its layer.
+LAYERS = (
+    ("core",),
+    ("field", "image_io"),
+    ("projection",),
+    ("annotation",),
+    ("compositor", "line_drawing"),
+    ("surface_texture", "worker", "preset_files"),
+    ("rendering",),
+    ("gpu", "scene", "external"),
+    ("jobs", "viewport", "api"),
+    ("ui",),
+    ("cli",),
+    ("extras",),
+    ("__main__", "__init__"),
 )
 
-#: What may use Blender everywhere.
-BLENDER_ROOMS = ("scene", "ui", "jobs", "viewport", "cli")
+#: Rooms that may use Blender everywhere. Of the others, only the commands of `extras` import them.
+BLENDER_ROOMS = {"scene", "ui", "jobs", "viewport", "cli"}
 
 #: Files of the room `gpu` that draw with Blender, and may import its modules.
 BLENDER_GPU_FILES = ("device.py",)
@@ -109,12 +69,15 @@ def imports_of(path: Path) -> tuple[set[str], set[str]]:
 def test_imports_run_one_way(path):
     inside, outside = imports_of(path)
     room = room_of(path)
-    assert room in MAY_IMPORT, f"which rooms may {room} import?"
+    (layer,) = (number for number, rooms in enumerate(LAYERS) if room in rooms)
+    above = {each for rooms in LAYERS[:layer] for each in rooms}
     rooms = {name.split(".")[0] for name in inside} - {room}
-    assert rooms <= MAY_IMPORT[room] | {"core"}
+    assert rooms <= above
     allowed = set(sys.stdlib_module_names) | {"numpy"}
     if room in BLENDER_ROOMS:
         allowed |= {"bpy", "bmesh", "bpy_extras", "mathutils", "gpu", "gpu_extras", "blf"}
+    elif room != "extras":
+        assert not rooms & BLENDER_ROOMS
     if path.name in BLENDER_GPU_FILES and room == "gpu":
         allowed |= {"gpu", "gpu_extras", "mathutils"}
     if room in ("external", "extras"):
@@ -191,7 +154,8 @@ def test_numpy_rooms_import_without_blender():
     modules = [
         "rosy_addon." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
         for path in FILES
-        if room_of(path) in (*NUMPY_ROOMS, "gpu", "cli") and path.stem != "__init__"
+        if room_of(path) not in (BLENDER_ROOMS | {"external", "extras", "__main__"}) - {"cli"}
+        and path.stem != "__init__"
     ]
     assert len(modules) > 20
     code = "\n".join(

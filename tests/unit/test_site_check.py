@@ -51,17 +51,10 @@ def test_faults_of_pages_are_found(site, tag, problem):
     assert list(site_check.problems(site)) == [f"index.html: {problem}"]
 
 
-@pytest.mark.parametrize(
-    ("file", "text"),
-    [
-        ("site.css", "@font-face { src: url(https://example.org/font) }"),
-        ("site.css", '@import "https://example.org/font"'),
-        ("site.js", 'fetch("https://example.org/font")'),
-    ],
-)
-def test_addresses_in_styles_and_scripts_are_found(site, file, text):
-    (site / file).write_text(text)
-    assert list(site_check.problems(site)) == [f"{file}: loads https://example.org/font"]
+@pytest.mark.parametrize("text", ["@import 'https://a.org/f'", "x { src: url(https://a.org/f) }"])
+def test_addresses_in_styles_are_found(site, text):
+    (site / "site.css").write_text(text)
+    assert list(site_check.problems(site)) == ["site.css: loads https://a.org/f"]
 
 
 def test_names_without_a_description_are_found(site):

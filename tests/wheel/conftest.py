@@ -43,40 +43,9 @@ def write_torus(path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-def write_sphere(path: Path) -> None:
-    """Write an ellipsoid of quads and triangles with a UV map, as ``.obj`` or ``.off``."""
-    rings, segments = 12, 24
-    theta, phi = np.meshgrid(
-        np.pi * np.arange(1, rings) / rings, 2 * np.pi * np.arange(segments) / segments,
-        indexing="ij",
-    )  # fmt: skip
-    sphere = [np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)]
-    sides = np.stack(sphere, axis=-1).reshape(-1, 3)
-    points = np.vstack([sides, [[0, 1, 0]], [[0, -1, 0]]]) * (1, 1.5, 0.8)
-    north, south = len(points) - 2, len(points) - 1
-    faces = []
-    for j in range(segments):
-        k = (j + 1) % segments
-        faces.append([north, k, j])
-        faces += [
-            [i * segments + j, i * segments + k, (i + 1) * segments + k, (i + 1) * segments + j]
-            for i in range(rings - 2)
-        ]
-        faces.append([(rings - 2) * segments + j, (rings - 2) * segments + k, south])
-    numbers = [" ".join(f"{value:.6f}" for value in point) for point in points]
-    if path.suffix == ".off":
-        lines = ["OFF", f"{len(points)} {len(faces)} 0", *numbers]
-        lines += [" ".join(map(str, [len(face), *face])) for face in faces]
-    else:
-        lines = [f"v {row}" for row in numbers]
-        lines += [f"vt {x:.6f} {z:.6f}" for x, _, z in points]
-        lines += ["f " + " ".join(f"{v + 1}/{v + 1}" for v in face) for face in faces]
-    path.write_text("\n".join(lines) + "\n")
-
-
 @pytest.fixture
-def sphere(tmp_path) -> Path:
+def torus(tmp_path) -> Path:
     """A mesh file in a folder of its own."""
-    path = tmp_path / "sphere.obj"
-    write_sphere(path)
+    path = tmp_path / "torus.obj"
+    write_torus(path)
     return path

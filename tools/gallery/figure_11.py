@@ -8,7 +8,7 @@ from rosy_addon.compositor.contrast import expected_std
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera
 
@@ -125,7 +125,7 @@ def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
     shown = ", ".join(
         f"{count} of {signed(kind)}" for kind, count in zip(kinds, counts, strict=True)
     )
-    expected = field.degree * euler_characteristic(surface)
+    expected = field.degree * surface.euler_characteristic
     return [name, surface.face_count, field.degree, shown or "none", int(index.sum()), expected]
 
 

@@ -15,11 +15,10 @@ import numpy as np
 
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import generate
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from rosy_addon.preset_files.store import load_preset
-from rosy_addon.projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .looks_page import IMAGES
 from .page import ROOT
@@ -113,7 +112,7 @@ def _models(meshes: Path) -> list[tuple[str, Surface]]:
         ),
     ]
     for title, name in FILES.items():
-        surface = read_mesh(meshes / name)
+        surface = Surface(meshes / name)
         matrix = UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[Path(name).suffix]]
         vertices = surface.vertices @ matrix[:3, :3].T
         models.append((title, build_surface(vertices, surface.corner_vertex, surface.face_start)))

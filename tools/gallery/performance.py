@@ -17,7 +17,6 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.preset_files.store import load_preset
@@ -89,8 +88,8 @@ def _samples(look: Look, name: str) -> None:
 
 def write_others(folder: Path) -> None:
     """Draw and save the bunny and the vase."""
-    bunny = _upright(read_mesh(folder / "meshes" / "stanford-bunny.obj"))
-    vase = read_mesh(folder / "meshes" / "vase.off")
+    bunny = _upright(Surface(folder / "meshes" / "stanford-bunny.obj"))
+    vase = Surface(folder / "meshes" / "vase.off")
     curved = smoothed(bunny, curvature_field(bunny, 4), 20)
     rows = [
         _surface_row(bunny, curved, (25, 12), "The Stanford bunny, N = 4"),

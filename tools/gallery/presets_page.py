@@ -17,13 +17,12 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look, uses_magnitude
 from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.field.generate import generate
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.surface import Surface
+from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from rosy_addon.preset_files.store import Preset, load_preset, preset_keys
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .looks_page import IMAGES
 from .page import ROOT
@@ -104,7 +103,7 @@ def _load_models(meshes: Path) -> dict[str, Model]:
     for name, (file, view) in FILES.items():
         path = meshes / file
         models[name] = _model(
-            name, read_mesh(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]], view
+            name, Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]], view
         )
     return models
 

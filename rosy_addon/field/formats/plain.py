@@ -13,8 +13,8 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
+from ..blocks import as_float64
 from ..rosy_field import MAX_DEGREE
-from ..validate import as_float64
 from .polygons import RawField
 from .text_rows import read_rows
 

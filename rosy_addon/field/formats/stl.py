@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
-from ..validate import as_float64
+from ..blocks import as_float64
 from .polygons import Polygons
 from .text_rows import read_rows
 

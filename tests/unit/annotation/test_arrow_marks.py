@@ -176,8 +176,8 @@ def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
 
 def test_places_do_not_depend_on_how_a_mesh_is_deformed():
     surface = icosphere(4)
-    stretched = replace(
-        surface, vertices=surface.vertices * (1.0, 1.0, 1.1), rest_vertices=surface.vertices
+    stretched = surface.with_parts(
+        vertices=surface.vertices * (1.0, 1.0, 1.1), rest_vertices=surface.vertices
     )
     cache = Cache()
     places = [surface_places(shape, 0.1, cache) for shape in (surface, stretched)]

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
+import inspect
 import io
-import pkgutil
-import sys
 
 import numpy as np
 import pytest
 from PIL import Image
-from public_signatures import public_names
 from shapes import icosphere, torus
 
 import rosy_addon as rf
-from rosy_addon import api
 from rosy_addon.api.pictures import corner_numbers
-from rosy_addon.api.surface import MeshArrays
 from rosy_addon.cli.parser import main
+from rosy_addon.compositor.look import Look
+from rosy_addon.core.settings import settings_of
+from rosy_addon.field import mesh_arrays
 from rosy_addon.field.formats.polygons import offsets_from_sizes
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 
 
-def surface_of(mesh, **options):
-    """A surface with the triangles of a mesh of the tests."""
-    return rf.Surface(mesh.vertices, mesh.corner_vertex.reshape(-1, 3), **options)
-
-
 @pytest.fixture(scope="module")
 def sphere():
-    return surface_of(icosphere(2), name="sphere")
+    return icosphere(2).with_parts(name="sphere")
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +31,10 @@ def field(sphere):
     return rf.smoothest(sphere)
 
 
-def test_public_names_are_no_modules():
-    """A submodule of the same name would replace a function when it is imported."""
-    modules = {module.name for module in pkgutil.iter_modules(rf.__path__)}
-    assert not modules & set(rf.__all__)
-    assert rf.__all__ == public_names(api)
-    assert all(getattr(rf, name) is getattr(api, name) for name in rf.__all__)
+@pytest.mark.parametrize("draw", [rf.render, rf.texture, rf.turntable])
+def test_parameters_do_not_hide_settings(draw):
+    """Functions that draw pictures take the settings of the look as keywords, too."""
+    assert not settings_of(Look).keys() & inspect.signature(draw).parameters.keys()
 
 
 @pytest.mark.parametrize(
@@ -56,7 +48,7 @@ def test_public_names_are_no_modules():
 )
 def test_faces_of_any_kind(faces, sizes):
     surface = rf.Surface([*SQUARE, [0.5, -1, 0]], faces)
-    assert np.array_equal(surface.mesh.face_start, offsets_from_sizes(sizes))
+    assert np.array_equal(surface.face_start, offsets_from_sizes(sizes))
     assert [list(face) for face in surface.faces] == [list(map(int, face)) for face in faces]
     assert [len(face) for face in surface.faces] == sizes
 
@@ -64,6 +56,14 @@ def test_faces_of_any_kind(faces, sizes):
 def test_a_flat_mesh_needs_no_z():
     surface = rf.Surface(np.array(SQUARE)[:, :2], [[0, 1, 2, 3]])
     assert np.array_equal(surface.vertices, SQUARE)
+
+
+def test_texture_coordinates_of_vertices_and_corners():
+    faces, uv = [[0, 1, 2], [0, 2, 3]], np.array(SQUARE)[:, :2]
+    corners = [0, 1, 2, 0, 2, 3]
+    for given in (uv, uv[corners]):
+        assert np.array_equal(rf.Surface(SQUARE, faces, uv=given).uv, uv[corners])
+    assert rf.Surface(SQUARE, faces).uv is None
 
 
 @pytest.mark.parametrize(
@@ -94,8 +94,8 @@ def test_meshes_that_are_refused(arguments, options, expected, error_of):
 
 
 def test_the_extension_reads_no_simulations(error_of, monkeypatch):
-    """The module that reads them is not in it."""
-    monkeypatch.setitem(sys.modules, "rosy_addon.external.simulation_files", None)
+    """The readers are not in it."""
+    monkeypatch.setattr(mesh_arrays, "SIMULATION_READERS", {})
     message = error_of(rf.Surface, "a.vtu")
     assert message == "a.vtu: is not a mesh file: its name must end in .obj, .off, .ply or .stl"
 
@@ -154,10 +154,10 @@ def test_files_and_arrays_give_the_same_field(sphere, field, tmp_path):
 
 def test_fields_from_arrays_of_a_surface(sphere, field, error_of):
     """Vectors of faces give the same field; the array is found by its name, or as the only one."""
-    arrays = MeshArrays(
+    arrays = mesh_arrays.MeshArrays(
         sphere.vertices,
-        sphere.mesh.corner_vertex,
-        sphere.mesh.face_start,
+        sphere.corner_vertex,
+        sphere.face_start,
         vertex_data={"p": sphere.vertices[:, 2]},
         face_data={"U": field.vectors},
     )
@@ -193,7 +193,7 @@ def test_lengths_of_guides_may_be_their_firmness(sphere, field):
 
 
 def test_a_field_of_another_surface_is_refused(sphere, field, error_of):
-    other = surface_of(icosphere(2), name="other")
+    other = icosphere(2).with_parts(name="other")
     for function in (rf.render, rf.strokes):
         assert error_of(function, other, field).startswith("other: the field is on another surface")
 
@@ -350,3 +350,32 @@ def test_a_turntable_counts_its_pictures(sphere, field, tmp_path):
     assert Image.open(path).n_frames == 3
     with pytest.raises(rf.RosyError, match="2 or more"):
         rf.turntable(sphere, field, path=tmp_path / "b.gif", pictures=1)
+
+
+CUBE = (
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+    [[3, 2, 1, 0], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
+)
+
+
+def test_outer_faces_see_the_sky_and_inner_ones_do_not():
+    vertices, faces = CUBE
+    outside = rf.Surface(vertices, faces)
+    inside = rf.Surface(vertices, [face[::-1] for face in faces])
+    np.testing.assert_allclose(rf.ambient_occlusion(outside, 32), 1, atol=0.02)
+    np.testing.assert_allclose(rf.ambient_occlusion(inside, 32), 0, atol=0.02)
+
+
+def test_tones_of_corners_and_of_vertices_draw_the_same_picture():
+    surface = rf.Surface(*CUBE)
+    tones = np.linspace(0, 1, 8)
+    options = {"preset": "pen-and-ink", "size": (64, 64)}
+    by_vertex = rf.render(surface, tone_values=tones, **options)
+    by_corner = rf.render(surface, tone_values=tones[surface.faces.ravel()], **options)
+    np.testing.assert_array_equal(by_vertex, by_corner)
+
+
+def test_other_numbers_of_tones_are_refused(error_of):
+    surface = rf.Surface(*CUBE)
+    message = error_of(rf.render, surface, tone_values=np.ones(6), preset="engraving")
+    assert "8 numbers, one for each vertex, or 24 numbers, one for each corner" in message

@@ -15,19 +15,15 @@ import rosy_addon as rf
 from rosy_addon.cli.parser import main
 
 
-def surface_of(mesh, **options):
-    return rf.Surface(mesh.vertices, np.split(mesh.corner_vertex, mesh.face_start[1:-1]), **options)
-
-
 @pytest.fixture(scope="module")
 def sphere():
-    return surface_of(icosphere(2), name="sphere")
+    return icosphere(2).with_parts(name="sphere")
 
 
 def members(surface, vectors, degree):
     """The members of one face: a vector rotated about the normal."""
     angles = 2 * np.pi * np.arange(degree) / degree
-    for vector, normal in zip(vectors, surface.face_normals, strict=True):
+    for vector, normal in zip(vectors, surface.face_normal, strict=True):
         perpendicular = np.cross(normal, vector)
         yield np.cos(angles)[:, None] * vector + np.sin(angles)[:, None] * perpendicular
 
@@ -35,7 +31,7 @@ def members(surface, vectors, degree):
 @pytest.mark.parametrize("degree", range(1, 8))
 def test_angles_are_those_of_the_nearest_members(degree):
     """Every member of one field against every member of the other, face by face."""
-    surface = surface_of(torus(16, 10))
+    surface = torus(16, 10)
     one, other = rf.form(surface, degree), rf.along_axis(surface, (1, 2, 3), degree=degree)
     difference = rf.compare([one, other]).differences["field 2"]
     for face, (a, b) in enumerate(
@@ -67,7 +63,7 @@ def test_the_face_of_the_largest_angle(sphere):
     turn = np.zeros(sphere.face_count)
     turn[:] = 0.1
     turn[7] = 0.4
-    x, y = one.vectors, np.cross(sphere.face_normals, one.vectors)
+    x, y = one.vectors, np.cross(sphere.face_normal, one.vectors)
     other = rf.from_vectors(sphere, np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * y, degree=1)
     row = rf.compare([one, other]).rows[1]
     assert row["worst_face"] == 7 and np.isclose(row["max"], np.degrees(0.4))

@@ -19,15 +19,9 @@ SQUARE = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]
 LOOK = Look(length=8)
 
 
-def surface_of(mesh, vertices=None, **options):
-    """A surface with the quadrilaterals of a mesh of the tests."""
-    points = mesh.vertices if vertices is None else vertices
-    return rf.Surface(points, mesh.corner_vertex.reshape(-1, 4), **options)
-
-
 @pytest.fixture(scope="module")
 def square():
-    return surface_of(plane(), name="square")
+    return plane().with_parts(name="square")
 
 
 def series(surface, count, degrees=1.0, degree=4):
@@ -73,7 +67,7 @@ def test_streaks_drift_and_loops_close(square):
 def test_noise_moves_with_the_mesh(square):
     """The field is that of the deformed mesh, although the noise is in the first one's rest shape."""
     bent = square.vertices * (1, 0.8, 1) + np.outer(square.vertices[:, 0] ** 2, (0, 0, 0.5))
-    other = surface_of(square.mesh, bent)
+    other = rf.Surface(bent, square.faces)
     fields = [rf.along_axis(each, (1, 0, 0), 4) for each in (square, other)]
     views = views_of(fields)
     assert {view.look.anchor for view in views} == {"surface"}
@@ -84,7 +78,7 @@ def test_noise_moves_with_the_mesh(square):
         face_values(mesh, np.eye(3), deformed, field, False)[0].channels[REPRESENTATION]
         for mesh, field in (
             (instance.surface, instance.field),
-            (other.mesh, fields[1].rosy),
+            (other, fields[1]),
         )
     )
     assert drawn == pytest.approx(expected, abs=1e-5)

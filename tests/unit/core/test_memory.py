@@ -18,7 +18,7 @@ from rosy_addon.core.cache import Cache
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import generate
-from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.surface import Surface
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.rendering.draw import draw_picture, picture_groups, picture_memory
@@ -214,11 +214,11 @@ def test_meshes_and_fields_are_refused_by_the_size_of_the_file(tmp_path, monkeyp
     rows = "".join(f"v {x} {x % 7} {x % 3}\n" for x in range(3000))
     faces = "".join(f"f {x} {x + 1} {x + 2}\n" for x in range(1, 2998))
     (tmp_path / "a.obj").write_text(rows + faces)
-    peak = traced_peak(lambda: read_mesh(tmp_path / "a.obj"))
+    peak = traced_peak(lambda: Surface(tmp_path / "a.obj"))
     limit_memory(monkeypatch, 2 * peak)
-    surface = read_mesh(tmp_path / "a.obj")
+    surface = Surface(tmp_path / "a.obj")
     limit_memory(monkeypatch, 0.5 * peak)
-    assert "a.obj: a file of 0 MB needs about" in error_of(read_mesh, tmp_path / "a.obj")
+    assert "a.obj: a file of 0 MB needs about" in error_of(Surface, tmp_path / "a.obj")
     limit_memory(monkeypatch, 1000)
     np.save(tmp_path / "a.npy", np.ones((surface.face_count, 3)))
     assert "a.npy: a file of 0 MB needs" in error_of(load_field, tmp_path / "a.npy", surface)

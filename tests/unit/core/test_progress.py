@@ -145,12 +145,9 @@ LONG = {
     "prescribed": (prescribed_field, (SURFACE, 4, np.array([5, 200]), np.array([1, -1])), 0.8),
     "convert": (convert, (SURFACE, FIELD, replace(CONVERSION, magnitude="curvature")), 0.9),
     "project": (project, ([INSTANCE] * 2, CAMERA), 0.9),
-    "several samples": (project, ([INSTANCE], CAMERA, "smooth", None, 3), 0.9),
     "occlusion": (ambient_occlusion, ([INSTANCE], 0, 16), 0.9),
     "picture": (picture, (Look(),), 0.9),
-    "members": (picture, (Look(method="members"),), 0.9),
-    "strokes": (draw_instances, ([INSTANCE], CAMERA, StrokeStyle()), 0.9),
-    "all strokes": (
+    "strokes": (
         draw_instances,
         ([INSTANCE], CAMERA, StrokeStyle(arrows=30.0, overshoot=4.0, outline=True)),
         0.9,

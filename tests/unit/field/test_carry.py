@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -25,10 +23,10 @@ def test_rotations_translations_and_scales_are_followed(surface, seed):
     rotation = Rotation.random(random_state=seed)
     vectors = vectors_of(surface) * random.uniform(0.1, 3, (surface.face_count, 1))
     moved = rotation.apply(surface.vertices) * random.uniform(0.1, 9) + random.normal(size=3)
-    actual = carried_vectors(replace(surface, vertices=moved), surface.vertices, vectors)
+    actual = carried_vectors(surface.with_parts(vertices=moved), surface.vertices, vectors)
     np.testing.assert_allclose(actual, rotation.apply(vectors), atol=1e-9)
     several = np.stack([vectors, -vectors], axis=1)
-    again = carried_vectors(replace(surface, vertices=moved), surface.vertices, several)
+    again = carried_vectors(surface.with_parts(vertices=moved), surface.vertices, several)
     np.testing.assert_allclose(again[:, 1], -actual, atol=1e-12)
 
 
@@ -47,7 +45,7 @@ def test_a_shear_rotates_less_than_its_edges():
     surface = plane(3, 3)
     sheared = surface.vertices + 0.5 * surface.vertices[:, [1]] * (1, 0, 0)
     vectors = np.tile((0.0, 1.0, 0.0), (surface.face_count, 1))
-    actual = carried_vectors(replace(surface, vertices=sheared), surface.vertices, vectors)
+    actual = carried_vectors(surface.with_parts(vertices=sheared), surface.vertices, vectors)
     turned = np.degrees(np.arctan2(actual[:, 0], actual[:, 1]))
     # The rotation of the polar decomposition of [[1, s], [0, 1]] is by atan(s / 2).
     np.testing.assert_allclose(turned, np.degrees(np.arctan(0.25)), atol=1e-6)
@@ -57,9 +55,9 @@ def test_what_has_not_moved_or_cannot_be_followed_stays():
     surface = icosphere(1)
     vectors = vectors_of(surface)
     assert np.array_equal(carried_vectors(surface, surface.vertices, vectors), vectors)
-    far = replace(surface, vertices=surface.vertices + 2.0)
+    far = surface.with_parts(vertices=surface.vertices + 2.0)
     assert np.array_equal(carried_vectors(far, surface.vertices, vectors), vectors)
-    turned = replace(surface, vertices=surface.vertices[:, [1, 2, 0]])
+    turned = surface.with_parts(vertices=surface.vertices[:, [1, 2, 0]])
     flat = np.zeros_like(surface.vertices)
     assert np.array_equal(carried_vectors(turned, flat, vectors), vectors)
     strange = vectors.copy()

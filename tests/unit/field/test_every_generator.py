@@ -14,7 +14,7 @@ from shapes import torus
 from rosy_addon.cli.parser import main
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.generate import GENERATORS, GeneratorSettings, generate, options_of
-from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.surface import Surface
 
 #: Degrees in which the edges around each square, or each equilateral triangle, cancel.
 CANCELLED = {"cube": (1, 3), "faces_without_area": (1, 4)}
@@ -92,7 +92,7 @@ def test_options_of_the_command_line(kind, words, options, tmp_path):
     mesh, out = tmp_path / "a.obj", tmp_path / "a.rosy"
     mesh.write_text("\n".join(rows) + "\n")
     assert main(["field", str(mesh), "-o", str(out), "--generate", kind, *words]) == 0
-    surface = read_mesh(mesh)
+    surface = Surface(mesh)
     settings = GeneratorSettings(kind, **options)
     expected = generate(surface, settings, 4).vectors
     assert np.array_equal(read_field(out, surface).vectors, expected)

@@ -18,11 +18,10 @@ from rosy_addon.field.field_io import load_field, write_field
 from rosy_addon.field.formats.sings import read_sings
 from rosy_addon.field.frames import dot, normalize
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
-from rosy_addon.field.surface import build_surface
+from rosy_addon.field.surface import Surface, build_surface
 
 BALL = icosphere(2)
 
@@ -84,7 +83,7 @@ def test_fieldgen_files_hold_the_mesh_and_a_field_on_vertices(degree, tmp_path):
     field = RosyField(degree, normalize(field.vectors))
     path = tmp_path / "a.obj"
     write_field(path, field, surface)
-    mesh = read_mesh(path)
+    mesh = Surface(path)
     assert np.array_equal(mesh.vertices, surface.vertices)
     assert np.array_equal(mesh.corner_vertex, surface.corner_vertex)
     again = read_field(path, mesh)

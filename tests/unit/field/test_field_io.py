@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,10 +15,10 @@ from shapes import cylinder, from_quads, icosphere, plane, torus
 from rosy_addon.field.field_io import write_field
 from rosy_addon.field.frames import dot
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.representation import face_representation
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.singularities import find_singularities
+from rosy_addon.field.surface import Surface
 from rosy_addon.field.validate import validated_field
 
 SQUARES = plane(3, 2)  # 6 faces, 12 vertices, facing +z
@@ -104,14 +103,14 @@ def test_members_may_be_listed_in_any_order(tmp_path):
 @pytest.mark.parametrize("name", ["vase-2", "vase-4", "vase-7", "dome-6", "cheburashka"])
 def test_fields_of_other_programs(name, shared_data):
     mesh, _, degree = name.partition("-")
-    surface = read_mesh(shared_data / "meshes" / f"{mesh}.off")
+    surface = Surface(shared_data / "meshes" / f"{mesh}.off")
     field = read_field(shared_data / "fields" / f"{name}.rawfield", surface)
     assert field.degree == int(degree or 4)
     assert np.allclose(field.magnitude, 1, atol=1e-4)
     assert np.abs(dot(field.vectors, surface.face_normal)).max() < 3e-7
     if name == "cheburashka":  # the only closed mesh
         _, index = find_singularities(surface, field)
-        assert index.sum() == field.degree * euler_characteristic(surface)
+        assert index.sum() == field.degree * surface.euler_characteristic
 
 
 @pytest.mark.parametrize(
@@ -285,8 +284,8 @@ def test_the_mean_does_not_depend_on_the_members_at_vertices():
 def test_a_field_belongs_to_the_rest_shape():
     tube = cylinder(24, 4)
     field = axis_field(tube, 4)
-    bent = replace(
-        tube, vertices=tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0), rest_vertices=tube.vertices
+    bent = tube.with_parts(
+        vertices=tube.vertices[:, [2, 1, 0]] * (1, 1, -1.0), rest_vertices=tube.vertices
     )
     again = validated_field(bent, field.vectors, 4, "here")
     assert np.array_equal(again.vectors, field.vectors)

@@ -107,7 +107,7 @@ def test_vectors_on_a_rest_shape_are_transported_back(surface):
     field = random_field(surface, 1)
     vectors = vectors_on_rest_shape(surface, rest, field.vectors)
     assert np.linalg.norm(vectors, axis=1) == pytest.approx(field.magnitude)
-    moved = replace(surface, rest_vertices=rest)
+    moved = surface.with_parts(rest_vertices=rest)
     deformed = np.ascontiguousarray(surface.vertices.T)
     expected, transported = (
         face_values(mesh, np.eye(3), deformed, a_field, False)[0].channels[REPRESENTATION]

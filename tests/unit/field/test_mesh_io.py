@@ -11,8 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from rosy_addon.field.formats.stl import weld
-from rosy_addon.field.mesh_io import read_mesh
-from rosy_addon.field.surface import MIN_EXTENT
+from rosy_addon.field.surface import MIN_EXTENT, Surface
 
 # A square, and a triangle on its edge from vertex 1 to vertex 2.
 VERTICES = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (1, 0.5, 1e-3)])
@@ -107,7 +106,7 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 def test_polygons_are_read_in_their_order(name, tmp_path):
     (tmp_path / name).write_bytes(FILES[name])
-    surface = read_mesh(tmp_path / name)
+    surface = Surface(tmp_path / name)
     assert np.allclose(surface.vertices, VERTICES, atol=1e-9)
     assert surface.corner_vertex.tolist() == [*FACES[0], *FACES[1]]
     assert surface.face_start.tolist() == [0, 4, 7]
@@ -117,7 +116,7 @@ def test_polygons_are_read_in_their_order(name, tmp_path):
 def test_binary_ply_of_equal_faces(order, tmp_path):
     triangles = [(0, 1, 2), (2, 3, 0), (2, 1, 4)]
     (tmp_path / "a.ply").write_bytes(binary_ply(order, triangles))
-    surface = read_mesh(tmp_path / "a.ply")
+    surface = Surface(tmp_path / "a.ply")
     assert surface.corner_vertex.reshape(-1, 3).tolist() == [list(face) for face in triangles]
 
 
@@ -142,7 +141,7 @@ def text_stl() -> bytes:
 @pytest.mark.parametrize("data", [binary_stl(), text_stl()], ids=["binary", "text"])
 def test_stl_corners_at_the_same_position_are_one_vertex(data, tmp_path):
     (tmp_path / "a.stl").write_bytes(data)
-    surface = read_mesh(tmp_path / "a.stl")
+    surface = Surface(tmp_path / "a.stl")
     assert len(surface.vertices) == 5
     assert surface.corner_vertex.tolist() == [0, 1, 2, 2, 3, 0, 2, 1, 4]
     assert np.array_equal(surface.vertices[surface.corner_vertex], TRIANGLES.reshape(-1, 3))
@@ -164,7 +163,7 @@ def test_edges_sharper_than_60_degrees_are_sharp(tmp_path):
         "OFF 8 3 0\n0 0 0\n0 0 1\n1 0 0\n1 0 1\n1 1 0\n1 1 1\n0 2 0\n0 2 1\n"
         "4 0 2 3 1\n4 2 4 5 3\n4 4 6 7 5\n"
     )
-    surface = read_mesh(tmp_path / "bent.off")
+    surface = Surface(tmp_path / "bent.off")
     fans = [
         len(set(surface.corner_fan[surface.corner_vertex == vertex].tolist())) for vertex in (2, 4)
     ]
@@ -234,7 +233,7 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     data, expected = DAMAGED[name]
     (tmp_path / name).write_bytes(data)
     tracemalloc.start()
-    message = error_of(read_mesh, tmp_path / name)
+    message = error_of(Surface, tmp_path / name)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert expected in message
@@ -243,9 +242,9 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
 
 
 def test_missing_files_and_folders(tmp_path, error_of):
-    assert "no such file" in error_of(read_mesh, tmp_path / "none.obj")
+    assert "no such file" in error_of(Surface, tmp_path / "none.obj")
     (tmp_path / "folder.obj").mkdir()
-    assert "is a directory" in error_of(read_mesh, tmp_path / "folder.obj")
+    assert "is a directory" in error_of(Surface, tmp_path / "folder.obj")
 
 
 @pytest.mark.slow
@@ -257,7 +256,7 @@ def test_random_damage_raises_only_rosy_errors(tmp_path_factory, garbage, name, 
     data = FILES[name]
     path.write_bytes(data[:offset] + garbage + data[offset + len(garbage) :])
     try:
-        read_mesh(path)
+        Surface(path)
     except RosyError as error:
         assert "\n" not in str(error) and str(path) in str(error)
 
@@ -269,5 +268,5 @@ def test_off_coordinates_are_read_exactly(tmp_path_factory, numbers):
     path = tmp_path_factory.getbasetemp() / "exact.off"
     rows = [" ".join(map(repr, numbers[k : k + 3])) for k in (0, 3, 6)]
     path.write_text("\n".join(["OFF", "3 1 0", *rows, "3 0 1 2", ""]))
-    surface = read_mesh(path)
+    surface = Surface(path)
     assert surface.vertices.ravel().tolist() == numbers

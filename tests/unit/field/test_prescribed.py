@@ -13,7 +13,7 @@ from rosy_addon.field import prescribed, turning_angles
 from rosy_addon.field.face_graph import face_graph, spanning_forest, triangle_graph
 from rosy_addon.field.prescribed import prescribed_field
 from rosy_addon.field.representation import face_frames, matching_angles, to_representation
-from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface, build_surface
 
 
@@ -186,7 +186,7 @@ def test_guides_turn_the_whole_field():
 @pytest.mark.parametrize("holes, missing", [(0, 0), (1, 0), (3, 0), (0, 1), (0, 3), (1, 2)])
 def test_all_singularities_are_found_again(holes, missing, degree):
     surface = block(holes, missing)
-    needed = degree * euler_characteristic(surface) if not missing else 0
+    needed = degree * surface.euler_characteristic if not missing else 0
     vertex = spread_vertices(surface, abs(needed) + 6, seed=degree)
     index = np.where(np.arange(len(vertex)) < abs(needed), np.sign(needed), 1)
     index[-3:] = -1

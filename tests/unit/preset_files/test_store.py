@@ -109,6 +109,19 @@ def test_a_preset_is_read_as_it_was_written(tmp_path, name, description, look):
     assert stored == json.loads(json.dumps(changed))
 
 
+def test_shipped_presets_have_the_settings_of_their_files():
+    assert {"paper", "plaid", "pen-and-ink"} <= set(preset_keys())
+    for name in preset_keys():
+        stored = json.loads((SHIPPED_FOLDER / f"{name}.json").read_text())["look"]
+        assert load_preset(name).look == Look(**stored) and load_preset(name).description
+
+
+def test_missing_presets(tmp_path, error_of):
+    message = error_of(load_preset, "papier")
+    assert "there is no preset 'papier'" in message and "paper" in message
+    assert "no such file" in error_of(load_preset, tmp_path / "none.json")
+
+
 def test_files_are_readable_by_people(tmp_path):
     write_preset(tmp_path / "a.json", MINE._replace(name="Schrägstrich Ø"))
     assert (tmp_path / "a.json").read_text(encoding="utf-8").splitlines() == [
@@ -139,87 +152,69 @@ def test_a_look_without_changes_has_no_settings():
 SHALLOW = sys.version_info < (3, 14)
 
 HEAD = '{"name": "a", "description": "b", "look": {'
+
+#: Settings of a look, and the error.
+SETTINGS = {
+    '"gain": ' + "[" * 900 + "]" * 900: "expected a number",
+    '"seed": ' + "9" * 5000: "number that is too long",
+    '"seed": ' + "9" * 3000: "setting 'seed' is 999",
+    '"gain": NaN': "setting 'gain' is nan",
+    '"gain": 1e999': "setting 'gain' is inf",
+    '"gain": null': "setting 'gain' is None, expected a number",
+    '"hue": ["one"]': "setting 'hue' is ['one'], expected one of",
+    '"hue": {}': "setting 'hue' is {}, expected one of",
+    f'"hue": "{"x" * 60_000}"': "setting 'hue' is 'xxx",
+    '"length": true': "setting 'length' is True, expected a whole number",
+    '"length": 1.5': "setting 'length' is 1.5, expected a whole number",
+    '"length": -3': "setting 'length' is -3",
+    '"view_plane": 1': "setting 'view_plane' is 1, expected true or",
+    '"ink_color": "#12345g"': "'#12345g', expected a color",
+    '"ink_color": "#123456\\n"': "expected a color",
+    '"gain": 1, "gain": 2': "'gain' appears twice",
+    '"sparkle": 1': "unknown setting 'sparkle': check its spelling",
+    f'"{"x" * 60_000}": 1': "unknown setting 'xxx",
+    '"a\\nb": 1': "unknown setting 'a\\nb'",
+}
+
+#: Names of presets, as JSON, and the error.
+BAD_NAMES = {
+    "3": "the name of the preset must be text, not 3",
+    "[]": "the name of the preset must be text, not []",
+    '""': "a letter or a digit",
+    '"../.."': "a letter or a digit",
+    f'"{"a" * 49}"': "has 49 characters, more than 48",
+    '"a\\nb"': "must be one line of text",
+    '"a\\u001b[31m"': "'a\\x1b[31m'",
+    '"a\\u202eb"': "'a\\u202eb'",
+    '"a\\ud800"': "'a\\ud800'",
+}
+
+#: Contents of files, and the error.
 HOSTILE = {
-    "huge": (b" " * MAX_FILE_BYTES + b"{}", "larger than the limit of 65,536 bytes"),
-    "deep list": (b"[" * 60_000, "nested too deeply" if SHALLOW else ""),
-    "deep object": (b'{"a":' * 12_000, "nested too deeply" if SHALLOW else ""),
-    "deep value": (
-        (HEAD + '"gain": ' + "[" * 900 + "]" * 900 + "}}").encode(),
-        "expected a number",
-    ),
-    "long number": ((HEAD + '"seed": ' + "9" * 5000 + "}}").encode(), "number that is too long"),
-    "large number": ((HEAD + '"seed": ' + "9" * 3000 + "}}").encode(), "setting 'seed' is 999"),
-    "NaN": ((HEAD + '"gain": NaN}}').encode(), "setting 'gain' is nan"),
-    "infinite": ((HEAD + '"gain": 1e999}}').encode(), "setting 'gain' is inf"),
-    "minus infinite": ((HEAD + '"gain": -Infinity}}').encode(), "setting 'gain' is -inf"),
-    "list": (
-        (HEAD + '"hue": ["one"]}}').encode(),
-        "setting 'hue' is ['one'], expected one of",
-    ),
-    "object": ((HEAD + '"hue": {}}}').encode(), "setting 'hue' is {}, expected one of"),
-    "null": ((HEAD + '"gain": null}}').encode(), "setting 'gain' is None, expected a number"),
-    "bool": (
-        (HEAD + '"length": true}}').encode(),
-        "setting 'length' is True, expected a whole number",
-    ),
-    "half": (
-        (HEAD + '"length": 1.5}}').encode(),
-        "setting 'length' is 1.5, expected a whole number",
-    ),
-    "number": (
-        (HEAD + '"view_plane": 1}}').encode(),
-        "setting 'view_plane' is 1, expected true or",
-    ),
-    "color": ((HEAD + '"ink_color": "#12345g"}}').encode(), "'#12345g', expected a color"),
-    "color, line": ((HEAD + '"ink_color": "#123456\\n"}}').encode(), "expected a color"),
-    "twice": ((HEAD + '"gain": 1, "gain": 2}}').encode(), "'gain' appears twice"),
-    "name twice": (b'{"name": "a", "name": "b"}', "'name' appears twice"),
-    "newer": ((HEAD + '"sparkle": 1}}').encode(), "unknown setting 'sparkle': check its spelling"),
-    "newer, long": ((HEAD + f'"{"x" * 60_000}": 1' + "}}").encode(), "unknown setting 'xxx"),
-    "long text": ((HEAD + f'"hue": "{"x" * 60_000}"' + "}}").encode(), "setting 'hue' is 'xxx"),
-    "lines in a key": ((HEAD + '"a\\nb": 1}}').encode(), "unknown setting 'a\\nb'"),
-    "UTF-16": ('{"name": "a"}'.encode("utf-16"), "binary data"),
-    "Latin-1": ('{"name": "Schräg"}'.encode("latin-1"), "not UTF-8"),
-    "empty": (b"", ":1: expecting value"),
-    "cut off": (b'{"name": "a", "descr', ":1: unterminated string"),
-    "name, number": (
-        b'{"name": 3, "description": "b", "look": {}}',
-        "the name of the preset must be text, not 3",
-    ),
-    "name, list": (
-        b'{"name": [], "description": "", "look": {}}',
-        "the name of the preset must be text, not []",
-    ),
-    "name, empty": (b'{"name": "", "description": "b", "look": {}}', "a letter or a digit"),
-    "name, dots": (b'{"name": "../..", "description": "b", "look": {}}', "a letter or a digit"),
-    "name, long": (
-        b'{"name": "' + b"a" * 49 + b'", "description": "b", "look": {}}',
-        "has 49 characters, more than 48",
-    ),
-    "name, lines": (
-        b'{"name": "a\\nb", "description": "", "look": {}}',
-        "must be one line of text",
-    ),
-    "name, escape": (b'{"name": "a\\u001b[31m", "description": "", "look": {}}', "'a\\x1b[31m'"),
-    "name, backward": (b'{"name": "a\\u202eb", "description": "", "look": {}}', "'a\\u202eb'"),
-    "name, half a character": (
-        b'{"name": "a\\ud800", "description": "", "look": {}}',
-        "'a\\ud800'",
-    ),
-    "description, long": (
-        b'{"name": "a", "description": "' + b"a" * 201 + b'", "look": {}}',
-        "the description of the preset has 201 characters, more than 200",
-    ),
-    "picture": (
-        b'{"name": "a", "description": "b", "look": {}, "picture": "iVBORw0KGgo="}',
-        "unknown entry 'picture'",
-    ),
+    **{f"{HEAD}{text}}}}}".encode(): error for text, error in SETTINGS.items()},
+    **{
+        f'{{"name": {name}, "description": "b", "look": {{}}}}'.encode(): error
+        for name, error in BAD_NAMES.items()
+    },
+    b" " * MAX_FILE_BYTES + b"{}": "larger than the limit of 65,536 bytes",
+    b"[" * 60_000: "nested too deeply" if SHALLOW else "",
+    b'{"a":' * 12_000: "nested too deeply" if SHALLOW else "",
+    b"[1]": "a preset must be a JSON object",
+    b'{"name": "a", "description": "b"}': "the preset has no 'look'",
+    b'{"name": "a", "description": "b", "look": 3}': "'look' must be a JSON object",
+    b'{"name": "a", "name": "b"}': "'name' appears twice",
+    '{"name": "a"}'.encode("utf-16"): "binary data",
+    '{"name": "Schr\u00e4g"}'.encode("latin-1"): "not UTF-8",
+    b"": ":1: expecting value",
+    b'{"name": "a", "descr': ":1: unterminated string",
+    b'{\n "name": "a",\n "look" {}\n}': ":3: expecting",
+    f'{{"name": "a", "description": "{"a" * 201}", "look": {{}}}}'.encode(): "201 characters, more",
+    HEAD.encode() + b'}, "picture": "iVBORw0KGgo="}': "unknown entry 'picture'",
 }
 
 
-@pytest.mark.parametrize("case", HOSTILE)
-def test_hostile_files(case, tmp_path, error_of):
-    data, expected = HOSTILE[case]
+@pytest.mark.parametrize(("data", "expected"), HOSTILE.items(), ids=range(len(HOSTILE)))
+def test_hostile_files(data, expected, tmp_path, error_of):
     path = tmp_path / "a.json"
     path.write_bytes(data)
     message = error_of(read_preset, path)

@@ -70,12 +70,7 @@ def test_everything_is_framed_and_touches_the_margin(seed, azimuth, elevation, p
 
 def test_framing_ignores_loose_vertices():
     ball = icosphere(2)
-    loose = type(ball)(
-        **{
-            **{name: getattr(ball, name) for name in ball.__dataclass_fields__},
-            "vertices": np.concatenate([ball.vertices, [[100.0, 0, 0]]]),
-        }
-    )
+    loose = ball.with_parts(vertices=np.concatenate([ball.vertices, [[100.0, 0, 0]]]))
     first, second = (
         orbit_camera(MeshInstance(s, np.eye(4)).face_points(), 10, 20, 50, 50)
         for s in (ball, loose)

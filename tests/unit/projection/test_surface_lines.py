@@ -12,8 +12,7 @@ from shapes import cylinder, from_triangles, icosphere, plane, torus
 from rosy_addon.core.cache import Cache
 from rosy_addon.field.directional_field import field_from_directions
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.mesh_io import read_mesh
-from rosy_addon.field.surface import build_surface
+from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.projection.surface_lines import (
     cached_surface_lines,
     rest_matrix,
@@ -113,7 +112,7 @@ def test_distances_on_a_sphere(degree):
     ("name", "spacing"), [("spot.obj", 0.015), *long(("stanford-bunny.obj", 0.0012))]
 )
 def test_distances_on_scanned_meshes(shared_data, name, spacing):
-    surface = read_mesh(shared_data / "meshes" / name)
+    surface = Surface(shared_data / "meshes" / name)
     lines = lines_of(surface, generate(surface, "form", 4), spacing)
     assert share_within(lines, spacing, TOLERANCE, AWAY) >= SHARE
 

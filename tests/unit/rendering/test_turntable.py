@@ -33,6 +33,7 @@ from rosy_addon.rendering.turntable import (
 from rosy_addon.worker.program import run_program
 
 QUICK = Look(length=8)
+BALL = MeshInstance(icosphere(2), np.eye(4), axis_field(icosphere(2), 2))
 
 
 def decode_frames(data):
@@ -99,10 +100,8 @@ def test_the_object_stays_in_the_frame_in_all_views():
 
 
 def test_a_video_has_all_frames(tmp_path):
-    surface = icosphere(2)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
     path = tmp_path / "film.gif"
-    views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
+    views = turntable_views(BALL, QUICK, 3, (32, 32), (0.0, 0.0))
     assert turntable(draw_picture, views, 3, path, 12) == path
     gif, actual = decode_frames(path.read_bytes())
     assert len(actual) == 3 and gif.size == (32, 32)
@@ -148,9 +147,7 @@ class CancelledError(Exception):
 
 def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
     """An .mp4 is encoded by another program."""
-    surface = icosphere(2)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
-    views = turntable_views(instance, QUICK, 2, (32, 32), (0.0, 0.0))
+    views = turntable_views(BALL, QUICK, 2, (32, 32), (0.0, 0.0))
     pid_file = tmp_path / "pid"
 
     def encode(*_):
@@ -170,29 +167,8 @@ def test_the_encoder_is_killed_when_the_video_is_cancelled(tmp_path):
     assert not (tmp_path / "film.mp4").exists()
 
 
-def test_a_program_that_fails():
-    program = "import sys; print('bad pixels'); sys.exit(3)"
-    status, output = run_program([sys.executable, "-c", program], "")
-    assert (status, output.strip()) == (3, "bad pixels")
-
-
-def test_the_progress_names_each_picture(tmp_path):
-    surface = icosphere(2)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
-    views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
-    reports = []
-    with listening(lambda *report: reports.append(report)):
-        turntable(draw_picture, views, 3, tmp_path / "film.gif", 12)
-    fractions = [fraction for fraction, _ in reports]
-    assert fractions == sorted(fractions) and fractions[0] == 0 and 0.97 < fractions[-1] < 1
-    labels = [f"picture {number} of 3" for number in (1, 2, 3)]
-    assert list(dict.fromkeys(label for _, label in reports)) == [*labels, "encoding the video"]
-
-
 def test_a_cancelled_video_leaves_no_file(tmp_path):
-    surface = icosphere(2)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
-    views = turntable_views(instance, QUICK, 3, (32, 32), (0.0, 0.0))
+    views = turntable_views(BALL, QUICK, 3, (32, 32), (0.0, 0.0))
 
     def cancel(fraction, label):
         if label == "picture 3 of 3":
@@ -207,9 +183,7 @@ def test_a_cancelled_video_leaves_no_file(tmp_path):
 def test_an_mp4_with_ffmpeg(tmp_path):
     """As many pictures as drawn come back, and their colors."""
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    surface = icosphere(2)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2))
-    views = turntable_views(instance, QUICK, 4, (64, 48), (0.0, 0.0))
+    views = turntable_views(BALL, QUICK, 4, (64, 48), (0.0, 0.0))
     path = tmp_path / "film.mp4"
     turntable(draw_picture, views, 4, path, 12, find_encoder())
     facts, *pictures = imageio_ffmpeg.read_frames(str(path))

@@ -1,0 +1,174 @@
+"""`Studio`: the panels of a figure, drawn under one camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..annotation.figure_parts import ColorBar, Panel, Row
+from ..annotation.singularity_marks import SingularityMarks, singularity_marks
+from ..annotation.singularity_settings import shows_singularities
+from ..compositor.look import Look
+from ..core.cache import Cache
+from ..core.color import map_colors
+from ..field.analysis import format_degrees
+from ..image_io.png import to_srgb_uint8
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.visible_vertices import project_vertices
+from ..rendering.draw import draw_picture
+from ..rendering.view_input import ViewInput
+from .comparison import Comparison
+
+#: Largest part of a panel that the dots of singularities cover.
+MAX_DOT_SHARE = 0.06
+
+#: The color map of differences, and where in it an angle of 0 and the largest one are: light and dark, but
+#: not so dark that lines vanish.
+DIFFERENCE_COLORS, DIFFERENCE_ENDS = "magma", (1.0, 0.25)
+
+
+@dataclass(frozen=True, eq=False)
+class Studio:
+    """Draw the panels of a figure: all fields under one camera.
+
+    Attributes
+    ----------
+    comparison : Comparison
+    instances : dict of str to MeshInstance
+        The fields in world space, by their titles.
+    camera : Camera
+    look : Look
+    workers : int
+        Processes that draw a picture together; see `draw_picture`.
+    """
+
+    comparison: Comparison
+    instances: dict[str, MeshInstance]
+    camera: Camera
+    look: Look
+    workers: int
+    _cache: Cache = field(default_factory=Cache)
+
+    def _rgba(self, instance: MeshInstance, **changes: Any) -> NDArray[np.float32]:
+        """Return the picture of an instance as `Picture.rgba`, without singularities."""
+        look = replace(self.look, singularity_dots="none", **changes)
+        view = ViewInput((instance,), self.camera, look)
+        return draw_picture(view, self._cache, keep_gbuffers=False, workers=self.workers).rgba
+
+    @cached_property
+    def _marks(self) -> dict[str, SingularityMarks | None]:
+        """Singularities of each field in its picture; None if the look shows none.
+
+        If there are very many, their dots are smaller, so that they do not hide the lines.
+        """
+        if not shows_singularities(self.look):
+            return dict.fromkeys(self.instances)
+        limit = MAX_DOT_SHARE * self.camera.width * self.camera.height
+        shown: dict[str, SingularityMarks | None] = {}
+        for title, instance in self.instances.items():
+            marks = singularity_marks([instance], self.camera, self.look)
+            area = max(float((np.pi * marks.radius**2).sum()), limit)
+            shown[title] = replace(marks, size=marks.size * np.sqrt(limit / area))
+        return shown
+
+    def field_row(self, titles: Sequence[str], color_bar: ColorBar | None) -> Row:
+        """Return the panels of the fields."""
+        panels = [
+            Panel(text, to_srgb_uint8(self._rgba(instance)[::-1]), self._marks[title])
+            for text, (title, instance) in zip(titles, self.instances.items(), strict=True)
+        ]
+        return Row(panels, color_bar)
+
+    def difference_row(self, lines: str, largest_angle: float) -> Row:
+        """Return the panels of the differences from the first field, in the same order as the fields."""
+        reference, first = next(iter(self.comparison.fields.items()))
+        top = largest_angle or 180.0 / first.degree
+        panels = [
+            self._difference_panel(title, lines, top)
+            if title in self.comparison.differences
+            else None
+            for title in self.instances
+        ]
+        legend = f"Angle to \u201c{reference}\u201d\n\u00d7  largest angle"
+        if shows_singularities(self.look):
+            legend += (
+                f"\nOpen circles: singularities of\n\u201c{reference}\u201d; dots: of the other field."
+                "\nLines connect those that match."
+            )
+        stops = map_colors(np.linspace(*DIFFERENCE_ENDS, 33), DIFFERENCE_COLORS)
+        return Row(panels, ColorBar("angle (degrees)", 0.0, top, stops.astype(np.float64)), legend)
+
+    def _difference_panel(self, title: str, lines: str, top: float) -> Panel:
+        """Return the panel of the difference of a field from the first one.
+
+        Parameters
+        ----------
+        title : str
+        lines : {"other", "first", "both"}
+            The field whose lines are drawn.
+        top : float
+            Angle at the top of the color map, in degrees.
+        """
+        reference, first = next(iter(self.instances.items()))
+        other, difference = self.instances[title], self.comparison.differences[title]
+        degrees = np.degrees(difference.angle)
+        values = degrees.astype(np.float32)[first.surface.corner_face]
+        at_zero, at_top = DIFFERENCE_ENDS
+        slope = top / (at_top - at_zero)
+        pictures = [
+            self._rgba(
+                replace(instance, color_values=values),
+                hue="values",
+                magnitude_length=False,
+                color_range=(-slope * at_zero, slope * (1.0 - at_zero)),
+                color_map=DIFFERENCE_COLORS,
+            )
+            for instance in {"first": [first], "other": [other], "both": [first, other]}[lines]
+        ]
+        # The pictures cover the same pixels.
+        rgba = np.mean(pictures, axis=0)
+        mean, p95, largest = (
+            f"{format_degrees(np.degrees(angle))}\u00b0"
+            for angle in (difference.mean, difference.p95, difference.max)
+        )
+        return Panel(
+            f"{title} vs. {reference}",
+            to_srgb_uint8(rgba[::-1]),
+            self._marks[title],
+            self._marks[reference],
+            self._links(title) if shows_singularities(self.look) else None,
+            self._worst_place(difference.worst_face),
+            f"mean {mean}, 95 % {p95}, largest {largest}",
+        )
+
+    def _links(self, title: str) -> NDArray[np.float64]:
+        """Return the (n, 2, 2) ends of lines between singularities that match, if both are visible."""
+        first = next(iter(self.comparison.fields.values())).singularities
+        second = self.comparison.fields[title].singularities
+        matching = self.comparison.matchings[title]
+        ends = np.stack([first.vertex[matching.first], second.vertex[matching.second]], axis=1)
+        place, is_visible = self._projected(ends.ravel())
+        return place.reshape(-1, 2, 2)[is_visible.reshape(-1, 2).all(axis=1)]
+
+    def _worst_place(self, face: int) -> NDArray[np.float64] | None:
+        """Return the place of a face in the picture, (2,) pixels; None if none of its corners is visible."""
+        if face < 0:
+            return None
+        surface = next(iter(self.instances.values())).surface
+        corners = surface.corner_vertex[surface.face_start[face] : surface.face_start[face + 1]]
+        place, is_visible = self._projected(corners)
+        return place[is_visible].mean(axis=0) if is_visible.any() else None
+
+    def _projected(
+        self, vertices: NDArray[np.integer[Any]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Return the (n, 2) places of vertices of the first surface in pixels, and which are visible."""
+        first = next(iter(self.instances.values()))
+        projected = project_vertices([first], self.camera, [vertices])
+        return projected.position, projected.is_visible

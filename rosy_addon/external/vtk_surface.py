@@ -1,0 +1,258 @@
+"""`surface_arrays`: the surface of VTK datasets, as polygons with arrays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import RosyError, counted
+from ..field.formats.polygons import Polygons, offsets_from_sizes
+from ..field.frames import dot
+from ..field.mesh_arrays import MeshArrays
+from ..field.polygon_arrays import face_area_vectors, mean_per_face
+
+#: VTK's cell types. Surface cells have this number of corners, or None: all points are corners.
+_STRIP, _PIXEL, _QUADRATIC_POLYGON = 6, 8, 36
+_CORNERS_OF_SURFACE_CELL: dict[int, int | None] = {
+    **dict.fromkeys((_STRIP, 7, _QUADRATIC_POLYGON)),
+    **dict.fromkeys((5, 22, 34, 69, 76), 3),
+    **dict.fromkeys((_PIXEL, 9, 23, 28, 30, 70, 77), 4),
+}
+
+#: Volume cells: the linear cell of the same shape, and the number of its corners, which come first.
+_POLYHEDRON = 42
+_LINEAR_VOLUME_CELL: dict[int, tuple[int, int]] = {
+    **dict.fromkeys((10, 24, 71, 78), (10, 4)),
+    11: (11, 8),
+    **dict.fromkeys((12, 25, 29, 33, 72, 79), (12, 8)),
+    **dict.fromkeys((13, 26, 31, 32, 73, 80), (13, 6)),
+    **dict.fromkeys((14, 27, 37, 74, 81), (14, 5)),
+    15: (15, 10),
+    16: (16, 12),
+}
+
+#: Arrays that describe the data structure.
+_INTERNAL_ARRAYS = (
+    *("vtkOriginalPointIds", "vtkOriginalCellIds", "vtkGhostType", "vtkGhostLevels"),
+    *("PointMergeMap", "gmsh:dim_tags"),
+)
+
+
+def surface_arrays(
+    datasets: list[Any], name: str, *, has_parts: bool, repeats_blocks: bool
+) -> MeshArrays:
+    """Return the surface of the datasets of a step, with the arrays at its points and cells.
+
+    Parameters
+    ----------
+    datasets : list of pyvista.DataSet or pyvista.MultiBlock
+        Several are parts of one mesh.
+    name : str
+        Name of the step, for messages.
+    has_parts : bool
+        Whether a dataset repeats the points along the cuts between its parts.
+    repeats_blocks : bool
+        Whether a dataset may have the same block several times.
+
+    Raises
+    ------
+    RosyError
+        If there is no mesh, or it has no surface.
+    """
+    grid = _joined_grid(datasets, name, has_parts, repeats_blocks)
+    polygons, points, cells = _surface_polygons(grid, name)
+    point_arrays, cell_arrays = _arrays(grid.point_data, points), _arrays(grid.cell_data, cells)
+    return MeshArrays(*polygons, None, point_arrays, cell_arrays)
+
+
+def _joined_grid(datasets: list[Any], name: str, has_parts: bool, repeats_blocks: bool) -> Any:
+    """Return the unstructured grid of the datasets of a step; see `surface_arrays`."""
+    import pyvista
+
+    dataset = datasets[0] if len(datasets) == 1 else pyvista.MultiBlock(datasets)
+    if isinstance(dataset, pyvista.MultiBlock):
+        has_parts = True
+        blocks = _blocks(dataset)
+        if repeats_blocks:
+            blocks = _without_copies(blocks)
+        dataset = pyvista.MultiBlock(blocks).combine() if blocks else pyvista.UnstructuredGrid()
+    if not isinstance(dataset, pyvista.DataSet):
+        raise RosyError(f"{name}: contains no mesh")
+    grid = dataset.cast_to_unstructured_grid()
+    if "vtkGhostType" in grid.cell_data:
+        grid = grid.remove_ghost_cells()
+    if has_parts and grid.n_cells:
+        grid = grid.clean(tolerance=0.0, remove_unused_points=False, average_point_data=False)
+    return grid
+
+
+def _blocks(dataset: Any) -> list[Any]:
+    """Return the meshes with cells in nested blocks."""
+    blocks = []
+    for block in dataset:
+        if hasattr(block, "combine"):
+            blocks += _blocks(block)
+        elif block is not None and getattr(block, "n_cells", 0):
+            blocks.append(block)
+    return blocks
+
+
+def _without_copies(blocks: list[Any]) -> list[Any]:
+    """Return the blocks without the repeated ones.
+
+    VTK returns the grid that the steps of an .xdmf file refer to as a further block.
+    """
+    kept: list[Any] = []
+    for block in blocks:
+        if not any(
+            block.n_cells == other.n_cells
+            and np.array_equal(block.points, other.points)
+            and np.array_equal(
+                block.cast_to_unstructured_grid().cells, other.cast_to_unstructured_grid().cells
+            )
+            for other in kept
+        ):
+            kept.append(block)
+    return kept
+
+
+def _arrays(attributes: Any, index: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the arrays of numbers at some points or cells."""
+    skipped = {
+        *_INTERNAL_ARRAYS,
+        attributes.active_normals_name,
+        attributes.active_texture_coordinates_name,
+    }
+    return {
+        name: np.asarray(values)[index]
+        for name, values in attributes.items()
+        if name not in skipped and np.asarray(values).dtype.kind in "fiu"
+    }
+
+
+def _surface_polygons(grid: Any, name: str) -> tuple[Polygons, np.ndarray, np.ndarray]:
+    """Return the surface of an unstructured grid.
+
+    Returns
+    -------
+    polygons : Polygons
+    points : (V,) int64 ndarray
+        The point of each vertex, ascending.
+    cells : (F,) int64 ndarray
+        The cell of each face, ascending.
+    """
+    cell_types = np.asarray(grid.celltypes)
+    if not len(cell_types):
+        raise RosyError(f"{name}: contains no cells")
+    if np.isin(cell_types, list(_CORNERS_OF_SURFACE_CELL)).any():
+        corner_point, face_start, cells = _surface_cells(grid, cell_types)
+    elif np.isin(cell_types, [*_LINEAR_VOLUME_CELL, _POLYHEDRON]).any():
+        corner_point, face_start, cells = _boundary(grid, cell_types)
+    else:
+        raise RosyError(
+            f"{name}: has no surface: none of its {counted(len(cell_types), 'cell')} is a face or a volume"
+        )
+    points = np.unique(corner_point)
+    polygons = Polygons(
+        np.asarray(grid.points)[points], np.searchsorted(points, corner_point), face_start
+    )
+    return polygons, points, cells
+
+
+def _surface_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the surface cells of a grid as polygons of points, in the order of the cells.
+
+    Returns
+    -------
+    corner_point : (C,) int64 ndarray
+    face_start : (F + 1,) int64 ndarray
+    face_cell : (F,) int64 ndarray
+    """
+    connectivity, offset = np.asarray(grid.cell_connectivity), np.asarray(grid.offset)
+    corner_count = np.diff(offset)
+    for cell_type, count in _CORNERS_OF_SURFACE_CELL.items():
+        if count is not None:
+            corner_count[cell_types == cell_type] = count
+    corner_count[cell_types == _QUADRATIC_POLYGON] //= 2
+    cells = np.flatnonzero(np.isin(cell_types, list(_CORNERS_OF_SURFACE_CELL)))
+    is_strip = cell_types[cells] == _STRIP
+    faces_of_cell = np.where(is_strip, np.maximum(corner_count[cells] - 2, 0), 1)
+    face_cell = np.repeat(cells, faces_of_cell)
+    in_strip = np.repeat(is_strip, faces_of_cell)
+    rank = _ranks(offsets_from_sizes(faces_of_cell))
+    face_start = offsets_from_sizes(np.where(in_strip, 3, corner_count[face_cell]))
+    sizes = np.diff(face_start)
+    position = _ranks(face_start)
+    # Every other triangle of a strip is clockwise. The points of a pixel are in rows.
+    is_turned = np.repeat(in_strip & (rank % 2 == 1), sizes) & (position > 0)
+    position = np.where(is_turned, 3 - position, position)
+    position += np.repeat(np.where(in_strip, rank, 0), sizes)
+    in_pixel = np.repeat(cell_types[face_cell] == _PIXEL, sizes) & (position > 1)
+    position = np.where(in_pixel, 5 - position, position)
+    corner_point = connectivity[np.repeat(offset[face_cell], sizes) + position]
+    return corner_point.astype(np.int64), face_start, face_cell
+
+
+def _boundary(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the boundary of the volume cells of a grid; the result is as in `_surface_cells`."""
+    import pyvista
+    from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
+
+    volume_cells = np.arange(len(cell_types))
+    if not (cell_types == _POLYHEDRON).any():
+        # VTK confuses the points of cells of second order.
+        volume_cells, grid = _linear_volume_cells(grid, cell_types)
+    surface_filter = vtkDataSetSurfaceFilter()
+    surface_filter.SetInputData(grid)
+    surface_filter.PassThroughPointIdsOn()
+    surface_filter.PassThroughCellIdsOn()
+    surface_filter.SetNonlinearSubdivisionLevel(0)
+    surface_filter.Update()
+    surface = pyvista.wrap(surface_filter.GetOutput()).cast_to_unstructured_grid()
+    corner, face_start, face_cell = _surface_cells(surface, np.asarray(surface.celltypes))
+    corner_point = np.asarray(surface.point_data["vtkOriginalPointIds"])[corner].astype(np.int64)
+    surface_cell = np.asarray(surface.cell_data["vtkOriginalCellIds"])[face_cell]
+    face_cell = volume_cells[surface_cell]
+    points = np.asarray(grid.points, dtype=np.float64)
+    cell_points = points[np.asarray(grid.cell_connectivity)]
+    cell_center = mean_per_face(cell_points, np.asarray(grid.offset))[surface_cell]
+    # Cells may be inside out, so faces are turned away from the centers of their cells.
+    outward = mean_per_face(points[corner_point], face_start) - cell_center
+    area_vectors = face_area_vectors(*Polygons(points, corner_point, face_start))
+    is_inward = dot(area_vectors, outward) < 0
+    # VTK's order of the faces is not documented.
+    smallest = np.minimum.reduceat(corner_point, face_start[:-1])
+    total = np.add.reduceat(corner_point, face_start[:-1])
+    order = np.lexsort((total, smallest, face_cell))
+    sizes = np.diff(face_start)[order]
+    ordered_start = offsets_from_sizes(sizes)
+    position = _ranks(ordered_start)
+    mirrored = np.where(position > 0, np.repeat(sizes, sizes) - position, 0)
+    position = np.where(np.repeat(is_inward[order], sizes), mirrored, position)
+    corner_point = corner_point[np.repeat(face_start[:-1][order], sizes) + position]
+    return corner_point, ordered_start, face_cell[order]
+
+
+def _ranks(start: np.ndarray) -> np.ndarray:
+    """Return the position of each element in its run, given the start of each run and the end of the last."""
+    return np.arange(start[-1]) - np.repeat(start[:-1], np.diff(start))
+
+
+def _linear_volume_cells(grid: Any, cell_types: np.ndarray) -> tuple[np.ndarray, Any]:
+    """Return the volume cells of a grid, and a grid of these cells reduced to their corners."""
+    import pyvista
+
+    cells = np.flatnonzero(np.isin(cell_types, list(_LINEAR_VOLUME_CELL)))
+    linear_type = np.zeros(len(cells), dtype=np.uint8)
+    sizes = np.zeros(len(cells), dtype=np.int64)
+    for cell_type, (linear, count) in _LINEAR_VOLUME_CELL.items():
+        is_type = cell_types[cells] == cell_type
+        linear_type[is_type], sizes[is_type] = linear, count
+    # In front of its points, each cell has their number.
+    start = offsets_from_sizes(sizes + 1)
+    first = np.repeat(np.asarray(grid.offset)[cells], sizes + 1)
+    position = np.maximum(_ranks(start) - 1, 0)
+    connectivity = np.asarray(grid.cell_connectivity)[first + position]
+    connectivity[start[:-1]] = sizes
+    return cells, pyvista.UnstructuredGrid(connectivity, linear_type, np.asarray(grid.points))

@@ -1,0 +1,274 @@
+"""`MeshArrays`: the arrays of a mesh, from a file or from an object of another library.
+
+None of these libraries is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.errors import RosyError, RosyWarning
+from .formats.polygons import Polygons, offsets_from_sizes
+from .mesh_io import READERS, read_polygons
+
+#: Corners of the surface cells of meshio, by their type. Cells of second order have further points,
+#: which are left out.
+MESHIO_CORNERS = {
+    "triangle": 3, "triangle6": 3, "triangle7": 3,
+    "quad": 4, "quad8": 4, "quad9": 4,
+}  # fmt: skip
+
+#: VTK's types of faces: triangle, polygon, quad.
+VTK_FACES = (5, 7, 9)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """The arrays of a mesh, before they are checked.
+
+    Attributes
+    ----------
+    vertices : (V, 3) or (V, 2) array_like
+    corner_vertex : (C,) int ndarray
+        Vertices of the corners, face by face.
+    face_start : (F + 1,) int ndarray
+        First corner of each face, and C.
+    uv : (V, 2) or (C, 2) array_like or None
+    vertex_data, face_data : mapping of str to ndarray, or None
+        Arrays of V and of F rows. None if the mesh file may have some, which are read when they are
+        asked for.
+    note : str
+        A warning about how the mesh was read; may be empty.
+    """
+
+    vertices: Any
+    corner_vertex: NDArray[Any]
+    face_start: NDArray[Any]
+    uv: Any = None
+    vertex_data: Mapping[str, NDArray[Any]] | None = None
+    face_data: Mapping[str, NDArray[Any]] | None = None
+    note: str = ""
+
+    @property
+    def polygons(self) -> Polygons:
+        """Vertices and faces."""
+        return Polygons(self.vertices, self.corner_vertex, self.face_start)
+
+
+#: Readers of the files of simulations by suffix, given the path and the step. The Python package adds
+#: them; the extension for Blender has none.
+SIMULATION_READERS: dict[str, Callable[[Path, int | None], MeshArrays]] = {}
+
+
+def mesh_arrays(
+    vertices: ArrayLike | str | os.PathLike[str] | Any,
+    faces: ArrayLike | Sequence[Sequence[int]] | None,
+    name: str,
+    uv: ArrayLike | None = None,
+    step: int | None = None,
+) -> MeshArrays:
+    """Return the arrays of a mesh, with (V, 3) `vertices` and (C, 2) `uv`, if any.
+
+    The parameters are those of `Surface`.
+
+    Raises
+    ------
+    RosyError
+        If the vertices are not numbers, the faces not whole numbers, texture coordinates do not fit, a
+        file cannot be read, or an object is no mesh.
+    """
+    is_path = faces is None and isinstance(vertices, (str, os.PathLike))
+    suffix = Path(vertices).suffix.lower() if is_path else ""
+    if step is not None and suffix in ("", *READERS):
+        raise RosyError(f"{name}: step applies only to files of simulations, such as .vtu")
+    if suffix in SIMULATION_READERS:
+        arrays = SIMULATION_READERS[suffix](Path(vertices), step)
+        if arrays.note:
+            warnings.warn(arrays.note, RosyWarning, stacklevel=3)
+    elif is_path:
+        arrays = MeshArrays(*read_polygons(vertices, tuple(SIMULATION_READERS)))
+    elif faces is None:
+        arrays = _arrays_of(vertices, name)
+    else:
+        arrays = MeshArrays(vertices, *_flat_faces(faces))
+    points = _positions(arrays.vertices, name)
+    uv = arrays.uv if uv is None else uv
+    if uv is not None:
+        uv = _corner_uv(uv, len(points), arrays.corner_vertex, name)
+    return replace(arrays, vertices=points, uv=uv)
+
+
+def _corner_uv(
+    uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
+) -> NDArray[np.float64]:
+    """Return (C, 2) texture coordinates of corners, from coordinates of vertices or corners."""
+    array = np.asarray(uv, dtype=np.float64)
+    if (
+        array.ndim != 2
+        or array.shape[1] != 2
+        or len(array) not in (vertex_count, len(corner_vertex))
+    ):
+        raise RosyError(
+            f"{name}: uv needs a row of 2 numbers for each of the {vertex_count:,} vertices or "
+            f"{len(corner_vertex):,} corners, not an array of shape {array.shape}"
+        )
+    if not np.isfinite(array).all():
+        raise RosyError(f"{name}: uv has values that are not finite")
+    return array[corner_vertex] if len(array) == vertex_count else array
+
+
+def _flat_faces(
+    faces: ArrayLike | Sequence[Sequence[int]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the vertices of all corners, and the first corner of each face."""
+    if isinstance(faces, np.ndarray):
+        rows: Sequence[Any] | NDArray[Any] = faces
+    else:
+        rows = [np.asarray(face) for face in faces]  # type: ignore[union-attr]
+        sizes = {row.shape for row in rows}
+        if len(sizes) == 1:
+            rows = np.array(rows)
+    if isinstance(rows, np.ndarray):
+        if rows.ndim != 2 or not np.issubdtype(rows.dtype, np.integer):
+            raise RosyError(
+                f"faces must be whole numbers, one row for each face, not {rows.dtype} of shape "
+                f"{rows.shape}"
+            )
+        return rows.ravel(), np.arange(len(rows) + 1) * rows.shape[1]
+    if any(row.ndim != 1 or not np.issubdtype(row.dtype, np.integer) for row in rows):
+        raise RosyError("faces must be whole numbers, one sequence for each face")
+    return np.concatenate(rows), offsets_from_sizes([len(row) for row in rows])
+
+
+def _positions(vertices: ArrayLike, name: str) -> NDArray[np.float64]:
+    """Return (V, 3) positions; the (V, 2) positions of a flat mesh get z = 0."""
+    try:
+        array = np.asarray(vertices, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise RosyError(f"{name}: vertices must be numbers, one row for each vertex") from None
+    if array.ndim != 2 or array.shape[1] not in (2, 3):
+        raise RosyError(f"{name}: vertices must have the shape (V, 3), not {array.shape}")
+    return array if array.shape[1] == 3 else np.pad(array, ((0, 0), (0, 1)))
+
+
+def _arrays_of(mesh: Any, name: str) -> MeshArrays:
+    """Return the arrays of a mesh of meshio, PyVista, trimesh or Open3D. `MeshArrays` stay as they are.
+
+    Raises
+    ------
+    RosyError
+        If the object is no such mesh, or it has no surface.
+    """
+    if isinstance(mesh, MeshArrays):
+        return mesh
+    if hasattr(mesh, "points") and isinstance(getattr(mesh, "cells", None), list):
+        return _from_meshio(mesh, name)
+    if hasattr(mesh, "extract_surface"):
+        return _from_pyvista(mesh, name)
+    # A scene of trimesh, and a mesh of Open3D's tensors.
+    for conversion in ("to_mesh", "to_legacy"):
+        if hasattr(mesh, conversion):
+            mesh = getattr(mesh, conversion)()
+    faces = getattr(mesh, "faces", getattr(mesh, "triangles", None))
+    if hasattr(mesh, "vertices") and faces is not None:
+        return _from_triangles(mesh, np.asarray(faces))
+    raise RosyError(
+        f"{name}: expected vertices and faces, the path of a file, or a mesh of meshio, PyVista, "
+        f"trimesh or Open3D, not {type(mesh).__name__}"
+    )
+
+
+def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
+    """Return the arrays of a mesh of trimesh or Open3D."""
+    vertices = np.asarray(mesh.vertices)
+    faces = faces.reshape(-1, 3)
+    visual = getattr(mesh, "visual", None)
+    uv = np.asarray(getattr(mesh, "triangle_uvs", getattr(visual, "uv", None)))
+    is_uv = uv.shape in ((len(vertices), 2), (faces.size, 2))
+    vertex_data = dict(getattr(mesh, "vertex_attributes", {}))
+    colors = _vertex_colors(mesh)
+    if colors.shape[0] == len(vertices):
+        vertex_data.update(zip(("red", "green", "blue"), colors.T, strict=False))
+    return MeshArrays(
+        vertices,
+        faces.ravel(),
+        np.arange(len(faces) + 1) * 3,
+        uv if is_uv and len(uv) else None,
+        vertex_data,
+        dict(getattr(mesh, "face_attributes", {})),
+    )
+
+
+def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
+    """Return the (V, 3) or (V, 4) colors of vertices, 0 to 1; an empty array if there are none."""
+    visual: Any = getattr(mesh, "visual", None)
+    if getattr(visual, "kind", None) == "vertex":
+        return np.asarray(visual.vertex_colors) / 255.0
+    return np.asarray(getattr(mesh, "vertex_colors", np.empty((0, 3))), dtype=np.float64)
+
+
+def _from_meshio(mesh: Any, name: str) -> MeshArrays:
+    """Return the surface cells of a mesh of meshio."""
+    corners, sizes, kept = [], [], []
+    for index, block in enumerate(mesh.cells):
+        count = MESHIO_CORNERS.get(block.type)
+        if block.type == "polygon":
+            count = np.shape(block.data)[1]
+        if count is None or not len(block.data):
+            continue
+        kept.append(index)
+        corners.append(np.asarray(block.data)[:, :count].ravel())
+        sizes.append(np.full(len(block.data), count))
+    if not kept:
+        found = ", ".join(sorted({block.type for block in mesh.cells})) or "none"
+        raise RosyError(f"{name}: has no triangles, quads or polygons, only these cells: {found}")
+    face_data = {
+        key: np.concatenate([np.asarray(blocks[index]) for index in kept])
+        for key, blocks in mesh.cell_data.items()
+    }
+    return MeshArrays(
+        mesh.points,
+        np.concatenate(corners),
+        offsets_from_sizes(np.concatenate(sizes)),
+        None,
+        {key: np.asarray(values) for key, values in mesh.point_data.items()},
+        face_data,
+    )
+
+
+def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
+    """Return the surface of a data set of PyVista: of a volume, its boundary."""
+    surface = mesh if hasattr(mesh, "faces") else _extracted_surface(mesh)
+    if surface.n_strips:
+        surface = surface.triangulate()
+    # The unstructured grid has the offsets of faces of different sizes, and says which cells are lines.
+    cells = surface.cast_to_unstructured_grid()
+    is_face = np.isin(cells.celltypes, VTK_FACES)
+    if not is_face.any():
+        raise RosyError(f"{name}: has no faces")
+    sizes = np.diff(cells.cell_offsets if hasattr(cells, "cell_offsets") else cells.offset)
+    uv = getattr(surface, "active_texture_coordinates", None)
+    return MeshArrays(
+        np.asarray(surface.points),
+        np.asarray(cells.cell_connectivity)[np.repeat(is_face, sizes)],
+        offsets_from_sizes(sizes[is_face]),
+        None if uv is None or uv.shape[1] != 2 else np.asarray(uv),
+        {key: np.asarray(values) for key, values in surface.point_data.items()},
+        {key: np.asarray(values)[is_face] for key, values in surface.cell_data.items()},
+    )
+
+
+def _extracted_surface(mesh: Any) -> Any:
+    """Return the faces of a grid, and the boundary of its volumes."""
+    try:
+        return mesh.extract_surface(algorithm="dataset_surface")
+    except TypeError:  # before PyVista 0.47, there was no other algorithm
+        return mesh.extract_surface()

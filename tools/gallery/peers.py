@@ -7,8 +7,7 @@ import json
 import numpy as np
 from PIL import Image
 
-from .looks_page import IMAGES
-from .page import ROOT
+from .page import IMAGES, ROOT
 from .sheet import Panel, save, sheet
 
 #: Folder into which `peers_blender` has drawn.
@@ -38,34 +37,15 @@ def write() -> None:
         )
         return
     seconds = json.loads((DRAWN / "seconds.json").read_text(encoding="utf-8"))
-    names = list(LABELS)
-    rows = []
-    for pair in (names[:2], names[2:]):
-        pictures = [np.asarray(Image.open(DRAWN / f"{name}.png").convert("L")) for name in pair]
-        rows.append([Panel(_halved(picture)) for picture in pictures])
-        rows.append(
-            [
-                Panel(_detail(picture), _label(name, seconds))
-                for name, picture in zip(pair, pictures, strict=True)
-            ]
-        )
-    save(sheet(rows), IMAGES / "hatching-peers.png")
-
-
-def _label(name: str, seconds: dict[str, float]) -> str:
-    if name in UNTIMED:
-        return LABELS[name]
-    return f"{LABELS[name]}; time {seconds[name] / seconds['rosy']:.1f}"
-
-
-def _halved(picture: np.ndarray) -> np.ndarray:
-    """Return (H / 2, W / 2, 3) means of 2 x 2 pixels."""
-    height, width = picture.shape
-    small = Image.fromarray(picture).resize((width // 2, height // 2), Image.Resampling.BOX)
-    return np.asarray(small.convert("RGB"))
-
-
-def _detail(picture: np.ndarray) -> np.ndarray:
+    halves, details = [], []
     left, top, width, height = DETAIL
-    part = Image.fromarray(picture[top : top + height, left : left + width])
-    return np.asarray(part.convert("RGB"))
+    for name, label in LABELS.items():
+        if name not in UNTIMED:
+            label += f"; time {seconds[name] / seconds['rosy']:.1f}"
+        picture = Image.open(DRAWN / f"{name}.png").convert("L")
+        half = picture.resize((picture.width // 2, picture.height // 2), Image.Resampling.BOX)
+        detail = picture.crop((left, top, left + width, top + height))
+        halves.append(Panel(np.asarray(half.convert("RGB"))))
+        details.append(Panel(np.asarray(detail.convert("RGB")), label))
+    rows = [halves[:2], details[:2], halves[2:], details[2:]]
+    save(sheet(rows), IMAGES / "hatching-peers.png")

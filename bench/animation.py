@@ -6,14 +6,12 @@ import itertools
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from . import cases
-from .again import ball_scene
-from .timing import Case, compare, main
+from .timing import Bench, main, peer
 
 TRIANGLES = 50_000
 
@@ -24,72 +22,73 @@ FRAMES_PER_TIMING = 10
 SHARED_FRAMES = 80
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time animations with unchanged parts, which are reused, and with several processes."""
-    try:
-        import bpy
-    except ImportError:
-        print("animation: skipped, because bpy is not installed", file=sys.stderr)
-        return
+    peer("bpy")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, animate in (
+            ("static mesh, moving camera", _move_camera),
+            ("static camera, deforming mesh", _deform),
+        ):
+            _compare_with_bakes(bench, name, _scene(animate), Path(folder))
+        _compare_processes(bench, Path(folder))
+
+
+def _compare_with_bakes(bench: Bench, name: str, scene, folder: Path) -> None:
+    """Time frames of an animation and as many single bakes."""
     from rosy_addon.core.cache import BAKE_CACHE
     from rosy_addon.jobs.animation import bake_animation
     from rosy_addon.jobs.bake import bake
     from rosy_addon.scene.pictures import OutputSettings
 
-    with tempfile.TemporaryDirectory() as folder:
-        settings = OutputSettings(folder=Path(folder))
-        for name, animate in (
-            ("static mesh, moving camera", _move_camera),
-            ("static camera, deforming mesh", _deform),
-        ):
-            scene = _scene(bpy, animate)
-            frame_numbers = itertools.count(1)
+    settings = OutputSettings(folder=folder)
+    numbers = itertools.count(1)
 
-            # The first frame costs as much as a bake.
-            def bake_frames(scene=scene, frame_numbers=frame_numbers) -> None:
-                batch = [next(frame_numbers) for _ in range(FRAMES_PER_TIMING)]
-                bake_animation(scene, batch, look=cases.LOOK, settings=settings, show=False)
+    def bake_frames() -> None:
+        batch = [next(numbers) for _ in range(FRAMES_PER_TIMING)]
+        bake_animation(scene, batch, look=cases.LOOK, settings=settings, show=False)
 
-            def bake_singly(scene=scene, frame_numbers=frame_numbers) -> None:
-                for _ in range(FRAMES_PER_TIMING):
-                    scene.frame_set(next(frame_numbers))
-                    BAKE_CACHE.clear()
-                    bake(scene, look=cases.LOOK, settings=settings)
+    def bake_singly() -> None:
+        for _ in range(FRAMES_PER_TIMING):
+            scene.frame_set(next(numbers))
+            BAKE_CACHE.clear()
+            bake(scene, look=cases.LOOK, settings=settings)
 
-            bake_frames()
-            yield compare(
-                f"{FRAMES_PER_TIMING} frames / as many single bakes, {name}",
-                bake_frames,
-                bake_singly,
-                target=0.7,
-                higher_is_better=False,
-                runs=runs,
-            )
-        scene = _scene(bpy, _deform)
-        scene.render.resolution_x, scene.render.resolution_y = 640, 480
-        path = Path(folder) / "scene.blend"
-        bpy.ops.wm.save_as_mainfile(filepath=str(path))
-        folder_numbers = itertools.count()
-
-        def run_processes(count: int) -> None:
-            out = Path(folder) / f"frames{next(folder_numbers)}"
-            command = [sys.executable, "-m", "rosy_addon", "bake", str(path), "--out", str(out)]
-            command += ["--frames", f"1-{SHARED_FRAMES}", "--jobs", str(count)]
-            subprocess.run(command, check=True, capture_output=True)
-
-        yield compare(
-            f"one process / two, {SHARED_FRAMES} frames, start and all",
-            lambda: run_processes(1),
-            lambda: run_processes(2),
-            target=1.8,
-            higher_is_better=True,
-            runs=min(runs, 3),
-        )
+    bake_frames()  # the first frame costs as much as a bake
+    name = f"{FRAMES_PER_TIMING} frames / as many single bakes, {name}"
+    bench.compare(name, bake_frames, bake_singly, at_most=0.7)
 
 
-def _scene(bpy, animate) -> object:
+def _compare_processes(bench: Bench, folder: Path) -> None:
+    """Time an animation of the command line with one process and with two."""
+    import bpy
+
+    scene = _scene(_deform)
+    scene.render.resolution_x, scene.render.resolution_y = 640, 480
+    path = folder / "scene.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    numbers = itertools.count()
+
+    def run_processes(count: int) -> None:
+        command = [sys.executable, "-m", "rosy_addon", "bake", str(path)]
+        command += ["--out", str(folder / f"frames{next(numbers)}")]
+        command += ["--frames", f"1-{SHARED_FRAMES}", "--jobs", str(count)]
+        subprocess.run(command, check=True, capture_output=True)
+
+    bench.compare(
+        f"one process / two, {SHARED_FRAMES} frames, start and all",
+        lambda: run_processes(1),
+        lambda: run_processes(2),
+        at_least=1.8,
+        runs=3,
+    )
+
+
+def _scene(animate) -> object:
     """Open a scene with the ball and a camera, 512 x 512 pixels."""
-    scene = ball_scene(bpy, TRIANGLES)
+    import bpy
+
+    scene = cases.ball_scene(TRIANGLES)
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     scene.collection.objects.link(camera)
     scene.camera = camera
@@ -121,4 +120,4 @@ def _deform(scene) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

@@ -1,7 +1,6 @@
 """Print how well the graphics card agrees with numpy, for several shapes and degrees.
 
-    blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--out TABLE.md]
-        [--data FOLDER]
+    blender -b --python-exit-code 1 -P bench/parity.py -- [--size PIXELS] [--data FOLDER]
 
 Draws a sphere, a torus and Suzanne for N = 1 to 6 with the graphics card that Blender uses, and
 prints a row for each. With `--data`, also the bunny and the vase, which are the files
@@ -39,22 +38,21 @@ def table_lines(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) 
     """Yield the lines of the table: its header, and a row for each shape and degree."""
     yield "| shape | triangles | N | pixels | agree % | correlation | shaded | card s | numpy s |"
     yield "|---|---:|---:|---:|---:|---:|---:|---:|---:|"
+    unshaded = rosy.Look(shading=0.0)
     for name in VIEWS:
         surface = surface_of_shape(rosy, name, data)
         if surface is None:
             continue
         camera = camera_of_shape(rosy, name, surface, size)
         for degree in DEGREES:
-            instance = rosy.MeshInstance(
-                surface, np.eye(4), rosy.generate(surface, "smoothest", degree)
-            )
-            unshaded_look = rosy.Look(shading=0.0)
+            field = rosy.generate(surface, "smoothest", degree)
+            instances = [rosy.MeshInstance(surface, np.eye(4), field)]
             start = time.perf_counter()
-            draw_on_card(rosy, card, [instance], camera, unshaded_look)
+            draw_on_card(rosy, card, instances, camera, unshaded)
             middle = time.perf_counter()
-            pair = draw_pair(rosy, card, [instance], camera, unshaded_look)
+            pair = draw_pair(rosy, card, instances, camera, unshaded)
             end = time.perf_counter()
-            shaded = draw_pair(rosy, card, [instance], camera, rosy.Look())
+            shaded = draw_pair(rosy, card, instances, camera, rosy.Look())
             yield (
                 f"| {name} | {len(surface.triangles)} | {degree} | {len(pair.gbuffer.pixel)} "
                 f"| {100 * pair.agreement:.3f} | {pair.likeness:.4f} | {shaded.likeness:.4f} "
@@ -63,20 +61,15 @@ def table_lines(rosy: SimpleNamespace, card: Any, size: int, data: Path | None) 
 
 
 def main() -> None:
-    """Print the table, and write it to a file if requested."""
+    """Print the table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--size", type=int, default=512)
-    parser.add_argument("--out", type=Path, help="also write the table to this file")
     parser.add_argument("--data", type=Path, help="folder with the meshes of bunny and vase")
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
     rosy = rooms()
-    device = module_of(rosy.package, "gpu.device").Device()
-    lines = []
-    for line in table_lines(rosy, rosy.GpuRenderer(device), options.size, options.data):
+    renderer = rosy.GpuRenderer(module_of(rosy.package, "gpu.device").Device())
+    for line in table_lines(rosy, renderer, options.size, options.data):
         print(line, flush=True)
-        lines.append(line)
-    if options.out:
-        options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

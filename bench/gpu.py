@@ -41,14 +41,6 @@ PAPER_CARD = "NVIDIA GeForce 8600 GTS"
 
 TRIANGLES, DEGREE = 12_000, 4
 
-#: Passes of each stage, and the size for the times of the stages.
-STAGES = {
-    "G-buffer (visibility, resolve)": ("visibility", "resolve"),
-    "covering (directions, angle_gradient)": ("directions", "angle_gradient"),
-    "streamlines and light (lic)": ("lic",),
-}
-STAGES_SIZE = 1920, 1080
-
 #: Number of frames of a median, and the maximum of their total time in seconds.
 FRAMES, SECONDS = 21, 6.0
 
@@ -75,40 +67,6 @@ def open_device() -> Any:
 def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
     """Draw a picture and leave it on the card."""
     return run(renderer.texture_steps(items, ViewInput((), camera, look)))
-
-
-class QueriedDevice:
-    """A device that records the card's own time for each pass."""
-
-    def __init__(self, device: Any) -> None:
-        self._device = device
-        self._queries: list[tuple[str, Any]] = []
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._device, name)
-
-    def compute(self, shader: Any, *rest: Any) -> None:
-        """As `Device.compute`."""
-        self._queried(self._device.compute, shader, *rest)
-
-    def draw(self, shader: Any, *rest: Any) -> None:
-        """As `Device.draw`."""
-        self._queried(self._device.draw, shader, *rest)
-
-    def take_seconds(self) -> dict[str, float]:
-        """Wait for the card. Return the time of the passes since the last call, by their names."""
-        self._device.finish()
-        seconds: dict[str, float] = {}
-        for name, query in self._queries:
-            seconds[name] = seconds.get(name, 0.0) + query.elapsed * 1e-9
-        self._queries.clear()
-        return seconds
-
-    def _queried(self, work: Any, shader: Any, *rest: Any) -> None:
-        query = self._device.context.query(time=True)
-        with query:
-            work(shader, *rest)
-        self._queries.append((shader.name, query))
 
 
 def frame_times(
@@ -139,20 +97,6 @@ def frame_times(
     while len(seconds) < frames and (not seconds or time.perf_counter() - start < SECONDS):
         seconds.append(draw())
     return np.array(seconds) * 1e3
-
-
-def stage_times(device: Any, frames: int) -> dict[str, float]:
-    """Return the median of the card's own time for each stage in milliseconds."""
-    queried = QueriedDevice(device)
-    renderer = GpuRenderer(queried)
-    items = renderer.upload([cases.instance(TRIANGLES, DEGREE)], "smooth")
-    seconds = []
-    for _ in range(frames + 1):
-        draw_texture(renderer, items, cases.camera(*STAGES_SIZE), cases.LOOK)
-        passes = queried.take_seconds()
-        seconds.append([sum(passes[name] for name in names) for names in STAGES.values()])
-    medians = np.median(seconds[1:], axis=0) * 1e3
-    return dict(zip(STAGES, medians.tolist(), strict=True))
 
 
 def looks(options: argparse.Namespace) -> Iterator[tuple[str, int, Look]]:
@@ -194,13 +138,8 @@ def main() -> None:
             rows.append(row | {"largest": float(times.max()), "card": float(card.min())})
             numbers = (rows[-1][key] for key in ("milliseconds", "least", "largest", "card"))
             print(f"{size:>10}  {name:44}", *(f"{n:8.2f}" for n in numbers), flush=True)
-    report: dict[str, Any] = {"renderer": device.name, "triangles": TRIANGLES, "rows": rows}
-    if not options.presets and not options.flow:
-        report["stages"] = stage_times(device, options.frames)
-        print(f"the card's own of {STAGES_SIZE[0]} x {STAGES_SIZE[1]}, N = {DEGREE}")
-        for name, milliseconds in report["stages"].items():
-            print(f"  {name:54} {milliseconds:8.2f}", flush=True)
     if options.json:
+        report = {"renderer": device.name, "triangles": TRIANGLES, "rows": rows}
         options.json.parent.mkdir(parents=True, exist_ok=True)
         options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 

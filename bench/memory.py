@@ -7,7 +7,6 @@ when the drawing begins, up to the writing of the file.
 from __future__ import annotations
 
 import ctypes
-import resource
 import subprocess
 import sys
 from dataclasses import replace
@@ -21,7 +20,7 @@ from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.pool import POOL
 
 from . import cases
-from .timing import Bench, main
+from .timing import Bench, main, peer
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -68,6 +67,7 @@ ESTIMATED: dict[str, tuple[str, int, int, dict[str, object]]] = {
 
 def measure(bench: Bench) -> None:
     """Measure each case once, because memory does not vary between runs."""
+    peer("resource")  # of the systems that tell the peak memory of a process
     for name in CASES:
         (peak,) = _run("--draw", name)
         amounts = peak, ALLOWED
@@ -116,6 +116,7 @@ def draw(name: str) -> float:
     triangles, degree, settings = CASES[name]
     look = replace(cases.LOOK, **settings)
     draw_picture(ViewInput((cases.instance(triangles, degree),), cases.camera(3840, 2160), look))
+    resource = peer("resource")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak * (1 if sys.platform == "darwin" else 1024) / 1e9
 

@@ -3,7 +3,8 @@
     python -m bench.page CASES.json ...
 
 The files are those that benchmarks write with --json. A table is between ``<!-- cases: PATTERN -->`` and
-``<!-- end -->``. It lists the cases whose names match the regular expression.
+``<!-- end -->``. It lists the cases whose names match the regular expression. If that has the groups `row` and
+`column`, the table has these, and shows the ratios with their targets in parentheses.
 """
 
 from __future__ import annotations
@@ -22,33 +23,59 @@ TABLE = re.compile(r"(<!-- cases: (?P<pattern>.*?) -->\n).*?(<!-- end -->)", re.
 def main() -> None:
     """Rewrite all tables for which the files have cases."""
     entries = [entry for path in sys.argv[1:] for entry in json.loads(Path(path).read_text())]
-
-    def fill_table(match: re.Match[str]) -> str:
-        matching = [entry for entry in entries if re.search(match["pattern"], entry["name"])]
-        return match[1] + _table(matching) + match[3] if matching else match[0]
-
     for page in PAGES:
-        page.write_text(TABLE.sub(fill_table, page.read_text(encoding="utf-8")), encoding="utf-8")
+        page.write_text(filled(page.read_text(encoding="utf-8"), entries), encoding="utf-8")
 
 
-def _table(entries: list[dict]) -> str:
-    lines = ["| case | ratio | min to max | target | amounts |", "| --- " * 5 + "|"]
+def filled(text: str, entries: list[dict]) -> str:
+    """Return a page with its tables of cases."""
+
+    def fill_table(table: re.Match[str]) -> str:
+        pattern = re.compile(table["pattern"])
+        matching = [entry for entry in entries if pattern.search(entry["name"])]
+        if not matching:
+            return table[0]
+        rows = _grid(matching, pattern) if "column" in pattern.groupindex else _list(matching)
+        lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+        return table[1] + "".join(f"| {' | '.join(line)} |\n" for line in lines) + table[3]
+
+    return TABLE.sub(fill_table, text)
+
+
+def _list(entries: list[dict]) -> list[list[str]]:
+    """Return a row for each case."""
+    rows = [["case", "ratio", "target", "amounts"]]
     for entry in entries:
-        target, ratio, sign = (
-            entry["target"],
-            entry["ratio"],
-            1 if entry["higher_is_better"] else -1,
-        )
-        if target is not None:
-            missed = ": **missed**" if sign * ratio < sign * target else ""
-            target = f"{'at least' if sign > 0 else 'at most'} {target:g}{missed}"
-        spread = f"{entry['low']:.2f} to {entry['high']:.2f}"
-        spread = spread if entry["low"] < entry["high"] else ""
-        amounts = " / ".join(f"{a:.0f}" if a >= 100 else f"{a:.3g}" for a in entry["amounts"])
-        name = entry["name"].strip().replace("|", "\\|")
-        cells = [name, f"{ratio:.2f}", spread, target or "", f"{amounts} {entry['unit']}".strip()]
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+        ratio, amounts = f"{entry['ratio']:.2f}", (_short(amount) for amount in entry["amounts"])
+        if entry["low"] < entry["high"]:
+            ratio += f" ({entry['low']:.2f} to {entry['high']:.2f})"
+        amount = f"{' / '.join(amounts)} {entry['unit']}".strip()
+        rows.append([entry["name"].strip(), ratio, _target(entry), amount])
+    return rows
+
+
+def _grid(entries: list[dict], pattern: re.Pattern[str]) -> list[list[str]]:
+    """Return the ratios by the groups `row` and `column` of the names."""
+    cells: dict[str, dict[str, str]] = {}
+    for entry in entries:
+        found, target = pattern.search(entry["name"]), _target(entry)
+        cell = f"{entry['ratio']:.2f}" + (f" ({target})" if target else "")
+        cells.setdefault(found["row"].strip(), {})[found["column"]] = cell
+    columns = list(dict.fromkeys(column for row in cells.values() for column in row))
+    rows = [[name, *(row.get(column, "") for column in columns)] for name, row in cells.items()]
+    return [["", *columns], *rows]
+
+
+def _target(entry: dict) -> str:
+    if entry["target"] is None:
+        return ""
+    sign = 1 if entry["higher_is_better"] else -1
+    missed = ": **missed**" if sign * entry["ratio"] < sign * entry["target"] else ""
+    return f"{'≥' if sign > 0 else '≤'} {entry['target']:g}{missed}"
+
+
+def _short(amount: float) -> str:
+    return f"{amount:.0f}" if amount >= 100 else f"{amount:.3g}"
 
 
 if __name__ == "__main__":

@@ -110,14 +110,14 @@ def _measure_fields(pixel_fields: Sequence[PixelField], look: Look) -> Measureme
 
 def _measure_images(field: PixelField, images: LicImages) -> Measurements:
     """Measure the images of one field, away from its borders and from undefined pixels."""
-    inside = np.pad(frame_of(field.representation != 0, field), 1)
+    inside = np.pad(_frame(field.representation != 0, field), 1)
     inside = ndimage.distance_transform_edt(inside)[1:-1, 1:-1] > BORDER
     chosen = inside.ravel()[field.pixel]
     first = nearest_member(field, 0.0)
     along, across, lengthwise, crosswise = [], [], 0.0, 0.0
     for index, member in enumerate(images.members[:, :, 0]):
-        turned = on_screen(field, first * np.exp(2j * np.pi * index / field.degree))
-        direction, image = frame_of(turned, field), frame_of(member, field)
+        turned = _on_screen(field, first * np.exp(2j * np.pi * index / field.degree))
+        direction, image = _frame(turned, field), _frame(member, field)
         along.append(persistence(image, direction, inside, max(ALONG))[list(ALONG)])
         across.append(persistence(image, 1j * direction, inside, max(ACROSS))[list(ACROSS)])
         slope = ndimage.sobel(image, 1) + 1j * ndimage.sobel(image, 0)
@@ -132,27 +132,27 @@ def _measure_images(field: PixelField, images: LicImages) -> Measurements:
 
 def _peak_height(field: PixelField, images: LicImages, orientation: float) -> float:
     """Return the mean height of the spectrum of a uniform field at its members."""
-    blend = frame_of(images.blend[:, 0], field)[BORDER:-BORDER, BORDER:-BORDER]
+    blend = _frame(images.blend[:, 0], field)[BORDER:-BORDER, BORDER:-BORDER]
     lines = field.degree if field.degree % 2 else field.degree // 2
     spectrum = ndimage.gaussian_filter1d(mean_spectrum(blend, 256), 1.0, mode="wrap")
     orientations = orientation + 180 / lines * np.arange(lines)
     return spectrum[np.rint(orientations - 0.5).astype(int) % 180].mean()
 
 
-def on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
+def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
     """Return (P,) complex: the unit directions on the screen of members in the view plane."""
     member = field.screen_jacobian[:, 0] * member.real + field.screen_jacobian[:, 1] * member.imag
     return member / np.maximum(np.abs(member), 1e-12)
 
 
-def frame_of(values: np.ndarray, field: PixelField) -> np.ndarray:
+def _frame(values: np.ndarray, field: PixelField) -> np.ndarray:
     """Return (H, W) values of the pixels of a field, 0 elsewhere."""
     frame = np.zeros(field.height * field.width, dtype=values.dtype)
     frame[field.pixel] = values
     return frame.reshape(field.height, field.width)
 
 
-def seen_field(surface: Surface, field: RosyField) -> PixelField:
+def _seen(surface: Surface, field: RosyField) -> PixelField:
     """Return a field as a camera sees it."""
     camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
@@ -173,15 +173,15 @@ def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
     for n in (4, 6):
         for name, surface, axis in (("sphere", ball, (0.3, 0.2, 1.0)), ("torus", ring, (0, 0, 1))):
             made[f"{name}, N = {n}"] = lambda n=n, surface=surface, axis=axis: [
-                seen_field(surface, axis_field(surface, n, axis))
+                _seen(surface, axis_field(surface, n, axis))
             ]
     if data is not None:
         bunny = read_mesh(data / "meshes" / "stanford-bunny.obj")
         vase = read_mesh(data / "meshes" / "vase.off")
-        made["bunny, N = 4"] = lambda: [seen_field(bunny, generate(bunny, "curvature", 4))]
+        made["bunny, N = 4"] = lambda: [_seen(bunny, generate(bunny, "curvature", 4))]
         for n in (2, 4, 7):
             file = data / "fields" / f"vase-{n}.rawfield"
-            made[f"vase, N = {n}"] = lambda f=file: [seen_field(vase, load_field(f, vase).field)]
+            made[f"vase, N = {n}"] = lambda f=file: [_seen(vase, load_field(f, vase).field)]
     return made
 
 

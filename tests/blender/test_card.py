@@ -1,6 +1,6 @@
 """The graphics card compared with numpy, in this Blender; software OpenGL is enough.
 
-`tests/harness/gpu_parity.py` defines what is measured. `bench/parity.py` measures it at 512 x 512.
+`tests/harness/gpu_parity.py` defines what is measured.
 """
 
 from __future__ import annotations

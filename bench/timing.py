@@ -11,7 +11,7 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,55 +21,22 @@ import numpy as np
 RUNS = 7
 
 
-@dataclass(frozen=True)
-class Case:
-    """One line of a benchmark: the ratio of two times or amounts.
+class Bench:
+    """Measures cases, prints each, and keeps them.
 
     Attributes
     ----------
-    name : str
-    ratio : float
-        Median over the runs of the first time over the second, which are measured in turn.
-    low, high : float
-        The smallest and the largest ratio.
-    target : float or None
-        Required ratio.
-    higher_is_better : bool
-        Whether the target is the smallest ratio that is allowed.
-    amounts : tuple of float
-        Medians of the two times or amounts, for reference.
-    unit : str
-        Unit of the amounts.
+    runs : int
+        Runs of each function.
+    cases : list of dict
+        Ratios of two times or amounts: `name`; `ratio`, the median over the runs, with `low` and `high`; the
+        required ratio, `target`, the least one if `higher_is_better`; the medians of both `amounts`, with
+        their `unit`; and the `machine`.
     """
-
-    name: str
-    ratio: float
-    low: float
-    high: float
-    target: float | None
-    higher_is_better: bool
-    amounts: tuple[float, float]
-    unit: str = "ms"
-
-    def line(self) -> str:
-        """Format the case for printing."""
-        verdict = ""
-        if self.target is not None:
-            sign = 1 if self.higher_is_better else -1
-            reached = sign * self.ratio >= sign * self.target
-            bound = "at least" if self.higher_is_better else "at most"
-            verdict = f"  {bound} {self.target:g}: {'yes' if reached else 'NO'}"
-        spread = f"({self.low:.2f} to {self.high:.2f})"
-        amounts = " / ".join(f"{amount:.4g}" for amount in self.amounts)
-        return f"{self.name:62} {self.ratio:6.2f} {spread:17} {amounts} {self.unit}{verdict}"
-
-
-class Bench:
-    """Measures cases, prints each, and keeps them in `cases`."""
 
     def __init__(self, runs: int = RUNS) -> None:
         self.runs = runs
-        self.cases: list[Case] = []
+        self.cases: list[dict[str, Any]] = []
 
     def compare(
         self,
@@ -81,8 +48,8 @@ class Bench:
         at_most: float | None = None,
         runs: int | None = None,
         cold: bool = False,
-    ) -> Case:
-        """Time two functions in turn, after each has run once.
+    ) -> dict[str, Any]:
+        """Time two functions in turn, after each has run once, and return the case.
 
         Parameters
         ----------
@@ -112,21 +79,27 @@ class Bench:
         unit: str,
         at_least: float | None = None,
         at_most: float | None = None,
-    ) -> Case:
-        """Print and keep a case with the ratios of its runs."""
-        spread = float(np.median(ratios)), float(np.min(ratios)), float(np.max(ratios))
-        target = at_most if at_least is None else at_least
-        first, second = map(float, amounts)
-        case = Case(name, *spread, target, at_least is not None, (first, second), unit)
-        print(case.line(), flush=True)
-        self.cases.append(case)
+    ) -> dict[str, Any]:
+        """Print, keep and return a case with the ratios of its runs."""
+        ratio, low, high = map(float, (np.median(ratios), np.min(ratios), np.max(ratios)))
+        first, second = amounts = [float(amount) for amount in amounts]
+        verdict, target = "", at_most if at_least is None else at_least
+        if target is not None:
+            is_reached = ratio <= target if at_least is None else ratio >= target
+            bound = "at most" if at_least is None else "at least"
+            verdict = f"  {bound} {target:g}: {'yes' if is_reached else 'NO'}"
+        spread = f"({low:.2f} to {high:.2f})"
+        print(f"{name:62} {ratio:6.2f} {spread:17} {first:.4g} / {second:.4g} {unit}{verdict}")
+        sys.stdout.flush()
+        case = {"name": name, "ratio": ratio, "low": low, "high": high, "target": target}
+        case |= {"higher_is_better": at_least is not None, "amounts": amounts, "unit": unit}
+        self.cases.append(case | {"machine": machine()})
         return case
 
     def write(self, path: Path) -> None:
-        """Write the cases as a list of JSON objects, each with the machine that it was measured on."""
-        entries = [{**asdict(case), "machine": machine()} for case in self.cases]
+        """Write the cases as JSON."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
+        path.write_text(json.dumps(self.cases, indent=1) + "\n", encoding="utf-8")
 
 
 def _seconds(work: Callable[[], object]) -> float:
@@ -168,6 +141,7 @@ def peer(module: str) -> Any:
         sys.exit(f"skipped, because {module} is not installed")
 
 
+@cache
 def machine() -> str:
     """Describe the machine: processor, cores, threads in use, versions."""
     versions = [f"Python {platform.python_version()}"]

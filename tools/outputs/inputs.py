@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import itertools
 import shutil
-import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,9 +22,7 @@ def write_inputs(folder: Path, data: Path) -> None:
     ring, bumpy = torus(), bumpy_sphere(18)
     texts = TABLES["inputs"] | {
         "torus.obj": obj_text(ring),
-        "wave.obj": wave_text(),
-        "cube.off": off_text(box(1)),
-        "star.off": off_text(star()),
+        "wave.obj": obj_text(wavy_sheet(), grid(24, 18, False, lambda u, v: (u, v))[0]),
         "pair.stl": stl_text(two_parts()),
         "bumpy.ply": ply_text(bumpy),
     }
@@ -33,7 +30,6 @@ def write_inputs(folder: Path, data: Path) -> None:
         texts["suzanne.obj"] = obj_text(suzanne())
     for name, text in (texts | field_texts(ring, folder)).items():
         (folder / name).write_text(text)
-    (folder / "pair-binary.stl").write_bytes(stl_bytes(two_parts()))
     write_tone(folder / "tone.png")
     for path in sorted(data.glob("*/*")):
         shutil.copy(path, folder)
@@ -91,13 +87,13 @@ def bumpy_sphere(count: int) -> Mesh:
     return (points * radius).T, faces
 
 
-def star() -> Mesh:
-    """Return a prism over a star, a concave polygon."""
-    k = np.arange(10)
-    outline = np.where(k % 2, 0.45, 1.0) * np.array([np.cos(np.pi * k / 5), np.sin(np.pi * k / 5)])
-    vertices = np.concatenate([np.column_stack([*outline, np.full(10, z)]) for z in (-0.3, 0.3)])
-    sides = [(i, (i + 1) % 10, (i + 1) % 10 + 10, i + 10) for i in range(10)]
-    return vertices, [tuple(range(9, -1, -1)), tuple(range(10, 20)), *sides]
+def wavy_sheet() -> Mesh:
+    """Return an open sheet of quads."""
+
+    def shape(u: np.ndarray, v: np.ndarray) -> Sequence[np.ndarray]:
+        return 2 * u - 1, 1.4 * v - 0.7, 0.2 * np.sin(7 * u) * np.cos(5 * v)
+
+    return grid(24, 18, False, shape)
 
 
 def two_parts() -> Mesh:
@@ -171,20 +167,12 @@ def rows_of(values: Any) -> list[str]:
     return [" ".join(f"{x:.17g}" for x in np.ravel(row)) for row in values]
 
 
-def obj_text(mesh: Mesh) -> str:
-    """Return an .obj file."""
+def obj_text(mesh: Mesh, uv: np.ndarray | None = None) -> str:
+    """Return an .obj file, with a UV coordinate at each vertex if there are any."""
+    corner = "{0}" if uv is None else "{0}/{0}"
     lines = [f"v {row}" for row in rows_of(mesh[0])]
-    lines += ["f " + " ".join(f"{i + 1}" for i in face) for face in mesh[1]]
-    return "\n".join([*lines, ""])
-
-
-def wave_text() -> str:
-    """Return an .obj file of an open sheet of quads, with a UV coordinate at each vertex."""
-    uv, faces = grid(24, 18, False, lambda u, v: (u, v))
-    u, v = uv.T
-    points = np.stack([2 * u - 1, 1.4 * v - 0.7, 0.2 * np.sin(7 * u) * np.cos(5 * v)], axis=1)
-    lines = [f"v {row}" for row in rows_of(points)] + [f"vt {row}" for row in rows_of(uv)]
-    lines += ["f " + " ".join(f"{i + 1}/{i + 1}" for i in face) for face in faces]
+    lines += [f"vt {row}" for row in rows_of([] if uv is None else uv)]
+    lines += ["f " + " ".join(corner.format(i + 1) for i in face) for face in mesh[1]]
     return "\n".join([*lines, ""])
 
 
@@ -216,11 +204,3 @@ def stl_text(mesh: Mesh) -> str:
         lines += [f"vertex {row}" for row in rows_of(mesh[0][list(face)])]
         lines += ["endloop", "endfacet"]
     return "\n".join([*lines, "endsolid mesh", ""])
-
-
-def stl_bytes(mesh: Mesh) -> bytes:
-    """Return a binary .stl file of triangles."""
-    corners = mesh[0][np.array(mesh[1])]
-    records = np.zeros(len(corners), [("normal", "<f4", 3), ("at", "<f4", (3, 3)), ("", "<u2")])
-    records["at"] = corners
-    return bytes(80) + struct.pack("<I", len(corners)) + records.tobytes()

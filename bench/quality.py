@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from harness.planar import lic, planar_pixel_field
+from harness.streaks import mean_spectrum, persistence
 from scipy import ndimage
 
 from rosy_addon.compositor.lic import look_noise
@@ -27,7 +28,6 @@ from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from tools.gallery.measure import mean_spectrum, persistence
 
 from . import cases
 from .timing import Bench, main
@@ -186,4 +186,4 @@ def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
 
 
 if __name__ == "__main__":
-    main(__doc__, measure, takes_data=True)
+    main(__doc__, measure, data={"type": Path, "help": "folder of meshes and fields of others"})

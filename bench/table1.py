@@ -19,9 +19,19 @@ FRAMES = {
 BRUTE, MEMBERS = (replace(cases.LOOK, method=method) for method in ("brute", "members"))
 
 
-def measure(bench: Bench) -> None:
-    """Time all rows."""
-    quick(bench)
+def measure(bench: Bench, quick: bool) -> None:
+    """Time all rows; if `quick`, only those in which the camera has moved, without a first run."""
+    for degree, target in LIC.items():
+        bench.compare(
+            f"brute / sheets, LIC stage, N = {degree}",
+            lambda d=degree: cases.compose_lic("brute", d),
+            lambda d=degree: cases.compose_lic("sheets", d),
+            at_least=target,
+            cold=quick,
+        )
+    _frames(bench, "frame", cases.frame, quick)
+    if quick:
+        return
     _frames(bench, "first frame of a mesh", cases.first_frame)
     for triangles in FRAMES:
         bench.compare(
@@ -30,19 +40,6 @@ def measure(bench: Bench) -> None:
             lambda t=triangles: cases.frame(t, 4),
             at_least=4.0,
         )
-
-
-def quick(bench: Bench, cold: bool = False) -> None:
-    """Time only the rows of the table, in which the camera has moved since the last frame."""
-    for degree, target in LIC.items():
-        bench.compare(
-            f"brute / sheets, LIC stage, N = {degree}",
-            lambda d=degree: cases.compose_lic("brute", d),
-            lambda d=degree: cases.compose_lic("sheets", d),
-            at_least=target,
-            cold=cold,
-        )
-    _frames(bench, "frame", cases.frame, cold)
 
 
 def _frames(bench: Bench, name: str, frame: Callable[..., np.ndarray], cold: bool = False) -> None:
@@ -59,4 +56,4 @@ def _frames(bench: Bench, name: str, frame: Callable[..., np.ndarray], cold: boo
 
 
 if __name__ == "__main__":
-    main(__doc__, measure)
+    main(__doc__, measure, quick={"action": "store_true"})

@@ -108,7 +108,7 @@ def _seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def main(about: str | None, measure: Callable[..., None], *, takes_data: bool = False) -> None:
+def main(about: str | None, measure: Callable[..., None], **options: dict[str, Any]) -> None:
     """Run a benchmark as a program: print its cases, and write them to a file with --json.
 
     Parameters
@@ -117,20 +117,20 @@ def main(about: str | None, measure: Callable[..., None], *, takes_data: bool = 
         Text of its help.
     measure : function
         Measures the cases with a `Bench`.
-    takes_data : bool
-        Offer --data, a folder with the meshes and fields of others, the second argument of `measure`.
+    **options
+        Further options of the command line, with their settings for argparse. `measure` gets their values.
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
     parser.add_argument("--runs", type=int, default=RUNS, help="runs per case (%(default)s)")
-    if takes_data:
-        parser.add_argument("--data", type=Path, help="folder with the meshes and fields of others")
-    options = parser.parse_args()
-    bench = Bench(options.runs)
+    for name, settings in options.items():
+        parser.add_argument(f"--{name}", **settings)
+    values = vars(parser.parse_args())
+    path, bench = values.pop("json"), Bench(values.pop("runs"))
     print(machine(), flush=True)
-    measure(*([bench, options.data] if takes_data else [bench]))
-    if options.json:
-        bench.write(options.json)
+    measure(bench, **values)
+    if path:
+        bench.write(path)
 
 
 def peer(module: str) -> Any:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from tests.harness.streaks import orientation_spectrum, peaks
+
 from .looks import MEASURED, PLANE, RED
-from .measure import orientation_spectrum, peaks
 from .page import fill_tables, listed, picture, signed
 from .plane import PlanarField, channel, compose_field, draw_field, singularity
 from .sheet import Panel, dotted

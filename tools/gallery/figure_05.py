@@ -8,9 +8,9 @@ import numpy as np
 
 from rosy_addon.compositor.pixel_field import blend_weights
 from tests.harness.planar import DegreeLayer, compose_planar, planar_pixel_field
+from tests.harness.streaks import correlation
 
 from .looks import MEASURED, RED
-from .measure import correlation
 from .page import fill_tables, picture
 from .plane import averaged, enlarged, points, singularity
 from .sheet import Panel, gray, inset, magnified, outlined

@@ -7,9 +7,9 @@ from scipy import ndimage
 
 from rosy_addon.field.rosy_field import RosyField
 from tests.harness.planar import DegreeLayer
+from tests.harness.streaks import correlation, local_correlation, orientation_spectrum, peaks
 
 from .looks import RED, SOLID
-from .measure import correlation, local_correlation, orientation_spectrum, peaks
 from .page import fill_tables, listed, picture
 from .shapes import plane, sphere
 from .sheet import Panel, display, magnified, outlined

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from rosy_addon.compositor.look import Look
+from tests.harness.streaks import persistence
 
 from .looks import MEASURED, PLANE
-from .measure import persistence
 from .page import fill_tables, picture
 from .plane import compose_field, draw_field, points
 from .sheet import Panel

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from tests.harness.streaks import mean_spectrum, peak_to_floor
+
 from .figure_06 import MEMBER, constant
 from .looks import MEASURED, PLANE
-from .measure import mean_spectrum, peak_to_floor
 from .page import fill_tables, picture
 from .plane import channel, compose_field, draw_field, singularity
 from .sheet import Panel, chart

@@ -12,7 +12,7 @@ from .sheets import PAGES, write_sheets
 #: Modules that draw what `pictures.toml` does not describe.
 MODULES = (
     *("figure-02", "figure-05", "figure-06", "figure-07", "figure-09", "figure-10", "figure-11"),
-    *("preset-pictures", "hero", "logo", "start-pages", "looks-page", "peers", "strokes-page"),
+    *("preset-pictures", "hero", "logo", "start-pages", "looks-page", "strokes-page"),
     *("textures-page", "editing-page", "figures-page", "motion", "listing", "simulations-page"),
     "performance",
 )

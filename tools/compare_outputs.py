@@ -154,25 +154,16 @@ def run_cases(
 def run_batch(revision: Revision, batch: Sequence[Case], blender: str) -> None:
     """Run cases of one lane in a child process, and cache their outputs if it is a commit's.
 
-    A case that ends the process is marked as crashed, and the next ones run in another process. If
-    not even the first case has started, all are.
+    If a case ends the process, it and the next ones are marked as crashed.
     """
-    remaining = list(batch)
-    while remaining:
-        printed = run_child(revision, remaining, blender)
-        remaining = [
-            case for case in remaining if not (revision.outputs / case.name / STATUS).is_file()
-        ]
-        started = remaining and (revision.outputs / remaining[0].name).is_dir()
-        for case in remaining[:1] if started else remaining:
-            folder = revision.outputs / case.name
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / LOG).write_text(printed)
-            (folder / STATUS).write_text("crashed")
-        remaining = remaining[1:] if started else []
-    for case in batch if revision.sha else ():
+    printed = run_child(revision, batch, blender)
+    for case in batch:
         new = revision.outputs / case.name
-        if (new / STATUS).read_text() == str(case.status):
+        if not (new / STATUS).is_file():
+            new.mkdir(parents=True, exist_ok=True)
+            (new / LOG).write_text(printed)
+            (new / STATUS).write_text("crashed")
+        elif revision.sha and (new / STATUS).read_text() == str(case.status):
             revision.cache.mkdir(parents=True, exist_ok=True)
             with contextlib.suppress(OSError):  # it is there already
                 os.replace(new, revision.cache / case.name)

@@ -1,24 +1,14 @@
-"""The pictures of docs/performance.md: sheets next to brute force and members, and samples of a pixel.
-
-`python -m tools.gallery.performance FOLDER` also draws the bunny and the vase, from a folder with
-`meshes/stanford-bunny.obj`, `meshes/vase.off` and `fields/vase-4.rawfield`.
-"""
+"""The pictures of docs/performance.md: sheets next to brute force and members, and samples of a pixel."""
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.field.curvature import curvature_field
-from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field
-from rosy_addon.field.mesh_io import read_mesh
-from rosy_addon.field.surface import build_surface
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
@@ -31,7 +21,7 @@ from .page import IMAGES
 from .plane import points, singularity
 from .shapes import sphere, torus
 from .sheet import Panel, display, magnified, save, sheet
-from .solid import around_field, compose_view, smoothed, view
+from .solid import around_field, compose_view, view
 
 #: Look with one sample per pixel, which hides no artifacts.
 LOOK = Look(length=40, gain=2.5)
@@ -44,7 +34,7 @@ SIDE, CLOSE, SAMPLED_SIDE = 400, 128, 256
 
 
 def write() -> None:
-    """Draw and save the pictures that need no files."""
+    """Draw and save the pictures."""
     save(sheet(_singularities()), IMAGES / "performance-singularities.png")
     ball, ring = sphere(), torus()
     left, right = points(SIDE) + SIDE / 6, points(SIDE) - SIDE / 6
@@ -63,21 +53,6 @@ def write() -> None:
     save(sheet(rows), IMAGES / "performance-surfaces.png")
     for name, look in (("samples", LOOK), ("hatching", load_preset("cross-hatch").look)):
         save(sheet(_samples(look)), IMAGES / f"performance-{name}.png")
-
-
-def write_others(folder: Path) -> None:
-    """Draw and save the bunny, whose y axis points up, and the vase."""
-    bunny, vase = (read_mesh(folder / "meshes" / n) for n in ("stanford-bunny.obj", "vase.off"))
-    x, y, z = bunny.vertices.T
-    vertices = np.stack([x, -z, y], axis=1)
-    bunny = build_surface(vertices, bunny.corner_vertex, bunny.face_start, name=bunny.name)
-    curved = smoothed(bunny, curvature_field(bunny, 4), 20)
-    vase_field = load_field(folder / "fields" / "vase-4.rawfield", vase).field
-    rows = [
-        _row(bunny, curved, (25, 12), "The Stanford bunny, N = 4"),
-        _row(vase, vase_field, (-30, 35), "A vase, N = 4"),
-    ]
-    save(sheet(rows), IMAGES / "performance-meshes.png")
 
 
 def _looks(*methods: str, look: Look = LOOK) -> list[Look]:
@@ -126,7 +101,3 @@ def _samples(look: Look) -> list[list[Panel]]:
         [Panel(picture, label) for picture, label in zip(shown, labels, strict=True)],
         [Panel(np.kron(picture[close], enlarged)) for picture in shown],
     ]
-
-
-if __name__ == "__main__":
-    write_others(Path(sys.argv[1]))

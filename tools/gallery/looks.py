@@ -12,4 +12,4 @@ MEASURED = Look(method="members", length=40, grain=2.0, gain=1.0, density=0.5)
 SOLID = Look(method="members", length=50, grain=2.0, gain=2.5, shading=0.8, supersampling=2)
 PLAID = SOLID.with_settings({"noise": "color", "grain": 3.0, "gain": 3.0, "length": 60})
 
-RED, BLUE = (214, 39, 40), (31, 119, 180)
+RED = (214, 39, 40)

@@ -25,7 +25,7 @@ CHANGES: dict[str, tuple[object, ...]] = {
 
 def measure(bench: Bench) -> None:
     """Time bakes of the ball as a mesh of Blender."""
-    peer("bpy")
+    peer("mathutils")  # of Blender
     from rosy_addon.core.cache import BAKE_CACHE
     from rosy_addon.jobs.bake import bake
 

@@ -19,7 +19,9 @@ TRIANGLES, FRAMES = 50_000, 80
 
 def measure(bench: Bench) -> None:
     """Time the frames of a ball that changes its shape, with all that a command does."""
-    bpy = peer("bpy")
+    peer("mathutils")  # of Blender
+    import bpy
+
     scene = cases.ball_scene(TRIANGLES)
     _deform(scene.objects["Ball"])
     scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

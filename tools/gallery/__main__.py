@@ -7,13 +7,13 @@ import importlib
 import sys
 
 from .page import FOLDER
-from .sheets import PAGES, write_sheets
+from .sheets import PAGES, write_page
 
 #: Modules that draw what `pictures.toml` does not describe.
 MODULES = (
     *("figure-02", "figure-05", "figure-06", "figure-07", "figure-09", "figure-10", "figure-11"),
     *("preset-pictures", "hero", "logo", "start-pages", "looks-page", "strokes-page"),
-    *("textures-page", "editing-page", "figures-page", "motion", "listing", "simulations-page"),
+    *("textures-page", "editing-page", "figures-page", "listing", "simulations-page"),
     "performance",
 )
 
@@ -30,7 +30,7 @@ def main() -> int:
     for name in names:
         print(f"drawing {name}", flush=True)
         if name in PAGES:
-            write_sheets(name)
+            write_page(name)
         if name in MODULES:
             importlib.import_module(f".{name.replace('-', '_')}", __package__).write()
     return 0

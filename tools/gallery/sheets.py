@@ -1,11 +1,11 @@
-"""Draw the sheets of pictures that `pictures.toml` describes."""
+"""Draw the sheets of pictures and the films that `pictures.toml` describes."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from PIL import Image, ImageDraw
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light
+from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import GeneratorSettings, generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
@@ -23,6 +24,7 @@ from rosy_addon.projection.camera import Camera, look_at, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 from rosy_addon.rendering.draw import draw_picture
+from rosy_addon.rendering.turntable import draw_next, turntable, turntable_views
 from rosy_addon.rendering.view_input import ViewInput
 
 from . import shapes, table_scene
@@ -37,12 +39,26 @@ PAGES: dict[str, Any] = tomllib.loads(
 INK, PAPER = (214, 84, 20), (255, 255, 255)
 
 
-def write_sheets(page: str) -> None:
-    """Draw and save the sheets of a page."""
+def write_page(page: str) -> None:
+    """Draw and save the sheets and the films of a page."""
     table = PAGES[page]
-    for name, options in table["sheets"].items():
+    for name, spec in table.get("films", {}).items():
+        _write_film(table | spec, ROOT / f"{table['prefix']}{name}.gif")
+    for name, options in table.get("sheets", {}).items():
         rows = [[draw_panel(table, options, panel) for panel in row] for row in options["rows"]]
-        save(sheet(rows), ROOT / f"{table['prefix']}-{name}.png")
+        save(sheet(rows), ROOT / f"{table['prefix']}{name}.png")
+
+
+def _write_film(spec: dict[str, Any], path: Path) -> None:
+    """Draw and save a turntable, or a loop of streaks that drift before a still camera."""
+    look = Look().with_settings(spec["look"])
+    surface = _surface(spec["mesh"])
+    instance = MeshInstance(surface, np.eye(4), _field(surface, spec))
+    is_still, count = look.flow != 0, spec["count"]
+    size, angles = tuple(spec["size"]), tuple(spec["view"])
+    views = turntable_views(instance, look, count, size, angles, still=is_still)
+    draw = partial(draw_next, cache=Cache()) if is_still else draw_picture
+    turntable(draw, views, count, path, spec["rate"])
 
 
 def draw_panel(*specs: dict[str, Any]) -> Panel:

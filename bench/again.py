@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import itertools
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-
-from rosy_addon.compositor.look import Look
-from rosy_addon.projection.camera import Camera
-
 from . import cases
-from .timing import Case, compare, main
+from .timing import Bench, main, peer
 
 #: Settings that a user changes, with the two values between which each alternates.
 CHANGES: dict[str, tuple[object, ...]] = {
@@ -23,69 +16,36 @@ CHANGES: dict[str, tuple[object, ...]] = {
     "seed": (1, 2),
     "grain": (2.0, 2.5),
     "density": (0.2, 0.3),
-    "hue": ("noise", "one"),
+    "noise": ("color", "gray"),
     "length": (30, 50),
     "guiding_angle": (0.2, 0.4),
     "crease_angle": (0.8, 0.9),
 }
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time bakes of the ball as a mesh of Blender."""
-    try:
-        import bpy
-    except ImportError:
-        print("changes of a look: left out, there is no bpy here", file=sys.stderr)
-        return
+    peer("mathutils")  # of Blender
     from rosy_addon.core.cache import BAKE_CACHE
     from rosy_addon.jobs.bake import bake
 
+    view = cases.camera()
     for triangles in (12_000, 200_000):
-        scene = ball_scene(bpy, triangles)
-        view = cases.camera()
+        scene = cases.ball_scene(triangles)
 
-        def bake_look(look: Look, scene: object = scene, view: Camera = view) -> None:
-            bake(scene, look=look, cameras=[view])
-
-        def bake_first(bake_look=bake_look) -> None:
+        def bake_first(scene: object = scene) -> None:
             BAKE_CACHE.clear()
-            bake_look(cases.LOOK)
+            bake(scene, look=cases.LOOK, cameras=[view])
 
         for setting, values in CHANGES.items():
-            alternating = itertools.cycle(values)
-
-            def bake_changed(setting=setting, alternating=alternating, bake_look=bake_look) -> None:
-                bake_look(replace(cases.LOOK, **{setting: next(alternating)}))
-
-            yield compare(
+            looks = itertools.cycle([replace(cases.LOOK, **{setting: value}) for value in values])
+            bench.compare(
                 f"bake after a change of {setting} / first bake, {triangles // 1000}K",
-                bake_changed,
+                lambda scene=scene, looks=looks: bake(scene, look=next(looks), cameras=[view]),
                 bake_first,
-                target=0.5,
-                higher_is_better=False,
-                runs=runs,
+                at_most=0.5,
             )
 
 
-def ball_scene(bpy, triangles: int) -> object:
-    """Return a scene that contains only the ball, with a field of degree 4."""
-    from rosy_addon.scene.mesh_fields import write_mesh_field
-    from rosy_addon.ui.properties import ensure_registered
-
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    ensure_registered()
-    surface = cases.ball(triangles)
-    mesh = bpy.data.meshes.new("Ball")
-    corners = surface.corner_vertex[surface.triangles]
-    mesh.from_pydata(surface.vertices.tolist(), [], corners.tolist())
-    mesh.shade_smooth()
-    write_mesh_field(mesh, cases.instance(triangles, 4).field)
-    obj = bpy.data.objects.new("Ball", mesh)
-    bpy.context.scene.collection.objects.link(obj)
-    bpy.context.view_layer.update()
-    assert np.allclose(obj.matrix_world, np.eye(4))
-    return bpy.context.scene
-
-
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

@@ -50,15 +50,9 @@ def ball(triangles: int, bumps: float = 0.06) -> Surface:
     polar = np.linspace(0, np.pi, rows + 1)[:, None]
     azimuth = np.arange(columns) * (2 * np.pi / columns)
     radius = 1 + bumps * np.sin(polar) ** 3 * np.sin(5 * azimuth) * np.sin(4 * polar)
-    point = radius[..., None] * np.stack(
-        [
-            np.sin(polar) * np.cos(azimuth),
-            np.sin(polar) * np.sin(azimuth),
-            np.cos(polar) + 0 * azimuth,
-        ],
-        axis=-1,
-    )
-    return _surface("ball", point)
+    around, up = np.sin(polar), np.cos(polar) + 0 * azimuth
+    point = np.stack([around * np.cos(azimuth), around * np.sin(azimuth), up], axis=-1)
+    return _surface("ball", radius[..., None] * point)
 
 
 @lru_cache(maxsize=8)
@@ -109,15 +103,9 @@ def camera(width: int = SIZE, height: int | None = None, azimuth: float = 0.0) -
 def first_frame(triangles: int, degree: int, look: Look = LOOK, size: int = SIZE) -> np.ndarray:
     """Draw a mesh for the first time, including the work that does not depend on the camera."""
     cached = instance(triangles, degree)
-    gbuffer = project(
-        [MeshInstance(_without_cache(cached.surface), cached.matrix, cached.field)], camera(size)
-    )
+    # A copy without cached results.
+    gbuffer = project([replace(cached, surface=replace(cached.surface))], camera(size))
     return compose(gbuffer, look).rgba
-
-
-def _without_cache(surface: Surface) -> Surface:
-    """Return a copy without cached results."""
-    return surface.with_parts()
 
 
 def frame(
@@ -128,3 +116,23 @@ def frame(
     instances = [instance(triangles, degree)]
     gbuffer = project(instances, eye, look.display, CORNER_FIELDS, look.supersampling)
     return compose(gbuffer, look).rgba
+
+
+def ball_scene(triangles: int) -> object:
+    """Open a scene of Blender that contains only the ball, with a field of degree 4, and return it."""
+    import bpy
+
+    from rosy_addon.scene.write_field import write_mesh_field
+    from rosy_addon.ui.properties import ensure_registered
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    ensure_registered()
+    surface = ball(triangles)
+    mesh = bpy.data.meshes.new("Ball")
+    corners = surface.corner_vertex[surface.triangles]
+    mesh.from_pydata(surface.vertices.tolist(), [], corners.tolist())
+    mesh.shade_smooth()
+    write_mesh_field(mesh, instance(triangles, 4).field)
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Ball", mesh))
+    bpy.context.view_layer.update()
+    return bpy.context.scene

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-
 import numpy as np
 
-from rosy_addon.field.connection import Connection, build_connection, laplacian
+from rosy_addon.field.connection import build_connection, laplacian
 from rosy_addon.field.smoothest import smallest_eigenvectors, smoothest_field
-from rosy_addon.field.sparse_multigrid import CSRMatrix
 
 from . import cases
-from .timing import Case, compare, main
+from .timing import Bench, main, peer
 
 DEGREE = 4
 
@@ -20,50 +16,35 @@ DEGREE = 4
 ITERATIONS = 20
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time both solvers, starting from the same connection of the mesh."""
-    try:
-        import scipy.sparse.linalg
-    except ImportError:
-        print("SciPy's LU: skipped, because scipy is not installed", file=sys.stderr)
-        return
+    sparse, linalg = peer("scipy.sparse"), peer("scipy.sparse.linalg")
     connection = build_connection(cases.ball(200_000))
-    matrix = laplacian(connection, DEGREE)
+    rosy = laplacian(connection, DEGREE)
+    shape = len(rosy), rosy.column_count
+    matrix = sparse.csr_matrix((rosy.data, rosy.indices, rosy.indptr), shape)
 
     def solve_with_scipy() -> None:
-        shifted = _csc(matrix, connection)
-        inverse = scipy.sparse.linalg.splu(shifted)
+        # The shift makes the matrix positive definite.
+        inverse = linalg.splu((matrix + 1e-8 * sparse.diags(connection.mass)).tocsc())
         z = np.random.default_rng(0).standard_normal(connection.node_count).astype(complex)
         for _ in range(ITERATIONS):
             z = inverse.solve(connection.mass * z)
             z /= np.sqrt(connection.mass @ np.abs(z) ** 2)
 
-    yield compare(
+    bench.compare(
         f"smoothest field / SciPy's LU and {ITERATIONS} iterations, 200K triangles, N = {DEGREE}",
         lambda: smallest_eigenvectors(connection, DEGREE),
         solve_with_scipy,
-        target=1.5,
-        higher_is_better=False,
-        runs=runs,
+        at_most=1.5,
     )
-    yield compare(
+    bench.compare(
         f"smoothest field, 800K / 200K triangles, N = {DEGREE}",
         lambda: smoothest_field(cases.ball(800_000), DEGREE),
         lambda: smoothest_field(cases.ball(200_000), DEGREE),
-        target=5.0,
-        higher_is_better=False,
-        runs=runs,
+        at_most=5.0,
     )
 
 
-def _csc(matrix: CSRMatrix, connection: Connection) -> object:
-    """Convert a matrix to SciPy, made positive definite."""
-    import scipy.sparse
-
-    shape = len(matrix), matrix.column_count
-    sparse = scipy.sparse.csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape)
-    return (sparse + 1e-8 * scipy.sparse.diags(connection.mass)).tocsc()
-
-
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

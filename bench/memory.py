@@ -6,33 +6,28 @@ when the drawing begins, up to the writing of the file.
 
 from __future__ import annotations
 
-import argparse
 import ctypes
-import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rosy_addon.image_io.png import write_png
-from rosy_addon.preset_files.store import load_preset
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.rendering.draw import draw_picture, picture_groups, picture_memory
 from rosy_addon.rendering.view_input import ViewInput
 from rosy_addon.worker.pool import POOL
 
 from . import cases
-from .timing import Case, main
+from .timing import Bench, main, peer
 
 ROOT = Path(__file__).resolve().parents[1]
 
 #: Allowed memory in gigabytes.
 ALLOWED = 8.0
 
-WIDE = 3840, 2160
-
-#: Triangles, N, and settings of the look, by the name of the case.
+#: Triangles, N, and settings of the look, of pictures whose peak is compared with the allowed memory.
 CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "3840 x 2160, N = 4": (12_000, 4, {}),
     "3840 x 2160, N = 7, color noise": (12_000, 7, {"hue": "noise"}),
@@ -41,68 +36,46 @@ CASES: dict[str, tuple[int, int, dict[str, object]]] = {
     "10M triangles, 3840 x 2160, N = 4": (10_000_000, 4, {}),
 }
 
-#: Presets, each of which is drawn with 1920 x 1080 pixels, and with 512 x 512.
-PRESETS = (
-    *("default", "plaid", "magnitude-map", "paper", "charcoal", "pencil", "pen-and-ink"),
-    *("cross-hatch", "white-on-black", "woodcut", "print-300-dpi", "engraving"),
-)
-
-#: Preset, triangles, N, size, other settings of the look and number of processes, of the pictures whose
-#: bound is compared with what they take.
-ESTIMATED: dict[str, tuple[str, int, int, tuple[int, int], dict[str, object], int]] = {
+#: Preset, N, triangles in thousands and other settings, of pictures whose bound is compared with what they
+#: take, after the size.
+ESTIMATED: dict[str, tuple[str, int, int, dict[str, object]]] = {
     **{
-        f"{width} x {height}, {preset}": (preset, 12_000, 4, (width, height), {}, 1)
-        for preset in PRESETS
-        for width, height in ((512, 512), (1920, 1080))
+        f"{size}, {preset}": (preset, 4, 12, {})
+        for preset in preset_keys()
+        for size in ("512 x 512", "1920 x 1080")
     },
-    "512 x 512, 300K triangles": ("default", 300_000, 4, (512, 512), {}, 1),
-    "1024 x 1024, 1K triangles": ("default", 1000, 4, (1024, 1024), {}, 1),
-    "1024 x 1024, 300K triangles": ("default", 300_000, 4, (1024, 1024), {}, 1),
-    "512 x 512, 3M triangles": ("default", 3_000_000, 4, (512, 512), {}, 1),
-    "1024 x 1024, N = 1": ("default", 12_000, 1, (1024, 1024), {}, 1),
-    "1024 x 1024, N = 2": ("default", 12_000, 2, (1024, 1024), {}, 1),
-    "1024 x 1024, N = 6": ("default", 12_000, 6, (1024, 1024), {}, 1),
-    "1024 x 1024, N = 7": ("default", 12_000, 7, (1024, 1024), {}, 1),
-    "1024 x 1024, brute": ("default", 12_000, 4, (1024, 1024), {"method": "brute", "length": 2}, 1),
-    "1024 x 1024, ibfv": ("default", 12_000, 4, (1024, 1024), {"method": "ibfv", "length": 4}, 1),
-    "1024 x 1024, drifting streaks": ("default", 12_000, 4, (1024, 1024), {"flow": 1.0}, 1),
-    "1024 x 1024, 2 x 2 samples": ("default", 12_000, 4, (1024, 1024), {"supersampling": 2}, 1),
+    "512 x 512, 300K triangles": ("default", 4, 300, {}),
+    "512 x 512, 3M triangles": ("default", 4, 3000, {}),
+    "1024 x 1024, 1K triangles": ("default", 4, 1, {}),
+    "1024 x 1024, 300K triangles": ("default", 4, 300, {}),
+    **{f"1024 x 1024, N = {n}": ("default", n, 12, {}) for n in (1, 2, 6, 7)},
+    "1024 x 1024, brute": ("default", 4, 12, {"method": "brute", "length": 2}),
+    "1024 x 1024, ibfv": ("default", 4, 12, {"method": "ibfv", "length": 4}),
+    "1024 x 1024, drifting streaks": ("default", 4, 12, {"flow": 1.0}),
+    "1024 x 1024, 2 x 2 samples": ("default", 4, 12, {"supersampling": 2}),
     "1024 x 1024, hatching of other streaks, 2 x 2 samples": (
-        "pen-and-ink", 12_000, 4, (1024, 1024), {"method": "members", "length": 2}, 1,
+        *("pen-and-ink", 4, 12),
+        {"method": "members", "length": 2},
     ),
-    "3840 x 2160": ("default", 12_000, 4, WIDE, {}, 1),
-    "3840 x 2160, two processes": ("default", 12_000, 4, WIDE, {}, 2),
-    "3840 x 2160, pen-and-ink": ("pen-and-ink", 12_000, 4, WIDE, {}, 1),
-    "3840 x 2160, plaid": ("plaid", 12_000, 4, WIDE, {}, 1),
-    "3840 x 2160, paper": ("paper", 12_000, 4, WIDE, {}, 1),
-}  # fmt: skip
+    "3840 x 2160, two processes": ("default", 4, 12, {}),
+    **{
+        f"3840 x 2160, {preset}": (preset, 4, 12, {})
+        for preset in ("default", "pen-and-ink", "plaid", "paper")
+    },
+}
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Measure each case once, because memory does not vary between runs."""
+    peer("resource")  # of the systems that tell the peak memory of a process
     for name in CASES:
         (peak,) = _run("--draw", name)
-        yield _case(f"peak memory / {ALLOWED:g} GB, {name}", (peak, ALLOWED), "GB", 1.0)
+        amounts = peak, ALLOWED
+        bench.add(f"peak memory / {ALLOWED:g} GB, {name}", peak / ALLOWED, amounts, "GB", at_most=1)
     for name in ESTIMATED if Path("/proc/self/clear_refs").exists() else ():
-        estimate, peak = _run("--estimate", name)
-        yield _case(f"bound / taken memory, {name}", (1000 * estimate, 1000 * peak), "MB", None)
-
-
-def _case(name: str, amounts: tuple[float, float], unit: str, target: float | None) -> Case:
-    """Return the case of the ratio of two amounts, and print its line."""
-    ratio = amounts[0] / amounts[1]
-    case = Case(
-        name=name,
-        ratio=ratio,
-        low=ratio,
-        high=ratio,
-        target=target,
-        higher_is_better=False,
-        amounts=amounts,
-        unit=unit,
-    )
-    print(case.line(), flush=True)
-    return case
+        bound, taken = _run("--estimate", name)
+        amounts = 1000 * bound, 1000 * taken
+        bench.add(f"bound / taken memory, {name}", bound / taken, amounts, "MB")
 
 
 def _run(*options: str) -> list[float]:
@@ -114,15 +87,18 @@ def _run(*options: str) -> list[float]:
 
 def estimate_and_draw(name: str) -> tuple[float, float]:
     """Return the memory of a case on Linux, in gigabytes: the bound, and what all processes take."""
-    preset, triangles, degree, size, settings, processes = ESTIMATED[name]
+    preset, degree, thousands, settings = ESTIMATED[name]
+    width, height = (int(side) for side in name.split(",")[0].split(" x "))
+    workers = 2 if "two processes" in name else 1
     look = replace(load_preset(preset).look, **settings)
-    view = ViewInput((cases.instance(triangles, degree),), cases.camera(*size), look)
+    ball = cases.instance(1000 * thousands, degree)
+    view = ViewInput((ball,), cases.camera(width, height), look)
     # Memory that is free in the heap since the mesh was made counts neither as held nor as taken.
     ctypes.CDLL(None).malloc_trim(0)
     Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     held = _resident_bytes("VmRSS")
-    bound = picture_memory(view, picture_groups(view, processes), processes)
-    rgba = draw_picture(view, workers=processes).rgba
+    bound = picture_memory(view, picture_groups(view, workers), workers)
+    rgba = draw_picture(view, workers=workers).rgba
     others = sum(_resident_bytes("VmHWM", helper.pid) for helper in POOL.helpers)
     with TemporaryDirectory() as folder:
         write_png(Path(folder) / "picture.png", rgba)
@@ -137,29 +113,19 @@ def _resident_bytes(kind: str, process: int | str = "self") -> int:
 
 def draw(name: str) -> float:
     """Draw a case, including its mesh, and return the peak memory of this process in gigabytes."""
-    import resource
-
     triangles, degree, settings = CASES[name]
     look = replace(cases.LOOK, **settings)
-    view = ViewInput((cases.instance(triangles, degree),), cases.camera(*WIDE), look)
-    (draw_picture(view))
+    draw_picture(ViewInput((cases.instance(triangles, degree),), cases.camera(3840, 2160), look))
+    resource = peer("resource")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak * (1 if sys.platform == "darwin" else 1024) / 1e9
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("--draw", choices=CASES)
-    parser.add_argument("--estimate", choices=ESTIMATED)
-    options, rest = parser.parse_known_args()
-    if options.estimate:
-        print(*estimate_and_draw(options.estimate))
-        sys.exit()
-    if options.draw:
-        print(draw(options.draw))
-        sys.exit()
-    if os.name == "nt":
-        sys.exit(
-            "memory: skipped, because this system does not report the peak memory of a process"
-        )
-    sys.exit(main(__doc__, measure, rest))
+    match sys.argv[1:]:
+        case ["--estimate", name]:
+            print(*estimate_and_draw(name))
+        case ["--draw", name]:
+            print(draw(name))
+        case _:
+            main(__doc__, measure)

@@ -1,72 +1,82 @@
-"""Write measured cases into the tables of docs/performance.md.
+"""Write measured cases into the tables of docs/performance.md and bench/NOTES.md.
 
     python -m bench.page CASES.json ...
 
-A table is between ``<!-- cases: PATTERN -->`` and ``<!-- end -->``. It lists the cases whose names
-match the regular expression.
+The files are those that benchmarks write with --json. A table is between ``<!-- cases: PATTERN -->`` and
+``<!-- end -->``. It lists the cases whose names match the regular expression. If that has the groups `row` and
+`column`, the table has these, and shows the ratios with their targets in parentheses.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 import sys
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "performance.md"
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = (ROOT / "docs" / "performance.md", ROOT / "bench" / "NOTES.md")
 
 TABLE = re.compile(r"(<!-- cases: (?P<pattern>.*?) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
-def main() -> int:
+def main() -> None:
     """Rewrite all tables for which the files have cases."""
-    summary = (__doc__ or "").partition("\n")[0]
-    parser = argparse.ArgumentParser(prog="python -m bench.page", description=summary)
-    parser.add_argument(
-        "cases", nargs="+", type=Path, help="files that benchmarks wrote with --json"
-    )
-    entries = [
-        entry for path in parser.parse_args().cases for entry in json.loads(path.read_text())
-    ]
-
-    def fill_table(match: re.Match[str]) -> str:
-        matching = [entry for entry in entries if re.search(match["pattern"], entry["name"])]
-        return match[1] + _table(matching) + match[3] if matching else match[0]
-
-    PAGE.write_text(TABLE.sub(fill_table, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
-    return 0
+    entries = [entry for path in sys.argv[1:] for entry in json.loads(Path(path).read_text())]
+    for page in PAGES:
+        page.write_text(filled(page.read_text(encoding="utf-8"), entries), encoding="utf-8")
 
 
-def _table(entries: list[dict]) -> str:
-    lines = ["| case | ratio | min to max | target | amounts |", "| --- " * 5 + "|"]
+def filled(text: str, entries: list[dict]) -> str:
+    """Return a page with its tables of cases."""
+
+    def fill_table(table: re.Match[str]) -> str:
+        pattern = re.compile(table["pattern"])
+        matching = [entry for entry in entries if pattern.search(entry["name"])]
+        if not matching:
+            return table[0]
+        rows = _grid(matching, pattern) if "column" in pattern.groupindex else _list(matching)
+        lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+        return table[1] + "".join(f"| {' | '.join(line)} |\n" for line in lines) + table[3]
+
+    return TABLE.sub(fill_table, text)
+
+
+def _list(entries: list[dict]) -> list[list[str]]:
+    """Return a row for each case."""
+    rows = [["case", "ratio", "target", "amounts"]]
     for entry in entries:
-        target = ""
-        if entry["target"] is not None:
-            better = entry["higher_is_better"]
-            target = f"{'at least' if better else 'at most'} {entry['target']:g}"
-            missed = (
-                entry["ratio"] < entry["target"] if better else entry["ratio"] > entry["target"]
-            )
-            target += ": **missed**" if missed else ""
-        amounts = " / ".join(_rounded(amount) for amount in entry["amounts"])
-        spread = f"{entry['low']:.2f} to {entry['high']:.2f}"
-        spread = spread if entry["low"] < entry["high"] else ""
-        name = entry["name"].strip().replace("|", "\\|")
-        cells = [
-            name,
-            f"{entry['ratio']:.2f}",
-            spread,
-            target,
-            f"{amounts} {entry['unit']}".strip(),
-        ]
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+        ratio, amounts = f"{entry['ratio']:.2f}", (_short(amount) for amount in entry["amounts"])
+        if entry["low"] < entry["high"]:
+            ratio += f" ({entry['low']:.2f} to {entry['high']:.2f})"
+        amount = f"{' / '.join(amounts)} {entry['unit']}".strip()
+        rows.append([entry["name"].strip(), ratio, _target(entry), amount])
+    return rows
 
 
-def _rounded(amount: float) -> str:
+def _grid(entries: list[dict], pattern: re.Pattern[str]) -> list[list[str]]:
+    """Return the ratios by the groups `row` and `column` of the names."""
+    cells: dict[str, dict[str, str]] = {}
+    for entry in entries:
+        found, target = pattern.search(entry["name"]), _target(entry)
+        cell = f"{entry['ratio']:.2f}" + (f" ({target})" if target else "")
+        cells.setdefault(found["row"].strip(), {})[found["column"]] = cell
+    columns = list(dict.fromkeys(column for row in cells.values() for column in row))
+    rows = [[name, *(row.get(column, "") for column in columns)] for name, row in cells.items()]
+    return [["", *columns], *rows]
+
+
+def _target(entry: dict) -> str:
+    if entry["target"] is None:
+        return ""
+    sign = 1 if entry["higher_is_better"] else -1
+    missed = ": **missed**" if sign * entry["ratio"] < sign * entry["target"] else ""
+    return f"{'≥' if sign > 0 else '≤'} {entry['target']:g}{missed}"
+
+
+def _short(amount: float) -> str:
     return f"{amount:.0f}" if amount >= 100 else f"{amount:.3g}"
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

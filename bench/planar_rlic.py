@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 from harness.planar import compose_planar
 
 from . import cases
-from .timing import Case, compare, main, use_one_core
+from .timing import Bench, main, peer, use_cores
 
 DEGREE = 4
 
@@ -18,14 +16,10 @@ DEGREE = 4
 LOOK = replace(cases.LOOK, length=20)
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time the picture from angles, and the images of the members from noise."""
-    try:
-        import rlic
-    except ImportError:
-        print("planar images of rlic: skipped, because rlic is not installed", file=sys.stderr)
-        return
-    use_one_core()
+    rlic = peer("rlic")
+    use_cores(1)
     field, noise = cases.plane(DEGREE)
     angle = (np.angle(field.representation) / DEGREE).reshape(cases.SIZE, cases.SIZE)
     texture = np.ascontiguousarray(noise.reshape(angle.shape))
@@ -39,20 +33,13 @@ def measure(runs: int) -> Iterator[Case]:
         for u, v in members:
             rlic.convolve(texture, u, v, kernel=kernel)
 
-    ours = {
-        "picture": lambda: compose_planar(angle, DEGREE, LOOK),
-        "images of the members": lambda: cases.compose_lic("sheets", DEGREE, LOOK),
-    }
-    for what, work in ours.items():
-        yield compare(
-            f"{what} / four images of rlic, N = {DEGREE}, 41 samples",
-            work,
-            four_images,
-            target=0.2,
-            higher_is_better=False,
-            runs=runs,
-        )
+    for what, work in (
+        ("picture", lambda: compose_planar(angle, DEGREE, LOOK)),
+        ("images of the members", lambda: cases.compose_lic("sheets", DEGREE, LOOK)),
+    ):
+        name = f"{what} / four images of rlic, N = {DEGREE}, 41 samples"
+        bench.compare(name, work, four_images, at_most=0.2)
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

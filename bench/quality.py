@@ -7,36 +7,30 @@ largest difference of autocorrelations. Meshes and fields of others are read fro
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 from harness.planar import lic, planar_pixel_field
+from harness.streaks import mean_spectrum, persistence
 from scipy import ndimage
 
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import (
-    PixelField,
-    nearest_member,
-    surface_pixel_field,
-)
+from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field, generate
+from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from tools.gallery.measure import mean_spectrum, persistence
 
 from . import cases
-from .timing import Case, main
+from .timing import Bench, main
 
 #: Lags of the autocorrelation along and across the field, in pixels.
 ALONG, ACROSS = (1, 2, 4, 8, 16, 32), (1, 2, 3, 4, 6)
@@ -44,14 +38,14 @@ ALONG, ACROSS = (1, 2, 4, 8, 16, 32), (1, 2, 3, 4, 6)
 #: Width of the border in pixels that is left out, because windows would extend over it.
 BORDER = 34
 
-SEEDS = (0, 1, 2, 3)
-
-#: Angles of uniform fields in radians, one for each seed.
-ANGLES = (0.05, 0.37, 0.8, 1.1)
-
+#: Seeds of the noise, and the angle of a uniform field in radians for each.
+SEEDS, ANGLES = (0, 1, 2, 3), (0.05, 0.37, 0.8, 1.1)
 
 #: White noise with half of the cells bright, as in the paper, which is the harder test.
-PAPER_LOOK = replace(cases.LOOK, density=0.5, high_pass=0.0)
+LOOKS = {
+    "paper's noise": replace(cases.LOOK, density=0.5, high_pass=0.0),
+    "default noise": cases.LOOK,
+}
 
 
 @dataclass(frozen=True)
@@ -76,65 +70,54 @@ class Measurements:
     sharpness: float
 
 
-def measure(runs: int, data: Path | None = None) -> Iterator[Case]:
-    """Compare all fields. `runs` is ignored, because pictures do not vary."""
-    del runs
+def measure(bench: Bench, data: Path | None) -> None:
+    """Compare all fields."""
     for name, make in _fields(data).items():
-        fields = make()
-        for look_name, look in (("paper's noise", PAPER_LOOK), ("default noise", cases.LOOK)):
+        pixel_fields = make()
+        for look_name, look in LOOKS.items():
             sheets, brute = (
-                _measure_fields(fields, replace(look, method=m)) for m in ("sheets", "brute")
+                _measure_fields(pixel_fields, replace(look, method=method))
+                for method in ("sheets", "brute")
             )
-            yield from _compare_methods(f"{name}, {look_name}", sheets, brute)
+            _compare_methods(bench, f"{name}, {look_name}", sheets, brute)
 
 
-def _compare_methods(name: str, sheets: Measurements, brute: Measurements) -> Iterator[Case]:
-    deviation_ratio = sheets.deviation / brute.deviation
-    deviation_ratio = np.maximum(deviation_ratio, 1 / deviation_ratio).max()
-    correlation = max(
-        np.abs(sheets.along - brute.along).max(), np.abs(sheets.across - brute.across).max()
-    )
-    sharpness_ratio = max(sheets.sharpness / brute.sharpness, brute.sharpness / sheets.sharpness)
-    for quantity, value, target, amounts in (
-        ("deviation", deviation_ratio, 1.02, (sheets.deviation[1], brute.deviation[1])),
-        ("autocorrelation", correlation, 0.03, (sheets.across[0], brute.across[0])),
-        ("sharpness", sharpness_ratio, 1.05, (sheets.sharpness, brute.sharpness)),
-    ):
-        value = float(value)
-        amounts = float(amounts[0]), float(amounts[1])
-        case = Case(f"{name}: {quantity}", value, value, value, target, False, amounts, "")
-        print(case.line(), flush=True)
-        yield case
+def _compare_methods(bench: Bench, name: str, sheets: Measurements, brute: Measurements) -> None:
+    ratio = sheets.deviation / brute.deviation
+    ratio = np.maximum(ratio, 1 / ratio).max()
+    amounts = sheets.deviation[1], brute.deviation[1]
+    bench.add(f"{name}: deviation", ratio, amounts, "", at_most=1.02)
+    along, across = np.abs(sheets.along - brute.along), np.abs(sheets.across - brute.across)
+    amounts = sheets.across[0], brute.across[0]
+    largest = max(along.max(), across.max())
+    bench.add(f"{name}: autocorrelation", largest, amounts, "", at_most=0.03)
+    ratio = sheets.sharpness / brute.sharpness
+    amounts = sheets.sharpness, brute.sharpness
+    bench.add(f"{name}: sharpness", max(ratio, 1 / ratio), amounts, "", at_most=1.05)
 
 
-def _measure_fields(fields: Sequence[PixelField], look: Look) -> Measurements:
+def _measure_fields(pixel_fields: Sequence[PixelField], look: Look) -> Measurements:
     """Return means over several seeds, or over several fields with one seed each."""
+    repeated = pixel_fields * len(SEEDS) if len(pixel_fields) == 1 else pixel_fields
     measurements = []
-    for seed, field in zip(SEEDS, fields * len(SEEDS) if len(fields) == 1 else fields, strict=True):
+    for seed, field in zip(SEEDS, repeated, strict=True):
         noise = look_noise(field, replace(look, seed=seed))
         measurements.append(_measure_images(field, lic(field, look, noise)))
-    return Measurements(
-        *(
-            np.mean([getattr(measured, name) for measured in measurements], axis=0)
-            for name in Measurements.__annotations__
-        )
-    )
+    names = [entry.name for entry in fields(Measurements)]
+    means = [np.mean([getattr(each, name) for each in measurements], axis=0) for name in names]
+    return Measurements(*means)
 
 
 def _measure_images(field: PixelField, images: LicImages) -> Measurements:
     """Measure the images of one field, away from its borders and from undefined pixels."""
-    shape = field.height, field.width
-    inside = np.zeros(field.height * field.width, dtype=bool)
-    inside[field.pixel] = field.representation != 0
-    inside = np.pad(inside.reshape(shape), 1)
+    inside = np.pad(_frame(field.representation != 0, field), 1)
     inside = ndimage.distance_transform_edt(inside)[1:-1, 1:-1] > BORDER
     chosen = inside.ravel()[field.pixel]
     first = nearest_member(field, 0.0)
     along, across, lengthwise, crosswise = [], [], 0.0, 0.0
     for index, member in enumerate(images.members[:, :, 0]):
-        screen_direction = _on_screen(field, first * np.exp(2j * np.pi * index / field.degree))
-        direction = _frame(screen_direction, field)
-        image = _frame(member, field)
+        turned = _on_screen(field, first * np.exp(2j * np.pi * index / field.degree))
+        direction, image = _frame(turned, field), _frame(member, field)
         along.append(persistence(image, direction, inside, max(ALONG))[list(ALONG)])
         across.append(persistence(image, 1j * direction, inside, max(ACROSS))[list(ACROSS)])
         slope = ndimage.sobel(image, 1) + 1j * ndimage.sobel(image, 0)
@@ -142,13 +125,18 @@ def _measure_images(field: PixelField, images: LicImages) -> Measurements:
         lengthwise, crosswise = lengthwise + rotated.real.var(), crosswise + rotated.imag.var()
     sharpness = crosswise / (crosswise + lengthwise)
     if np.ptp(field.representation[chosen]) == 0:
-        blend = _frame(images.blend[:, 0], field)[BORDER:-BORDER, BORDER:-BORDER]
-        lines = field.degree if field.degree % 2 else field.degree // 2
-        spectrum = ndimage.gaussian_filter1d(mean_spectrum(blend, 256), 1.0, mode="wrap")
-        orientation = np.degrees(np.angle(first[0])) + 180 / lines * np.arange(lines)
-        sharpness = spectrum[np.rint(orientation - 0.5).astype(int) % 180].mean()
+        sharpness = _peak_height(field, images, np.degrees(np.angle(first[0])))
     deviation = np.array([images.members[:, chosen].std(), images.blend[chosen].std()])
     return Measurements(deviation, np.mean(along, axis=0), np.mean(across, axis=0), sharpness)
+
+
+def _peak_height(field: PixelField, images: LicImages, orientation: float) -> float:
+    """Return the mean height of the spectrum of a uniform field at its members."""
+    blend = _frame(images.blend[:, 0], field)[BORDER:-BORDER, BORDER:-BORDER]
+    lines = field.degree if field.degree % 2 else field.degree // 2
+    spectrum = ndimage.gaussian_filter1d(mean_spectrum(blend, 256), 1.0, mode="wrap")
+    orientations = orientation + 180 / lines * np.arange(lines)
+    return spectrum[np.rint(orientations - 0.5).astype(int) % 180].mean()
 
 
 def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
@@ -158,66 +146,44 @@ def _on_screen(field: PixelField, member: np.ndarray) -> np.ndarray:
 
 
 def _frame(values: np.ndarray, field: PixelField) -> np.ndarray:
+    """Return (H, W) values of the pixels of a field, 0 elsewhere."""
     frame = np.zeros(field.height * field.width, dtype=values.dtype)
     frame[field.pixel] = values
     return frame.reshape(field.height, field.width)
 
 
-# --- fields ----------------------------------------------------------------------------------------
+def _seen(surface: Surface, field: RosyField) -> PixelField:
+    """Return a field as a camera sees it."""
+    camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
+    gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
+    return surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)
 
 
 def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
-    fields: dict[str, Callable[[], list[PixelField]]] = {}
-    for degree in (2, 3, 4, 6):
-        fields[f"uniform, N = {degree}"] = partial(_uniform, degree)
-        fields[f"singularities, N = {degree}"] = lambda degree=degree: [cases.plane(degree)[0]]
-    for degree in (4, 6):
-        fields[f"sphere, N = {degree}"] = partial(_on_sphere, degree)
-        fields[f"torus, N = {degree}"] = partial(_on_torus, degree)
-    if data is not None:
-        fields["bunny, N = 4"] = partial(_on_bunny, data)
-        for degree in (2, 4, 7):
-            fields[f"vase, N = {degree}"] = partial(_on_vase, data, degree)
-    return fields
-
-
-def _uniform(degree: int) -> list[PixelField]:
-    """Return uniform fields at several angles, because at one angle streamlines alias with the grid."""
+    """Return functions that make the fields, by name."""
+    made: dict[str, Callable[[], list[PixelField]]] = {}
     shape = cases.SIZE, cases.SIZE
-    return [planar_pixel_field(np.full(shape, angle), degree) for angle in ANGLES]
-
-
-def _on_sphere(degree: int) -> list[PixelField]:
-    surface = cases.ball(20_000, bumps=0.0)
-    return _pixel_fields_of(surface, axis_field(surface, degree, (0.3, 0.2, 1.0)))
-
-
-def _on_torus(degree: int) -> list[PixelField]:
-    surface = cases.torus(20_000)
-    return _pixel_fields_of(surface, axis_field(surface, degree, (0.0, 0.0, 1.0)))
-
-
-def _on_bunny(data: Path) -> list[PixelField]:
-    surface = Surface(data / "meshes" / "stanford-bunny.obj")
-    return _pixel_fields_of(surface, generate(surface, "curvature", 4))
-
-
-def _on_vase(data: Path, degree: int) -> list[PixelField]:
-    surface = Surface(data / "meshes" / "vase.off")
-    return _pixel_fields_of(
-        surface, load_field(data / "fields" / f"vase-{degree}.rawfield", surface).field
-    )
-
-
-def _pixel_fields_of(surface: Surface, field: RosyField) -> list[PixelField]:
-    """Return the field as a camera sees it, in a list of one."""
-    camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
-    gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)]
+    for n in (2, 3, 4, 6):
+        # Several angles, because at one angle streamlines alias with the grid.
+        made[f"uniform, N = {n}"] = lambda n=n: [
+            planar_pixel_field(np.full(shape, angle), n) for angle in ANGLES
+        ]
+        made[f"singularities, N = {n}"] = lambda n=n: [cases.plane(n)[0]]
+    ball, ring = cases.ball(20_000, bumps=0.0), cases.torus(20_000)
+    for n in (4, 6):
+        for name, surface, axis in (("sphere", ball, (0.3, 0.2, 1.0)), ("torus", ring, (0, 0, 1))):
+            made[f"{name}, N = {n}"] = lambda n=n, surface=surface, axis=axis: [
+                _seen(surface, axis_field(surface, n, axis))
+            ]
+    if data is not None:
+        bunny = read_mesh(data / "meshes" / "stanford-bunny.obj")
+        vase = read_mesh(data / "meshes" / "vase.off")
+        made["bunny, N = 4"] = lambda: [_seen(bunny, generate(bunny, "curvature", 4))]
+        for n in (2, 4, 7):
+            file = data / "fields" / f"vase-{n}.rawfield"
+            made[f"vase, N = {n}"] = lambda f=file: [_seen(vase, load_field(f, vase).field)]
+    return made
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("--data", type=Path)
-    options, rest = parser.parse_known_args()
-    sys.exit(main(__doc__, partial(measure, data=options.data), rest))
+    main(__doc__, measure, data={"type": Path, "help": "folder of meshes and fields of others"})

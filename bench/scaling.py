@@ -1,75 +1,53 @@
-"""How time grows with the length of streamlines, the degree, the pixels and the triangles."""
+"""How time grows with the length of streamlines, the degree, the pixels, the samples and the triangles."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 
 from . import cases
-from .timing import Case, compare, main
+from .timing import Bench, main
 
-DEGREE = 4
+DEGREE, TRIANGLES = 4, 12_000
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time all cases."""
+
+    def frame(look=cases.LOOK, triangles=TRIANGLES, size=cases.SIZE) -> object:
+        return cases.frame(triangles, DEGREE, look, size)
+
     for times in (2, 4, 8):
         long = replace(cases.LOOK, length=times * cases.LOOK.length)
         target = 1.6 if times == 8 else None
-        yield compare(
+        bench.compare(
             f"streamlines {times} times longer, LIC stage",
             lambda look=long: cases.compose_lic("sheets", DEGREE, look),
             lambda: cases.compose_lic("sheets", DEGREE),
-            target=target,
-            higher_is_better=False,
-            runs=runs,
+            at_most=target,
         )
-        yield compare(
-            f"streamlines {times} times longer, frame, 12K triangles",
-            lambda look=long: cases.frame(12_000, DEGREE, look),
-            lambda: cases.frame(12_000, DEGREE),
-            target=target,
-            higher_is_better=False,
-            runs=runs,
-        )
+        name = f"streamlines {times} times longer, frame, 12K triangles"
+        bench.compare(name, lambda look=long: frame(look), frame, at_most=target)
     for size in (256, 1024):
-        yield compare(
-            f"{size} x {size} / 512 x 512 pixels, frame, 12K triangles",
-            lambda s=size: cases.frame(12_000, DEGREE, size=s),
-            lambda: cases.frame(12_000, DEGREE),
-            higher_is_better=False,
-            runs=runs,
-        )
-    for triangles in (12_000, 200_000):
-        yield compare(
+        name = f"{size} x {size} / 512 x 512 pixels, frame, 12K triangles"
+        bench.compare(name, lambda s=size: frame(size=s), frame)
+    sampled = replace(cases.LOOK, supersampling=2)
+    for triangles in (TRIANGLES, 200_000):
+        bench.compare(
             f"2 x 2 samples / one, 1080 x 1080 pixels, frame, {triangles // 1000}K triangles",
-            lambda t=triangles: cases.frame(
-                t, DEGREE, replace(cases.LOOK, supersampling=2), size=1080
-            ),
-            lambda t=triangles: cases.frame(t, DEGREE, size=1080),
-            target=2.0,
-            higher_is_better=False,
-            runs=runs,
+            lambda t=triangles: frame(sampled, t, 1080),
+            lambda t=triangles: frame(triangles=t, size=1080),
+            at_most=2.0,
         )
     for degree in (1, 3, 6, 8, 12):
-        yield compare(
+        bench.compare(
             f"N = {degree} / N = 2, LIC stage",
             lambda d=degree: cases.compose_lic("sheets", d),
             lambda: cases.compose_lic("sheets", 2),
-            higher_is_better=False,
-            runs=runs,
         )
-    for triangles in (200, 200_000, 2_000_000):
-        yield compare(
-            f"{triangles} / 12K triangles, frame",
-            lambda t=triangles: cases.frame(t, DEGREE),
-            lambda: cases.frame(12_000, DEGREE),
-            target=1.34 if triangles == 200_000 else None,
-            higher_is_better=False,
-            runs=runs,
-        )
+    for triangles, target in ((200, None), (200_000, 1.34), (2_000_000, None)):
+        name = f"{triangles} / 12K triangles, frame"
+        bench.compare(name, lambda t=triangles: frame(triangles=t), frame, at_most=target)
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

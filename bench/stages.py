@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 from harness.planar import lic
@@ -19,22 +18,17 @@ from rosy_addon.projection.project import project
 from rosy_addon.projection.rasterizer import rasterize
 
 from . import cases
-from .timing import Case, compare, main
+from .timing import Bench, main
 
 DEGREE = 4
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time all stages for a small and a large mesh."""
     for triangles in (12_000, 200_000):
-        for name, work in _stages(triangles).items():
-            yield compare(
-                f"{name} / frame, {triangles // 1000}K triangles, N = {DEGREE}",
-                work,
-                lambda t=triangles: cases.frame(t, DEGREE),
-                higher_is_better=False,
-                runs=runs,
-            )
+        for stage, work in _stages(triangles).items():
+            name = f"{stage} / frame, {triangles // 1000}K triangles, N = {DEGREE}"
+            bench.compare(name, work, lambda t=triangles: cases.frame(t, DEGREE))
 
 
 def _stages(triangles: int) -> dict[str, Callable[[], object]]:
@@ -65,4 +59,4 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

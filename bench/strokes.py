@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
-
 import numpy as np
 from harness.stroke_spacing import lateral_gaps
 from harness.stroke_tracing import trace_strokes
@@ -18,7 +15,7 @@ from rosy_addon.projection.camera import look_at, orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
 from . import cases
-from .timing import Case, compare, main
+from .timing import Bench, main
 
 DEGREE = 4
 
@@ -30,8 +27,8 @@ SPACING, MAX_LENGTH = 0.0102, 12.0
 MAX_SECONDS = 30.0
 
 
-def measure(runs: int) -> Iterator[Case]:
-    """Yield the ratios of times. Number, evenness and time go to the error stream."""
+def measure(bench: Bench) -> None:
+    """Time tracing beside the smoothest field, and drawing without and with hidden strokes."""
     surface = cases.ball(200_000)
     instance = MeshInstance(surface, np.eye(4), smoothest_field(surface, DEGREE))
     rules = SeparationRules(max_length=MAX_LENGTH)
@@ -39,33 +36,29 @@ def measure(runs: int) -> Iterator[Case]:
     gaps = lateral_gaps(build_tangent_mesh(instance), strokes)
     print(
         f"{len(strokes)} strokes, {100 * gaps.evenness():.1f} % of gaps within 25 %, "
-        f"none nearer than {gaps.nearest_distance.min():.2f} spacings",
-        file=sys.stderr,
+        f"none nearer than {gaps.nearest_distance.min():.2f} spacings"
     )
-    case = compare(
+    case = bench.compare(
         f"{len(strokes)} strokes / smoothest field, 200K triangles, N = {DEGREE}",
         lambda: trace_strokes(instance, SPACING, rules=rules),
         lambda: smoothest_field(surface, DEGREE),
-        higher_is_better=False,
-        runs=min(runs, 3),
+        runs=3,
     )
-    seconds = case.amounts[0] / 1e3
+    seconds = case["amounts"][0] / 1e3
     verdict = "yes" if seconds <= MAX_SECONDS else "NO"
-    print(f"{seconds:.1f} s, at most {MAX_SECONDS:g}: {verdict}", file=sys.stderr)
-    yield case
+    print(f"{seconds:.1f} s, at most {MAX_SECONDS:g}: {verdict}")
     camera = orthographic_camera(look_at((0, -4, 1), (0, 0, 0)), 800, 800, scale=2.4)
 
     def draw(hidden: bool) -> object:
         return draw_instances([instance], camera, StrokeStyle(spacing=5.0, hidden=hidden))
 
-    yield compare(
+    bench.compare(
         "strokes without / with hidden ones, ball, 800 x 800, spacing 5",
         lambda: draw(False),
         lambda: draw(True),
-        higher_is_better=False,
-        runs=min(runs, 3),
+        runs=3,
     )
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

@@ -6,16 +6,14 @@ Mesa's llvmpipe unless the system has a graphics card; the name of its renderer 
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from . import cases
-from .timing import Case, compare, main, use_one_core
+from .timing import Bench, main, peer, use_cores
 
 DEGREE = 4
 
@@ -31,44 +29,37 @@ SAMPLES_LABEL = {1: "", 2: ", 1080 x 1080, 2 x 2 samples a pixel"}
 AZIMUTH_STEP = 0.01
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time a small and a large mesh."""
-    use_one_core()
-    # Set before the library is loaded: llvmpipe counts the cores of the machine, not of the process.
-    os.environ["LP_NUM_THREADS"] = "0"
-    try:
-        import vtk
-    except ImportError:
-        print("surfaces of VTK: skipped, because vtk is not installed", file=sys.stderr)
-        return
+    use_cores(1)
     for triangles, size, samples, target in (
         (12_000, cases.SIZE, 1, 0.5),
         (200_000, cases.SIZE, 1, 0.5),
         (12_000, LARGE_SIZE, 2, 0.6),
     ):
         look = replace(LOOK, supersampling=samples)
-        draw_next, read_pixels, name = vtk_renderer(vtk, triangles, size)
-        vtk_coverage = float((read_pixels().min(axis=1) < 255).mean())
-        rosy_coverage = float((cases.frame(triangles, DEGREE, look, size)[..., 3] > 0).mean())
-        print(
-            f"{name}; covered: {vtk_coverage:.1%} by VTK, {rosy_coverage:.1%} by RoSy", flush=True
-        )
+        draw_next, read_pixels, name = vtk_renderer(triangles, size)
+        print_coverage(name, read_pixels(), cases.frame(triangles, DEGREE, look, size))
         azimuths = iter(np.arange(1, 10_000) * AZIMUTH_STEP)
-        yield compare(
+        bench.compare(
             f"N = 4{SAMPLES_LABEL[samples]} / VTK's one vector field, frame, "
             f"{triangles // 1000}K triangles",
             lambda t=triangles, look=look, size=size, azimuths=azimuths: cases.frame(
                 t, DEGREE, look, size, azimuth=next(azimuths)
             ),
             lambda draw=draw_next, read=read_pixels: (draw(), read()),
-            target=target,
-            higher_is_better=False,
-            runs=runs,
+            at_most=target,
         )
 
 
+def print_coverage(name: str, vtk_pixels: np.ndarray, rgba: np.ndarray) -> None:
+    """Print how much of the frame both cover, for a check that they draw the same."""
+    vtk_coverage, coverage = (vtk_pixels.min(axis=1) < 255).mean(), (rgba[..., 3] > 0).mean()
+    print(f"{name}; covered: {vtk_coverage:.1%} by VTK, {coverage:.1%} by RoSy", flush=True)
+
+
 def vtk_renderer(
-    vtk: Any, triangles: int, size: int = cases.SIZE
+    triangles: int, size: int = cases.SIZE
 ) -> tuple[Callable[[], None], Callable[[], np.ndarray], str]:
     """Set up VTK's surface LIC of the ball.
 
@@ -81,6 +72,7 @@ def vtk_renderer(
     name : str
         Name of the renderer that the driver reports.
     """
+    vtk = peer("vtk")
     from vtk.util.numpy_support import vtk_to_numpy
 
     mapper = vtk.vtkSurfaceLICMapper()
@@ -88,7 +80,7 @@ def vtk_renderer(
     mapper.SetInputArrayToProcess(0, 0, 0, vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS, "field")
     settings = mapper.GetLICInterface()
     settings.SetNumberOfSteps(LOOK.length)
-    settings.SetStepSize(LOOK.step)
+    settings.SetStepSize(1.0)
     settings.EnhancedLICOff()  # a second pass, which would double its samples
     actor = vtk.vtkActor()
     actor.SetMapper(mapper)
@@ -100,14 +92,7 @@ def vtk_renderer(
     window.SetMultiSamples(0)
     window.SetSize(size, size)
     window.AddRenderer(scene)
-    rosy_camera = cases.camera()
-    eye = -rosy_camera.view[:3, :3].T @ rosy_camera.view[:3, 3]
-    camera = scene.GetActiveCamera()
-    camera.SetPosition(*eye)
-    camera.SetFocalPoint(0, 0, 0)
-    camera.SetViewUp(0, 0, 1)
-    camera.SetViewAngle(np.degrees(2 * np.arctan(1 / rosy_camera.projection[1, 1])))
-    scene.ResetCameraClippingRange()
+    camera = _set_camera(scene)
     pixels = vtk.vtkUnsignedCharArray()
 
     def draw_next() -> None:
@@ -116,14 +101,25 @@ def vtk_renderer(
         window.WaitForCompletion()
 
     def read_pixels() -> np.ndarray:
-        last = size - 1
-        window.GetPixelData(0, 0, last, last, 0, pixels, 0)
+        window.GetPixelData(0, 0, size - 1, size - 1, 0, pixels, 0)
         return vtk_to_numpy(pixels)
 
     draw_next()
     lines = window.ReportCapabilities().splitlines()
     names = [line.split(":", 1)[1].strip() for line in lines if "renderer string" in line]
     return draw_next, read_pixels, names[0] if names else window.GetClassName()
+
+
+def _set_camera(scene: Any) -> Any:
+    """Place VTK's camera as that of `cases`, and return it."""
+    rosy_camera = cases.camera()
+    camera = scene.GetActiveCamera()
+    camera.SetPosition(*(-rosy_camera.view[:3, :3].T @ rosy_camera.view[:3, 3]))
+    camera.SetFocalPoint(0, 0, 0)
+    camera.SetViewUp(0, 0, 1)
+    camera.SetViewAngle(np.degrees(2 * np.arctan(1 / rosy_camera.projection[1, 1])))
+    scene.ResetCameraClippingRange()
+    return camera
 
 
 def _poly_data(vtk: Any, triangles: int) -> Any:
@@ -149,4 +145,4 @@ def _poly_data(vtk: Any, triangles: int) -> Any:
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

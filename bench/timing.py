@@ -1,17 +1,19 @@
-"""Ratios of alternating timings, which the load of the machine affects equally; command line."""
+"""Ratios of alternating timings, which the load of the machine affects equally; command line of a benchmark."""
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import importlib.metadata
 import json
 import os
 import platform
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,98 +21,85 @@ import numpy as np
 RUNS = 7
 
 
-@dataclass(frozen=True)
-class Case:
-    """One line of a benchmark: the ratio of two times or amounts.
+class Bench:
+    """Measures cases, prints each, and keeps them.
 
     Attributes
     ----------
-    name : str
-    ratio : float
-        Median over the runs of the first time over the second, which are measured in turn.
-    low, high : float
-        The smallest and the largest ratio.
-    target : float or None
-        Required ratio.
-    higher_is_better : bool
-    amounts : tuple of float
-        Medians of the two times or amounts, for reference.
-    unit : str
-        Unit of the amounts.
-    """
-
-    name: str
-    ratio: float
-    low: float
-    high: float
-    target: float | None
-    higher_is_better: bool
-    amounts: tuple[float, float]
-    unit: str = "ms"
-
-    @property
-    def reached(self) -> bool:
-        """Whether the ratio reaches its target."""
-        if self.target is None:
-            return True
-        return self.ratio >= self.target if self.higher_is_better else self.ratio <= self.target
-
-    def line(self) -> str:
-        """Format the case for printing."""
-        verdict = ""
-        if self.target is not None:
-            sign = "at least" if self.higher_is_better else "at most"
-            verdict = f"  {sign} {self.target:g}: {'yes' if self.reached else 'NO'}"
-        spread = f"({self.low:.2f} to {self.high:.2f})"
-        amounts = " / ".join(f"{amount:.4g}" for amount in self.amounts)
-        return f"{self.name:62} {self.ratio:6.2f} {spread:17} {amounts} {self.unit}{verdict}"
-
-    def entry(self) -> dict[str, object]:
-        """Return the case as an object for JSON."""
-        return asdict(self)
-
-
-def compare(
-    name: str,
-    one: Callable[[], object],
-    other: Callable[[], object],
-    *,
-    target: float | None = None,
-    higher_is_better: bool = True,
-    runs: int = RUNS,
-    cold: bool = False,
-) -> Case:
-    """Time two functions in turn, after each has run once.
-
-    Parameters
-    ----------
-    name : str
-    one, other : function
-        The ratio is the time of `one` over that of `other`.
-    target : float, optional
-    higher_is_better : bool
     runs : int
-        Runs of each function, not counting the first.
-    cold : bool
-        Time the first run of `one` as well, because it is slow and leaves no cached results.
+        Runs of each function.
+    cases : list of dict
+        Ratios of two times or amounts: `name`; `ratio`, the median over the runs, with `low` and `high`; the
+        required ratio, `target`, the least one if `higher_is_better`; the medians of both `amounts`, with
+        their `unit`; and the `machine`.
     """
-    if not cold:
-        one()
-    other()
-    times = np.array([(_seconds(one), _seconds(other)) for _ in range(runs)])
-    ratios = times[:, 0] / times[:, 1]
-    first, second = np.median(times, axis=0) * 1e3
-    case = Case(
-        name=name,
-        ratio=float(np.median(ratios)),
-        low=float(ratios.min()),
-        high=float(ratios.max()),
-        target=target,
-        higher_is_better=higher_is_better,
-        amounts=(float(first), float(second)),
-    )
-    print(case.line(), flush=True)
-    return case
+
+    def __init__(self, runs: int = RUNS) -> None:
+        self.runs = runs
+        self.cases: list[dict[str, Any]] = []
+
+    def compare(
+        self,
+        name: str,
+        one: Callable[[], object],
+        other: Callable[[], object],
+        *,
+        at_least: float | None = None,
+        at_most: float | None = None,
+        runs: int | None = None,
+        cold: bool = False,
+    ) -> dict[str, Any]:
+        """Time two functions in turn, after each has run once, and return the case.
+
+        Parameters
+        ----------
+        name : str
+        one, other : function
+            The ratio is the time of `one` over that of `other`.
+        at_least, at_most : float, optional
+            Required ratio.
+        runs : int, optional
+            Largest number of runs of each function, not counting the first.
+        cold : bool
+            Time the first run of `one` as well, because it is slow and leaves no cached results.
+        """
+        if not cold:
+            one()
+        other()
+        count = min(self.runs, runs or self.runs)
+        times = np.array([(_seconds(one), _seconds(other)) for _ in range(count)])
+        medians = np.median(times, axis=0) * 1e3
+        return self.add(name, times[:, 0] / times[:, 1], medians, "ms", at_least, at_most)
+
+    def add(
+        self,
+        name: str,
+        ratios: np.ndarray | float,
+        amounts: Sequence[float],
+        unit: str,
+        at_least: float | None = None,
+        at_most: float | None = None,
+    ) -> dict[str, Any]:
+        """Print, keep and return a case with the ratios of its runs."""
+        ratio, low, high = map(float, (np.median(ratios), np.min(ratios), np.max(ratios)))
+        first, second = amounts = [float(amount) for amount in amounts]
+        verdict, target = "", at_most if at_least is None else at_least
+        if target is not None:
+            is_reached = ratio <= target if at_least is None else ratio >= target
+            bound = "at most" if at_least is None else "at least"
+            verdict = f"  {bound} {target:g}: {'yes' if is_reached else 'NO'}"
+        spread = f"({low:.2f} to {high:.2f})"
+        print(f"{name:62} {ratio:6.2f} {spread:17} {first:.4g} / {second:.4g} {unit}{verdict}")
+        sys.stdout.flush()
+        case = {"name": name, "ratio": ratio, "low": low, "high": high, "target": target}
+        case |= {"higher_is_better": at_least is not None, "amounts": amounts, "unit": unit}
+        self.cases.append(case | {"machine": machine()})
+        return case
+
+    def write(self, path: Path) -> None:
+        """Write the cases as JSON."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(self.cases, indent=1) + "\n", encoding="utf-8")
 
 
 def _seconds(work: Callable[[], object]) -> float:
@@ -119,11 +108,7 @@ def _seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def main(
-    about: str | None,
-    measure: Callable[[int], Iterable[Case]],
-    arguments: Sequence[str] | None = None,
-) -> int:
+def main(about: str | None, measure: Callable[..., None], **options: dict[str, Any]) -> None:
     """Run a benchmark as a program: print its cases, and write them to a file with --json.
 
     Parameters
@@ -131,28 +116,32 @@ def main(
     about : str
         Text of its help.
     measure : function
-        Takes the number of runs, and returns the cases.
-    arguments : sequence of str, optional
-        By default those of the program.
+        Measures the cases with a `Bench`.
+    **options
+        Further options of the command line, with their settings for argparse. `measure` gets their values.
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the cases to a file")
     parser.add_argument("--runs", type=int, default=RUNS, help="runs per case (%(default)s)")
-    options = parser.parse_args(arguments)
+    for name, settings in options.items():
+        parser.add_argument(f"--{name}", **settings)
+    values = vars(parser.parse_args())
+    path, bench = values.pop("json"), Bench(values.pop("runs"))
     print(machine(), flush=True)
-    cases = list(measure(options.runs))
-    if options.json:
-        write(options.json, [case.entry() for case in cases])
-    return 0
+    measure(bench, **values)
+    if path:
+        bench.write(path)
 
 
-def write(path: Path, entries: Sequence[dict[str, object]]) -> None:
-    """Write cases as a list of JSON objects, each with the machine that it was measured on."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    named = [{**entry, "machine": machine()} for entry in entries]
-    path.write_text(json.dumps(named, indent=1) + "\n", encoding="utf-8")
+def peer(module: str) -> Any:
+    """Import what a benchmark needs or compares with; without it, end the program and say so."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        sys.exit(f"skipped, because {module} is not installed")
 
 
+@cache
 def machine() -> str:
     """Describe the machine: processor, cores, threads in use, versions."""
     versions = [f"Python {platform.python_version()}"]
@@ -165,27 +154,20 @@ def machine() -> str:
     return f"{_processor()}, {cores}, {platform.system()}, {', '.join(versions)}"
 
 
-def use_one_core() -> None:
-    """Limit this process to one core, so that the threads of libraries have no advantage."""
-    use_cores(1)
-
-
 def use_cores(count: int) -> None:
-    """Limit this process, and those that it starts, to a number of cores."""
+    """Limit this process, and those that it starts, to a number of cores.
+
+    Call it before VTK is imported: Mesa's llvmpipe then uses as many threads.
+    """
+    os.environ["LP_NUM_THREADS"] = str(count) if count > 1 else "0"
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, set(sorted(os.sched_getaffinity(0))[:count]))
     else:
-        print(
-            "this system cannot limit a process to some cores: peers may use more", file=sys.stderr
-        )
+        print("this system cannot limit a process to some cores: peers may use more")
 
 
 def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [
-                line.split(":", 1)[1].strip() for line in file if line.startswith("model name")
-            ]
-    except OSError:
-        names = []
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text(encoding="utf-8").splitlines() if cpuinfo.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     return names[0] if names else platform.processor() or platform.machine()

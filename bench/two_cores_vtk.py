@@ -5,9 +5,6 @@ As in `surface_vtk`, but RoSy draws with two processes, and VTK's driver with tw
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,22 +14,15 @@ from rosy_addon.rendering.view_input import ViewInput
 
 from . import cases
 from .surface_vtk import AZIMUTH_STEP, DEGREE, LARGE_SIZE, LOOK, SAMPLES_LABEL, vtk_renderer
-from .timing import Case, compare, main, use_cores
+from .timing import Bench, main, use_cores
 
 TRIANGLES, SAMPLES, CORES = 12_000, 2, 2
 
 
-def measure(runs: int) -> Iterator[Case]:
+def measure(bench: Bench) -> None:
     """Time the large frame."""
     use_cores(CORES)
-    # Set before the library is loaded: llvmpipe counts the cores of the machine, not of the process.
-    os.environ["LP_NUM_THREADS"] = str(CORES)
-    try:
-        import vtk
-    except ImportError:
-        print("two cores of VTK: skipped, because vtk is not installed", file=sys.stderr)
-        return
-    draw_next, read_pixels, name = vtk_renderer(vtk, TRIANGLES, LARGE_SIZE)
+    draw_next, read_pixels, name = vtk_renderer(TRIANGLES, LARGE_SIZE)
     print(name, flush=True)
     look = replace(LOOK, supersampling=SAMPLES)
     instances = (cases.instance(TRIANGLES, DEGREE),)
@@ -42,15 +32,13 @@ def measure(runs: int) -> Iterator[Case]:
         view = ViewInput(instances, cases.camera(LARGE_SIZE, azimuth=next(azimuths)), look)
         draw_picture(view, cases.CORNER_FIELDS, keep_gbuffers=False, workers=CORES)
 
-    yield compare(
+    bench.compare(
         f"N = 4{SAMPLES_LABEL[SAMPLES]} / VTK's one vector field, frame, two cores each",
         draw,
         lambda: (draw_next(), read_pixels()),
-        target=0.8,
-        higher_is_better=False,
-        runs=runs,
+        at_most=0.8,
     )
 
 
 if __name__ == "__main__":
-    sys.exit(main(__doc__, measure))
+    main(__doc__, measure)

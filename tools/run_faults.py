@@ -79,24 +79,17 @@ def copy_tree(folder: Path) -> Path:
 def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
     """Run the tests of a fault in a copy; return the exit status and the last line of output."""
     python = str(copy / PYTHON[fault.lane] / "bin/python")
-    command = [python, "-m", "pytest", "-x", "-p", "no:cacheprovider", *fault.tests]
-    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    options = {"cwd": copy, "env": environment, "capture_output": True, "text": True}
+    options = {"cwd": copy, "capture_output": True, "text": True, "timeout": TIME_LIMIT}
+    options["env"] = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+    command = [python, "-m", "pytest", "-x", "-p", "no:cacheprovider"]
     try:
         if fault.lane == "blender":
             shutil.rmtree(copy / "dist", ignore_errors=True)
             subprocess.run([python, "tools/build_zip.py", "dist"], check=True, **options)
             (zip_path,) = (copy / "dist").glob("*.zip")
-            lane_command = [
-                sys.executable,
-                "tests/blender/run.py",
-                "stable",
-                str(zip_path),
-                "--windows",
-                "none",
-            ]
-            command = [*lane_command, *fault.tests]
-        completed = subprocess.run(command, check=False, timeout=TIME_LIMIT, **options)
+            command = [sys.executable, "tests/blender/run.py", "stable", str(zip_path)]
+            command += ["--windows", "none"]
+        completed = subprocess.run([*command, *fault.tests], check=False, **options)
     except subprocess.TimeoutExpired:
         return -1, f"stopped after {TIME_LIMIT} s"
     except subprocess.CalledProcessError as error:
@@ -107,29 +100,24 @@ def run_tests(fault: Fault, copy: Path) -> tuple[int, str]:
 
 def try_fault(fault: Fault, copies: queue.Queue[Path], baseline: bool) -> bool:
     """Run the tests of a fault, print a line, and return whether the outcome is as expected."""
-    copy = copies.get()
-    start = time.monotonic()
-    path = copy / fault.file
-    original, broken = path.read_bytes() if path.is_file() else b"", broken_text(fault, copy)
-    succeeded, verdict, message = (
-        False,
-        "does not apply",
-        f"`find` is not in {fault.file} exactly once",
-    )
-    try:
-        if broken is not None and baseline:
+    copy, start, succeeded = copies.get(), time.monotonic(), False
+    path, broken = copy / fault.file, broken_text(fault, copy)
+    verdict, message = "does not apply", f"`find` is not in {fault.file} exactly once"
+    if broken is not None:
+        original = path.read_bytes()
+        try:
+            if not baseline:
+                path.write_text(broken, encoding="utf-8")
             status, message = run_tests(fault, copy)
+        finally:
+            path.write_bytes(original)
+        if baseline:
             succeeded = status == 0 and "passed" in message and "skipped" not in message
             verdict = "passes" if succeeded else "DOES NOT PASS"
-        elif broken is not None:
-            path.write_text(broken, encoding="utf-8")
-            status, message = run_tests(fault, copy)
+        else:
             succeeded = status == TESTS_FAILED and "failed" in message
             verdict = "caught" if succeeded else "MISSED"
-    finally:
-        if broken is not None:
-            path.write_bytes(original)
-        copies.put(copy)
+    copies.put(copy)
     print(f"{verdict:14} {fault.name:36} {time.monotonic() - start:6.1f} s  {message}", flush=True)
     return succeeded
 
@@ -143,16 +131,14 @@ def main() -> int:
     mode.add_argument("--baseline", action="store_true", help="the tests pass without the faults")
     mode.add_argument("--check", action="store_true", help="only check that each fault applies")
     options = parser.parse_args()
-    faults = read_faults()
-    if unknown := set(options.names) - {fault.name for fault in faults}:
+    faults = {fault.name: fault for fault in read_faults()}
+    if unknown := set(options.names) - set(faults):
         parser.error(f"no fault is named {', '.join(sorted(unknown))}")
-    faults = [fault for fault in faults if not options.names or fault.name in options.names]
+    chosen = [faults[name] for name in options.names or faults]
     if options.check:
-        unmatched = [fault.name for fault in faults if broken_text(fault, ROOT) is None]
+        unmatched = [fault.name for fault in chosen if broken_text(fault, ROOT) is None]
         print(
-            "\n".join(
-                [*(f"does not apply  {name}" for name in unmatched), f"{len(faults)} checked"]
-            )
+            *(f"does not apply  {name}" for name in unmatched), f"{len(chosen)} checked", sep="\n"
         )
         return 1 if unmatched else 0
     with tempfile.TemporaryDirectory(prefix="rosy-faults-") as name:
@@ -160,9 +146,8 @@ def main() -> int:
         for number in range(options.jobs):
             copies.put(copy_tree(Path(name) / str(number)))
         with ThreadPoolExecutor(options.jobs) as pool:
-            succeeded = list(
-                pool.map(lambda fault: try_fault(fault, copies, options.baseline), faults)
-            )
+            tried = pool.map(lambda fault: try_fault(fault, copies, options.baseline), chosen)
+            succeeded = list(tried)
     print(f"{sum(succeeded)} of {len(succeeded)} {'pass' if options.baseline else 'caught'}")
     return 0 if all(succeeded) else 1
 

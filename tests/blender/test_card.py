@@ -1,7 +1,7 @@
 """The graphics card compared with numpy, in this Blender; software OpenGL is enough.
 
 `tests/harness/gpu_parity.py` defines what is measured. `tests/unit/gpu/` compares further looks without
-Blender, and `bench/parity.py` at 512 x 512.
+Blender.
 """
 
 from __future__ import annotations

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image
 from scipy.spatial import cKDTree
 
-from rosy_addon.compositor.look import Look
 from rosy_addon.field.closest_point import closest_triangles
-from rosy_addon.field.combing import BrushStroke, Combing, GuideBrush, start_combing
+from rosy_addon.field.combing import start_combing
 from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
 from rosy_addon.field.guided_system import guided_system
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities
@@ -20,14 +21,14 @@ from rosy_addon.field.surface import Surface
 from rosy_addon.preset_files.store import load_preset
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.visible_vertices import project_vertices
+from rosy_addon.rendering.draw import draw_picture
+from rosy_addon.rendering.view_input import ViewInput
 
-from .fields_page import dotted_picture
-from .page import ROOT
+from .page import IMAGES
 from .shapes import sphere, suzanne, torus
 from .sheet import Panel, display, save, sheet
+from .sheets import INK, with_line
 from .solid import compose_view, curve_through, points_on_surface, view
-
-IMAGES = ROOT / "docs" / "images"
 
 DEGREE, WIDE, FILM, SIDE = 2, 394, 320, 256
 ANGLES, BALL_ANGLES, RING_ANGLES = (-26, 8), (-26, 30), (20, 40)
@@ -40,7 +41,9 @@ STROKES = (
     ((0.36, 0.45), (0.50, 0.54), (0.64, 0.59)),
     ((0.66, 0.62), (0.665, 0.75), (0.64, 0.88)),
 )
-INK, RADIUS = (214, 84, 20), 0.14
+
+#: Radius of the brush.
+RADIUS = 0.14
 
 #: Singularities on a torus, as fractions of the picture from the top left, and their indices.
 RING_PLACES = ((0.20, 0.58), (0.38, 0.68), (0.64, 0.66), (0.80, 0.55))
@@ -62,49 +65,64 @@ PIECES, MILLISECONDS = 5, 150
 def write() -> None:
     """Draw and save all pictures."""
     head = suzanne()
-    look = load_preset("engraving").look
     frames = list(_combed(head))
-    first, last = frames[0][0], frames[-1][0]
     panels = [
-        Panel(_picture(head, first, look, WIDE), "Smoothest"),
-        Panel(_picture(head, last, look, WIDE), "Combed with five strokes"),
+        Panel(_picture(head, frames[0][0], ANGLES, WIDE), "Smoothest"),
+        Panel(_picture(head, frames[-1][0], ANGLES, WIDE), "Combed with five strokes"),
     ]
     save(sheet([panels]), IMAGES / "editing-comb.png")
     save(sheet(_out_of_sight()), IMAGES / "editing-singularities.png")
-    pictures = [_with_strokes(_picture(head, field, look, FILM), lines) for field, lines in frames]
-    film = [Image.fromarray(picture).quantize(16, dither=Image.Dither.NONE) for picture in pictures]
-    film[0].save(
-        IMAGES / "editing-comb.gif",
-        save_all=True,
-        append_images=film[1:],
-        duration=[8 * MILLISECONDS, *[MILLISECONDS] * (len(film) - 2), 15 * MILLISECONDS],
-        loop=0,
-    )
+    film = []
+    for field, lines in frames:
+        picture = _picture(head, field, ANGLES, FILM)
+        for line in lines:
+            picture = with_line(picture, line, 4, INK) if len(line) > 1 else picture
+        film.append(Image.fromarray(picture).quantize(16, dither=Image.Dither.NONE))
+    durations = [8 * MILLISECONDS, *[MILLISECONDS] * (len(film) - 2), 15 * MILLISECONDS]
+    options = {"save_all": True, "append_images": film[1:], "duration": durations, "loop": 0}
+    film[0].save(IMAGES / "editing-comb.gif", **options)
+
+
+def _picture(
+    surface: Surface, field: RosyField, angles: tuple[float, float], side: int, **settings: object
+) -> np.ndarray:
+    """Return an engraving; with `settings`, one as users draw it."""
+    look = load_preset("engraving").look
+    instance = MeshInstance(surface, np.eye(4), field)
+    if settings:
+        view_input = ViewInput((instance,), view(surface, angles, (side, side), 1), look)
+        return display(draw_picture(replace(view_input, look=replace(look, **settings))).rgba)
+    camera = view(surface, angles, (side, side), look.supersampling)
+    return display(compose_view(surface, field, look, camera).rgba)
 
 
 def _out_of_sight() -> list[list[Panel]]:
     """Draw a sphere, a torus and a head before and after their singularities were moved."""
     ball, ring, head = sphere(), torus(), suzanne()
+    ball_field, head_field = generate(ball, "smoothest", 4), generate(head, "smoothest", DEGREE)
+    drawn = (
+        (ball, BALL_ANGLES, ball_field, _moved_out_of_sight(ball, ball_field, BALL_ANGLES)),
+        (ring, RING_ANGLES, *_two_pairs(ring)),
+        (head, ANGLES, head_field, _moved_out_of_sight(head, head_field, ANGLES)),
+    )
+    rows: list[list[Panel]] = [[], []]
+    for (surface, angles, *fields), texts in zip(drawn, OUT_OF_SIGHT_TEXTS, strict=True):
+        for row, field, text in zip(rows, fields, texts, strict=True):
+            picture = _picture(surface, field, angles, SIDE, singularity_dots="visible")
+            row.append(Panel(picture, text))
+    return rows
+
+
+def _two_pairs(ring: Surface) -> tuple[RosyField, RosyField]:
+    """Return a field with two pairs of opposite singularities, and one in which each pair is merged."""
     camera = view(ring, RING_ANGLES, (SIDE, SIDE), 2)
     places = points_on_surface(ring, camera, np.array(RING_PLACES))
     vertex = cKDTree(ring.vertices).query(places)[1]
     settings = GeneratorSettings("prescribed", singularities=(vertex, np.array(RING_INDEX)))
-    ring_field = generate(ring, settings, 4)
-    merged = ring_field
+    field = merged = generate(ring, settings, 4)
     for source, target in vertex.reshape(-1, 2):
         merged = move_index(ring, merged, int(source), int(target), reach=ring.extent)
-    ball_field, head_field = generate(ball, "smoothest", 4), generate(head, "smoothest", DEGREE)
-    drawn = (
-        (ball, BALL_ANGLES, ball_field, _moved_out_of_sight(ball, ball_field, BALL_ANGLES)),
-        (ring, RING_ANGLES, ring_field, merged),
-        (head, ANGLES, head_field, _moved_out_of_sight(head, head_field, ANGLES)),
-    )
-    look = load_preset("engraving").look
-    before, after = [], []
-    for (surface, angles, field, moved), texts in zip(drawn, OUT_OF_SIGHT_TEXTS, strict=True):
-        for row, shown, text in ((before, field, texts[0]), (after, moved, texts[1])):
-            row.append(Panel(dotted_picture(surface, shown, look, angles, SIDE), text))
-    return [before, after]
+    return field, merged
 
 
 def _moved_out_of_sight(
@@ -148,29 +166,8 @@ def _combed(head: Surface) -> Iterator[tuple[RosyField, list[np.ndarray]]]:
             points = points_on_surface(head, view(head, ANGLES, (WIDE, WIDE), 2), curve[piece])
             combing.follow(stroke.extend(points, np.ones(len(points))))
             lines[-1] = curve[: piece[-1] + 1]
-            yield _field(combing), list(lines)
+            yield RosyField(DEGREE, combing.vectors), list(lines)
         combing.follow(stroke.finish())
         combing.settle()
-        yield _field(combing), list(lines)
-    yield _field(combing), []
-
-
-def _field(combing: Combing) -> RosyField:
-    return RosyField(DEGREE, combing.vectors)
-
-
-def _picture(head: Surface, field: RosyField, look: Look, side: int) -> np.ndarray:
-    camera = view(head, ANGLES, (side, side), look.supersampling)
-    return display(compose_view(head, field, look, camera).rgba)
-
-
-def _with_strokes(picture: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
-    """Draw strokes, in fractions of the picture."""
-    image = Image.fromarray(picture)
-    pen = ImageDraw.Draw(image)
-    for line in lines:
-        if len(line) > 1:
-            pen.line(
-                [tuple(point) for point in (line * FILM).tolist()], fill=INK, width=4, joint="curve"
-            )
-    return np.asarray(image)
+        yield RosyField(DEGREE, combing.vectors), list(lines)
+    yield RosyField(DEGREE, combing.vectors), []

@@ -6,161 +6,124 @@ import numpy as np
 from scipy import ndimage
 
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import find_singularities
 from tests.harness.planar import DegreeLayer
+from tests.harness.streaks import correlation, local_correlation, orientation_spectrum, peaks
 
 from .looks import RED, SOLID
-from .measure import correlation, local_correlation, orientation_spectrum, peaks
-from .page import Page, listed
+from .page import fill_tables, listed, picture
 from .shapes import plane, sphere
 from .sheet import Panel, display, magnified, outlined
 from .solid import compose_view, frame_of, harmonic_field, layer_in_view, view
 
-SIZE = 402
-TILTS, TILTED_SIZE = (0, 60, 78), 262
-MEMBER = np.radians(30)
+SIZE, TILTED_SIZE = 402, 262
 
-#: View angles at which a corner of the cube is in the center.
+#: Tilts of the plane in degrees, and the angle of a member on it.
+TILTS, MEMBER = (0, 60, 78), np.radians(30)
+
+#: Azimuth and elevation from which a corner of the cube is in the center.
 VIEW = (45, 35)
-_FIXED = SOLID.with_settings({"gain": 3.0})
+
 #: Side of the closeup, its magnification, and its distance from the silhouette.
 CLOSEUP, TIMES, MARGIN = 52, 5, 28
+
+#: Samples of a pixel in each direction.
+SAMPLES = SOLID.supersampling
+
+#: Looks of the sphere, by the choice of members.
 LOOKS = {
-    "off": _FIXED.with_settings({"view_plane": False}),
-    "on": _FIXED,
-    "brute": _FIXED.with_settings({"method": "brute"}),
+    "among projections": SOLID.with_settings({"gain": 3.0, "view_plane": False}),
+    "in the view plane": SOLID.with_settings({"gain": 3.0}),
+    "brute force": SOLID.with_settings({"gain": 3.0, "method": "brute"}),
 }
-NAMES = {"off": "among projections", "on": "in the view plane", "brute": "brute force"}
 
 
 def write() -> None:
-    """Draw and write the page."""
-    page = Page("figure-07", "Members on tilted surfaces")
-    _write_plane(page)
-    _write_sphere(page)
-    page.write("Figures 7 and 8")
+    """Draw the pictures and measure the tables."""
+    fill_tables("figure-07", _tilted_planes(), _sphere())
 
 
-def _write_plane(page: Page) -> None:
-    page.text(
-        """This page shows how members look on tilted surfaces. The first field is a constant 4-RoSy
-        field on a plane. If the plane is parallel to the view, the members are at right angles in
-        the picture too. The more the plane is tilted, the more they deviate from right angles."""
-    )
+def _tilted_planes() -> list[list[str]]:
+    """Draw a 4-RoSy field on a plane at several tilts, and compare members with the spectrum."""
     surface = plane()
     member = [np.cos(MEMBER), np.sin(MEMBER), 0.0]
     field = RosyField(4, np.tile(member, (surface.face_count, 1)))
     look = SOLID.with_settings({"shading": 0.0})
+    side = SAMPLES * TILTED_SIZE
     panels, rows = [], []
     for tilt in TILTS:
-        camera = view(surface, (0, 90 - tilt), (TILTED_SIZE,) * 2, look.supersampling, False)
-        picture = compose_view(surface, field, look, camera)
-        panels.append(Panel(display(picture.rgba), f"tilted by {tilt}°"))
-        layers = layer_in_view(surface, field, look, camera)
-        side = look.supersampling * TILTED_SIZE
-        tone = frame_of(layers.tone[:, 0], layers.pixel, (side, side))
-        half_size = 0.45 * side * np.array([np.cos(np.radians(tilt)), 1.0])
-        down, across = np.rint(half_size).astype(int)
+        camera = view(surface, (0, 90 - tilt), (TILTED_SIZE,) * 2, SAMPLES, False)
+        shown = compose_view(surface, field, look, camera)
+        panels.append(Panel(display(shown.rgba), f"tilted by {tilt}°"))
+        layer = layer_in_view(surface, field, look, camera)
+        tone = frame_of(layer.tone[:, 0], layer.pixel, (side, side))
+        foreshortening = np.cos(np.radians(tilt))
+        down, across = np.rint(0.45 * side * np.array([foreshortening, 1.0])).astype(int)
         middle = side // 2
         patch = tone[middle - down : middle + down, middle - across : middle + across]
         # Drawn at twice the size: each pixel is the mean of 2 x 2.
-        measured = peaks(orientation_spectrum(_downsampled(patch), 720))
+        height, width = (length // 2 for length in patch.shape)
+        patch = patch[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))
         angles = MEMBER + np.array([0, np.pi / 2])
-        expected = np.degrees(np.arctan2(np.sin(angles) * np.cos(np.radians(tilt)), np.cos(angles)))
-        expected = sorted(expected % 180)
-        rows.append([f"{tilt}°", listed(expected), listed(measured)])
-    page.picture([panels], "A 4-RoSy field on a plane at three tilts", "plane")
-    page.text(
-        """The table lists the orientations of the projected members, and the peaks of the
-        orientation spectrum of the picture, in degrees."""
-    )
-    page.table(["Tilt", "Projected members", "Measured in the picture"], rows)
+        expected = np.degrees(np.arctan2(np.sin(angles) * foreshortening, np.cos(angles))) % 180
+        measured = peaks(orientation_spectrum(patch, 720))
+        rows.append([f"{tilt}°", listed(sorted(expected)), listed(measured)])
+    picture("figure-07-plane", panels)
+    return rows
 
 
-def _write_sphere(page: Page) -> None:
+def _sphere() -> list[list[object]]:
+    """Draw the field of a cube on a sphere, and correlate both choices of members with brute force."""
     surface = sphere(64)
     field = harmonic_field(surface, 4, np.eye(3))
-    _, index = find_singularities(surface, field)
-    page.text("## Choosing members in the view plane")
-    page.text(
-        f"""The second field is a 4-RoSy field on a sphere with the symmetry of a cube: {len(index)}
-        singularities of index +1/4 at the corners. On the left, members are chosen among their
-        projections, as in the plane. Where the surface turns away, the lines at which the two sets
-        of images break come close to each other. The weights do not account for this, and streaks
-        break. On the right, the members are first rotated into the view plane, where they are at
-        equal angles, and rotated back after the choice. No streak breaks."""
-    )
-    camera = view(surface, VIEW, (SIZE, SIZE), SOLID.supersampling)
-    pictures = {name: compose_view(surface, field, look, camera) for name, look in LOOKS.items()}
+    camera = view(surface, VIEW, (SIZE, SIZE), SAMPLES)
     layers = {name: layer_in_view(surface, field, look, camera) for name, look in LOOKS.items()}
-    tones = {name: _frame(layer, 0) for name, layer in layers.items()}
-    covered_weight = _frame(layers["on"], None)
-    local_correlations = {
-        name: local_correlation(
-            tones[name], tones["brute"], covered_weight, 3.0 * SOLID.supersampling
-        )
-        for name in ("off", "on")
+    shown = {
+        name: display(compose_view(surface, field, look, camera).rgba)
+        for name, look in LOOKS.items()
     }
-    left, top, right, bottom = box = _worst_box(
-        local_correlations["on"] - local_correlations["off"], covered_weight
-    )
-    displayed = {name: display(picture.rgba) for name, picture in pictures.items()}
+    among, in_plane, brute = LOOKS
+    tones = {name: _frame(layer, layer.images.blend[:, 0]) for name, layer in layers.items()}
+    covered = _frame(layers[in_plane], 1.0)
+    local = {
+        name: local_correlation(tones[name], tones[brute], covered, 3.0 * SAMPLES)
+        for name in (among, in_plane)
+    }
+    left, top, right, bottom = box = _worst_box(local[in_plane] - local[among], covered)
     spheres = [
-        Panel(outlined(displayed[name], box, RED), f"members chosen {NAMES[name]}")
-        for name in ("off", "on")
+        Panel(outlined(shown[name], box, RED), f"members chosen {name}")
+        for name in (among, in_plane)
     ]
-    page.picture([spheres], "A sphere with the field of a cube, drawn with both methods", "sphere")
+    picture("figure-07-sphere", spheres)
     closeups = [
-        Panel(magnified(displayed[name][top:bottom, left:right], TIMES), f"{label}, {TIMES} times")
-        for name, label in NAMES.items()
+        Panel(magnified(shown[name][top:bottom, left:right], TIMES), f"{name}, {TIMES} times")
+        for name in LOOKS
     ]
-    page.picture([closeups], "Closeups of the marked square, and brute force", "closeup")
-    page.text(
-        """The table lists the correlation with brute force over the sphere and in the marked
-        square. It also lists the local correlation around each pixel (Gaussian window with a
-        standard deviation of 3 pixels): its 1st percentile, and the part of the sphere where it is
-        below 0.9."""
-    )
-    covered, square = covered_weight > 0, np.zeros(covered_weight.shape, dtype=bool)
-    square[_subpixels(SIZE - bottom, SIZE - top), _subpixels(left, right)] = True
-    rows = []
-    for name, local in local_correlations.items():
-        row = [NAMES[name]]
-        row += [correlation(tones[name][part], tones["brute"][part]) for part in (covered, square)]
-        local = local[covered]
-        row += [float(np.nanquantile(local, 0.01)), f"{100 * np.mean(local < 0.9):.2f} %"]
-        rows.append(row)
-    page.table(
-        ["Members chosen", "Whole sphere", "Marked square", "1st percentile", "Below 0.9"], rows
-    )
+    picture("figure-07-closeup", closeups)
+    square = np.zeros(covered.shape, dtype=bool)
+    rows, columns = np.array([[SIZE - bottom, SIZE - top], [left, right]]) * SAMPLES
+    square[slice(*rows), slice(*columns)] = True
+    table: list[list[object]] = []
+    for name, values in local.items():
+        whole, part = (
+            correlation(tones[name][mask], tones[brute][mask]) for mask in (covered > 0, square)
+        )
+        values = values[covered > 0]
+        below = f"{100 * np.mean(values < 0.9):.2f} %"
+        table.append([name, whole, part, float(np.nanquantile(values, 0.01)), below])
+    return table
 
 
-def _frame(layers: DegreeLayer, channel: int | None) -> np.ndarray:
-    """Return (H, W): one channel of the uncorrected blend, or 1 at covered pixels if it is None."""
-    values = 1.0 if channel is None else layers.images.blend[:, channel]
-    return frame_of(values, layers.pixel, (SIZE * SOLID.supersampling,) * 2)
+def _frame(layer: DegreeLayer, values: np.ndarray | float) -> np.ndarray:
+    """Return (H, W) values of the pixels of a layer, 0 elsewhere."""
+    return frame_of(values, layer.pixel, (SIZE * SAMPLES,) * 2)
 
 
-def _subpixels(start: int, stop: int) -> slice:
-    """Convert pixels of the finished picture to pixels of the supersampled one."""
-    return slice(start * SOLID.supersampling, stop * SOLID.supersampling)
-
-
-def _worst_box(
-    improvement: np.ndarray, covered_weight: np.ndarray, side: int = CLOSEUP
-) -> tuple[int, int, int, int]:
+def _worst_box(improvement: np.ndarray, covered: np.ndarray) -> tuple[int, int, int, int]:
     """Return the box (left, top, right, bottom) of the picture where the correlation improves most."""
-    supersampling = SOLID.supersampling
-    inside = ndimage.binary_erosion(covered_weight > 0, iterations=supersampling * MARGIN)
-    mean_improvement = ndimage.uniform_filter(
-        np.where(inside, np.nan_to_num(improvement), 0), supersampling * side
-    )
-    row, column = np.unravel_index(np.argmax(mean_improvement), mean_improvement.shape)
-    left = int(np.clip(column // supersampling - side // 2, 0, SIZE - side))
-    top = int(np.clip(SIZE - 1 - row // supersampling - side // 2, 0, SIZE - side))
-    return left, top, left + side, top + side
-
-
-def _downsampled(patch: np.ndarray) -> np.ndarray:
-    height, width = (side // 2 for side in patch.shape)
-    return patch[: 2 * height, : 2 * width].reshape(height, 2, width, 2).mean(axis=(1, 3))
+    inside = ndimage.binary_erosion(covered > 0, iterations=SAMPLES * MARGIN)
+    improvement = np.where(inside, np.nan_to_num(improvement), 0)
+    mean = ndimage.uniform_filter(improvement, SAMPLES * CLOSEUP)
+    row, column = np.unravel_index(np.argmax(mean), mean.shape)
+    left = int(np.clip(column // SAMPLES - CLOSEUP // 2, 0, SIZE - CLOSEUP))
+    top = int(np.clip(SIZE - 1 - row // SAMPLES - CLOSEUP // 2, 0, SIZE - CLOSEUP))
+    return left, top, left + CLOSEUP, top + CLOSEUP

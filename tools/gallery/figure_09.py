@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from scipy.stats import spearmanr
 
+from rosy_addon.compositor.look import Look
+from tests.harness.streaks import persistence
+
 from .looks import MEASURED, PLANE
-from .measure import persistence
-from .page import Page
+from .page import fill_tables, picture
 from .plane import compose_field, draw_field, points
 from .sheet import Panel
 
 DEGREE, SIZE = 4, 400
+
 #: With few bright cells, the shortest streaks would be dots, so half of the cells are bright.
 LOOK = PLANE.with_settings({"density": 0.5, "gain": 2.5})
+
+#: Ways to show the magnitude: label of the picture, label of the table, and settings.
+WAYS = (
+    ("magnitude not shown", "not shown", {"magnitude": "none"}),
+    ("as color", "color", {"magnitude": "color"}),
+    ("as length of the streaks", "length", {"magnitude": "length"}),
+    ("as both", "both", {"magnitude": "both"}),
+)
+
 #: Zeros of the field: positions in pixels from the center, and signs of their indices.
 ZEROS = ((-95 + 70j, 1), (80 + 95j, -1), (20 - 20j, 1), (-70 - 110j, -1), (120 - 90j, 1))
+
 #: Distance from a zero in pixels at which the field reaches most of its magnitude.
 REACH = 90.0
+
+#: Ranges of the magnitude, relative to the largest.
+EDGES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def field(p: np.ndarray) -> np.ndarray:
@@ -32,93 +47,43 @@ def field(p: np.ndarray) -> np.ndarray:
     return z
 
 
-#: The settings with which the magnitude is shown, by the names of the panels.
-MAPPINGS: dict[str, dict[str, Any]] = {
-    "not shown": {},
-    "color": {"hue": "magnitude"},
-    "length": {"magnitude_length": True},
-    "both": {"hue": "magnitude", "magnitude_length": True},
-}
-
-
 def write() -> None:
-    """Draw and write the page."""
-    page = Page("figure-09", "Magnitude")
-    page.text(
-        """This page shows how RoSy can display the magnitude of a field. The field is a 4-RoSy
-        field with five singularities, where its magnitude is zero. In (a), the magnitude is not
-        shown. It can be mapped to color (b), to the length of the streaks (c), or to both (d).
-        Short streaks are means of few samples and would have too much contrast, so their contrast
-        is reduced."""
-    )
-    labels = (
-        "(a) magnitude not shown",
-        "(b) as color",
-        "(c) as length of the streaks",
-        "(d) as both",
-    )
-    panels = [
-        Panel(draw_field(field, DEGREE, SIZE, LOOK.with_settings(settings)), label)
-        for label, settings in zip(labels, MAPPINGS.values(), strict=True)
-    ]
-    page.picture([panels[:2], panels[2:]], "The magnitude of a 4-RoSy field shown in three ways")
-    _measure(page)
-    page.write("Figure 9")
-
-
-def _measure(page: Page) -> None:
-    page.text("## Measurements")
+    """Draw the picture and measure the table."""
     z = field(points(SIZE))
-    rho = np.abs(z) / np.abs(z).max()
-    page.text(
-        """The column for luminance lists the rank correlation of the magnitude with the luminance
-        of the picture, averaged over squares of 10 pixels so that single streaks have no effect.
-        The half-length is the distance along a member at which the image of that member has an
-        autocorrelation of one half, by ranges of the magnitude ρ. Near zeros of the field it is
-        shorter even for streaks of full length, because they bend."""
-    )
+    magnitude = np.abs(z) / np.abs(z).max()
+    panels, rows = [], []
+    for letter, (label, name, settings) in zip("abcd", WAYS, strict=True):
+        shown = draw_field(field, DEGREE, SIZE, LOOK.with_settings(settings))
+        panels.append(Panel(shown, f"({letter}) {label}"))
+        look = MEASURED.with_settings(settings)
+        rows.append([name, _rank(look, magnitude), *_half_lengths(look, z, magnitude)])
+    picture("figure-09", panels[:2], panels[2:])
+    fill_tables("figure-09", rows)
+
+
+def _rank(look: Look, magnitude: np.ndarray) -> float:
+    """Return the rank correlation of magnitude and luminance, both averaged over 10 x 10 pixels."""
+    rgba = compose_field(field, DEGREE, SIZE, look).rgba
+    luminance = rgba[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
     cells = (SIZE // 10, 10, SIZE // 10, 10)
-    luminance = {}
-    for mapping, settings in MAPPINGS.items():
-        rgba = compose_field(field, DEGREE, SIZE, MEASURED.with_settings(settings)).rgba
-        luminance[mapping] = rgba[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
-    ranks = {
-        mapping: float(
-            spearmanr(
-                rho.reshape(cells).mean(axis=(1, 3)).ravel(),
-                values.reshape(cells).mean(axis=(1, 3)).ravel(),
-            ).statistic
-        )
-        for mapping, values in luminance.items()
-    }
-    edges = (0.0, 0.25, 0.5, 0.75, 1.0)
-    heads = [f"Half-length, ρ {low:g} to {high:g}" for low, high in pairwise(edges)]
-    rows = [
-        [mapping, ranks[mapping], *_half_lengths(mapping, z, rho, edges)] for mapping in MAPPINGS
-    ]
-    page.table(["Magnitude as", "Luminance", *heads], rows)
+    means = [values.reshape(cells).mean(axis=(1, 3)).ravel() for values in (magnitude, luminance)]
+    return float(spearmanr(*means).statistic)
 
 
-def _half_lengths(
-    mapping: str, z: np.ndarray, rho: np.ndarray, edges: tuple[float, ...]
-) -> list[str]:
+def _half_lengths(look: Look, z: np.ndarray, magnitude: np.ndarray) -> list[str]:
     """Return the distance at which the correlation along streaks has halved, by range of magnitude."""
-    look = MEASURED.with_settings({**MAPPINGS[mapping], "weights": "none"})
+    look = look.with_settings({"weights": "none"})
     image = compose_field(field, DEGREE, SIZE, look).layer.images.members[0, :, 0]
-    image = image.reshape(SIZE, SIZE)
     angle = np.angle(z) / DEGREE
     # Leave out the borders, and the breaking points of the image that is measured.
     selected = np.abs(DEGREE * angle) < 2.0
     margin = 45
     selected[:margin] = selected[-margin:] = selected[:, :margin] = selected[:, -margin:] = False
     lengths = []
-    for low, high in pairwise(edges):
-        correlations = persistence(
-            image, np.exp(1j * angle), selected & (rho >= low) & (rho < high), 60
-        )
-        first_below = int(np.argmax(correlations < 0.5))
-        fraction = (correlations[first_below - 1] - 0.5) / (
-            correlations[first_below - 1] - correlations[first_below]
-        )
-        lengths.append(f"{first_below - 1 + fraction:.1f} px")
+    for low, high in pairwise(EDGES):
+        part = selected & (magnitude >= low) & (magnitude < high)
+        values = persistence(image.reshape(SIZE, SIZE), np.exp(1j * angle), part, 60)
+        below = int(np.argmax(values < 0.5))
+        fraction = (values[below - 1] - 0.5) / (values[below - 1] - values[below])
+        lengths.append(f"{below - 1 + fraction:.1f} px")
     return lengths

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from PIL import Image, ImageDraw
 
-from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look, uses_magnitude
+from rosy_addon.compositor.look import Look
 from rosy_addon.core.color import from_hex
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.generate import generate
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.preset_files.store import load_preset, preset_keys
-from rosy_addon.projection.camera import orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
 
-from .figure_11 import smoothed_a_little
 from .page import ROOT
-from .presets_page import on_paper
 from .shapes import sphere, suzanne, torus, triple_torus
 from .sheet import display, font
-from .solid import around_field, harmonic_field, icosahedron_axes, smoothed
+from .solid import (
+    around_field,
+    even_curvature,
+    harmonic_field,
+    icosahedron_axes,
+    picture_on_paper,
+    ring_curvature,
+)
 
 FOLDER = ROOT / "docs" / "listing"
 
@@ -47,7 +51,7 @@ ENLARGED = 1.6
 
 #: Looks of the picture of fields: gray streaks, and a plaid.
 STREAKS = Look(length=80, grain=2.6, gain=2.8, shading=0.85, supersampling=2)
-WEAVE = STREAKS.with_settings({"hue": "noise", "grain": 4.0, "gain": 3.0})
+WEAVE = STREAKS.with_settings({"noise": "color", "grain": 4.0, "gain": 3.0})
 
 #: Size of the captions, and their color.
 CAPTION, INK = 34, (40, 40, 40)
@@ -91,50 +95,46 @@ def _band(left: float, right: float) -> Image.Image:
 
 def _presets(monkey: Surface, form: RosyField) -> Image.Image:
     """Draw Suzanne in every preset, with their names."""
-    columns, caption = 4, CAPTION + 14
-    names = preset_keys()
-    rows = -(-len(names) // columns)
-    width, height = SIZE[0] // columns, SIZE[1] // rows
     curved = curvature_field(monkey, 4)
-    canvas = Image.new("RGB", SIZE, (255, 255, 255))
-    pen = ImageDraw.Draw(canvas)
-    for index, name in enumerate(names):
+    shots = []
+    for name in preset_keys():
         preset = load_preset(name)
         look = preset.look.with_settings({"supersampling": 2})
-        field = form if not uses_magnitude(look) else curved
-        paper = look.paper_color if look.ink != "soft" else "#ffffff"
-        size = (width, height - caption)
-        shown = _draw(monkey, field, look, (-26.0, 6.0), size, 0.04, paper)
-        left, top = index % columns * width, index // columns * height
-        canvas.paste(Image.fromarray(shown), (left, top))
-        middle = (left + width / 2, top + height - caption / 2)
-        pen.text(middle, preset.name, INK, font(CAPTION * 3 // 4), anchor="mm")
-    return canvas
+        field = form if look.magnitude == "none" else curved
+        paper = look.paper_color if look.ink == "hatch" else "#ffffff"
+        shots.append((monkey, field, look, (-26.0, 6.0), preset.name, paper))
+    return _labeled(shots, 4, CAPTION * 3 // 4, CAPTION + 14, 0.04)
 
 
 def _fields(monkey: Surface) -> Image.Image:
     """Draw fields of degrees 1 to 6 on shapes, with their degrees."""
     rings, ring, ball = triple_torus(), torus(), sphere(64)
-    crossing = smoothed_a_little(monkey, curvature_field(monkey, 4))
-    along_rings = smoothed(rings, curvature_field(rings, 4), 200)
+    icosahedral = harmonic_field(ball, 6, icosahedron_axes())
     shots = (
         (monkey, generate(monkey, "smoothest", 1), STREAKS, (-26.0, 6.0), "1: vectors"),
         (monkey, generate(monkey, "smoothest", 2), STREAKS, (-26.0, 6.0), "2: lines"),
-        (monkey, crossing, STREAKS, (-26.0, 6.0), "4: crosses"),
-        (rings, along_rings, WEAVE, (14.0, 52.0), "4, with colored noise"),
-        (ball, harmonic_field(ball, 6, icosahedron_axes()), STREAKS, (20.0, 20.0), "6"),
+        (monkey, even_curvature(monkey, 4), STREAKS, (-26.0, 6.0), "4: crosses"),
+        (rings, ring_curvature(rings), WEAVE, (14.0, 52.0), "4, with colored noise"),
+        (ball, icosahedral, STREAKS, (20.0, 20.0), "6"),
         (ring, around_field(ring, 6), WEAVE, (20.0, 42.0), "6, with colored noise"),
     )
-    columns, caption = 3, CAPTION + 26
-    width, height = SIZE[0] // columns, SIZE[1] // 2
+    named = [(*shot, f"N = {text}", "#ffffff") for *shot, text in shots]
+    return _labeled(named, 3, CAPTION, CAPTION + 26, 0.02)
+
+
+def _labeled(
+    shots: Sequence[tuple], columns: int, font_size: int, caption: int, margin: float
+) -> Image.Image:
+    """Draw pictures in columns: surface, field, look, angles, text below it and color behind it."""
+    width, height = SIZE[0] // columns, SIZE[1] // -(-len(shots) // columns)
     canvas = Image.new("RGB", SIZE, (255, 255, 255))
     pen = ImageDraw.Draw(canvas)
-    for index, (surface, field, look, angles, text) in enumerate(shots):
-        shown = _draw(surface, field, look, angles, (width, height - caption), 0.02, "#ffffff")
+    for index, (*shot, text, background) in enumerate(shots):
+        shown = _draw(*shot, (width, height - caption), margin, background)
         left, top = index % columns * width, index // columns * height
         canvas.paste(Image.fromarray(shown), (left, top))
         middle = (left + width / 2, top + height - caption / 2)
-        pen.text(middle, f"N = {text}", INK, font(CAPTION), anchor="mm")
+        pen.text(middle, text, INK, font(font_size), anchor="mm")
     return canvas
 
 
@@ -148,10 +148,8 @@ def _draw(
     background: str,
 ) -> np.ndarray:
     """Return a picture on a plain background, (H, W, 3) uint8 with rows from the top."""
-    width, height = (look.supersampling * side for side in size)
-    camera = orbit_camera(surface.vertices, *angles, width, height, margin=margin)
     instance = MeshInstance(surface, np.eye(4), field)
-    rgba = on_paper(compose(project([instance], camera, look.display), look).rgba, look)
+    rgba = picture_on_paper(instance, look, angles, size, margin)
     color = np.rint(np.asarray(from_hex(background)) * 255)
     alpha = rgba[::-1, :, 3:]
     opaque = display(np.concatenate([rgba[..., :3], np.ones_like(rgba[..., 3:])], axis=-1))

@@ -8,7 +8,7 @@ from PIL import Image
 from rosy_addon.compositor.look import Look
 from rosy_addon.core.color import from_hex, to_display
 
-from .page import ROOT
+from .page import IMAGES
 from .plane import compose_field, points, singularity
 
 #: Side of the picture that is drawn, and of the files, in pixels.
@@ -33,6 +33,4 @@ def write() -> None:
     disc = np.clip(DRAWN / 2 - np.abs(points(DRAWN)), 0, 1)[..., None]
     drawn = Image.fromarray(np.rint(np.concatenate([color, disc], axis=-1) * 255).astype(np.uint8))
     for name, size in (("logo", LOGO), ("favicon", FAVICON)):
-        drawn.resize((size, size), Image.Resampling.BOX).save(
-            ROOT / "docs" / "images" / f"{name}.png", optimize=True
-        )
+        drawn.resize((size, size), Image.Resampling.BOX).save(IMAGES / f"{name}.png", optimize=True)

@@ -8,7 +8,8 @@ PLANE = Look(method="members", length=60, grain=2.0, gain=3.0)
 #: Look of planar pictures for measurements: half of the noise cells are bright, as in the paper.
 MEASURED = Look(method="members", length=40, grain=2.0, gain=1.0, density=0.5)
 
-#: Look of surfaces.
+#: Looks of surfaces: gray streaks, and a plaid.
 SOLID = Look(method="members", length=50, grain=2.0, gain=2.5, shading=0.8, supersampling=2)
+PLAID = SOLID.with_settings({"noise": "color", "grain": 3.0, "gain": 3.0, "length": 60})
 
-RED, BLUE = (214, 39, 40), (31, 119, 180)
+RED = (214, 39, 40)

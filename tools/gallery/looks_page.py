@@ -22,7 +22,6 @@ from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
-from .figure_11 import smoothed_a_little
 from .page import ROOT
 from .setting_pictures import (
     SETTINGS,
@@ -33,7 +32,7 @@ from .setting_pictures import (
 )
 from .shapes import suzanne
 from .sheet import Panel, display, save, sheet
-from .solid import compose_view, view
+from .solid import compose_view, smoothed_a_little, view
 
 PAGE = ROOT / "docs" / "looks.md"
 IMAGES = ROOT / "docs" / "images"

@@ -1,69 +1,47 @@
-"""Write docs/presets.md: each preset large on one model and small on two others.
+"""Pictures of the presets: those in the panel, docs/presets.md and docs/first-pictures.md.
 
-`python -m tools.gallery.presets_page FOLDER` draws and writes it. The folder contains
-`meshes/spot.obj` and `meshes/stanford-bunny.obj`, which are not part of this repository.
+`python -m tools.gallery preset-pictures` draws the preview pictures of the shipped presets, which are part
+of the zip. `python -m tools.gallery.presets_page FOLDER` draws both pages, with the meshes of `FILES` in
+FOLDER/meshes, which are not part of this repository.
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.look import Look, uses_magnitude
-from rosy_addon.core.color import from_hex, to_linear
+from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import generate
-from rosy_addon.field.surface import Surface
-from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
-from rosy_addon.preset_files.store import Preset, load_preset, preset_keys
-from rosy_addon.projection.camera import orbit_camera
+from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.project import project
+from rosy_addon.projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
-from .looks_page import IMAGES
-from .page import ROOT
-from .shapes import suzanne
-from .sheet import display
+from .page import IMAGES, ROOT
+from .shapes import grid_surface, suzanne
+from .sheet import Panel, display, save, sheet
+from .solid import picture_on_paper
 
-PAGE = ROOT / "docs" / "presets.md"
+PRESETS_PAGE, FIRST_PAGE = ROOT / "docs" / "presets.md", ROOT / "docs" / "first-pictures.md"
 
-#: Sizes of the large picture and of the two small ones in pixels.
-LARGE, SMALL = (820, 640), (410, 320)
+#: Mesh files, by title.
+FILES = {
+    "Stanford bunny": "stanford-bunny.obj",
+    "Spot": "spot.obj",
+    "Cheburashka": "cheburashka.off",
+    "Piece of a vase": "vase.off",
+}
 
-#: Empty margin at each border, as a fraction of the frame.
-MARGIN = 0.04
+#: Azimuths and elevations of the models of docs/presets.md.
+VIEWS = {"Suzanne": (-26.0, 8.0), "Spot": (-128.0, 12.0), "Bunny": (-18.0, 10.0)}
 
-#: Palette sizes of the .png files: of hatching (ink, paper and the edges between) and of others.
-HATCHING_COLORS, COLORS = 32, 192
-
-
-@dataclass(frozen=True)
-class Model:
-    """A mesh with its fields, and the view of it.
-
-    Attributes
-    ----------
-    name : str
-    instance : MeshInstance
-        With the default field, for presets that do not show the magnitude.
-    with_magnitude : MeshInstance
-        With the curvature of each face.
-    view : (float, float)
-        Azimuth and elevation in degrees.
-    """
-
-    name: str
-    instance: MeshInstance
-    with_magnitude: MeshInstance
-    view: tuple[float, float]
-
-
-#: Mesh files in the folder, with their views, by the name of the model.
-FILES = {"Spot": ("spot.obj", (-128.0, 12.0)), "Bunny": ("stanford-bunny.obj", (-18.0, 10.0))}
+#: Sizes of the large picture of a preset and of the two small ones in pixels, and their margin.
+LARGE, SMALL, MARGIN = (820, 640), (410, 320), 0.04
 
 #: Models of the large pictures, for presets with another model than Suzanne.
 LARGE_ON = {
@@ -74,89 +52,149 @@ LARGE_ON = {
     "woodcut": "Spot",
 }
 
+#: Palette sizes of the .png files: of hatching (ink, paper and the edges between) and of others.
+HATCHING_COLORS, COLORS = 32, 192
 
-def write(folder: Path) -> None:
-    """Draw and write the page, with the meshes of a folder."""
-    models = _load_models(folder / "meshes")
-    pieces = [
-        "# Presets",
-        "Here you can compare all presets that come with RoSy, on Suzanne (subdivided three "
-        "times), on [Spot](https://www.cs.cmu.edu/~kmcrane/Projects/ModelRepository/) and on the "
-        "Stanford bunny. All pictures use the default field, *Form* with degree 4, and the light of "
-        "the preset, unless the lines below the picture say otherwise. These two lines make the "
-        "picture from a selected mesh in a new scene. Use them in Blender's Python console or in a "
-        "script. In the panel, use *Make Field*, *Look* and *Bake*. The view transform *Standard* "
-        "shows ink and paper as they were drawn.",
-        "With a mesh file and without Blender:",
-        "    rosyfields render bunny.obj -o bunny.png --preset engraving --size 1600x1200",
-        "Lengths are in pixels of the finished picture. A picture of twice the size shows twice as "
-        "many lines, not broader ones. `python -m tools.gallery.presets_page FOLDER` draws this "
-        "page, given a folder with `meshes/spot.obj` and `meshes/stanford-bunny.obj`.",
-    ]
-    for name in preset_keys():
-        pieces.append(_section(name, load_preset(name), models))
-    PAGE.write_text("\n\n".join(pieces) + "\n", encoding="utf-8")
+#: Presets, size, view and margin of the pictures of docs/first-pictures.md, and pictures in a row.
+FIRST_PRESETS = ("default", "cross-hatch", "engraving", "pencil")
+SIDE, FIRST_VIEW, FIRST_MARGIN, COLUMNS = 262, (-32.0, 24.0), 0.006, 3
 
 
-def _load_models(meshes: Path) -> dict[str, Model]:
-    models = {"Suzanne": _model("Suzanne", suzanne(), np.eye(4), (-26.0, 8.0))}
-    for name, (file, view) in FILES.items():
-        path = meshes / file
-        models[name] = _model(
-            name, Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]], view
+def write_pages(folder: Path) -> None:
+    """Draw and write both pages, with the meshes of a folder."""
+    files = {title: _read(folder / "meshes" / name) for title, name in FILES.items()}
+    _write_presets(files)
+    _write_first_pictures(files)
+
+
+def _read(path: Path) -> tuple[Surface, np.ndarray]:
+    """Return the surface of a mesh file, and the matrix that turns it so that z is up."""
+    return read_mesh(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]]
+
+
+def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
+    """Draw each preset large on one model and small on two others."""
+    models = {
+        "Suzanne": (suzanne(), np.eye(4)),
+        "Spot": files["Spot"],
+        "Bunny": files["Stanford bunny"],
+    }
+    instances = {
+        (name, kind): MeshInstance(surface, matrix, generate(surface, kind, 4))
+        for name, (surface, matrix) in models.items()
+        for kind in ("form", "curvature")
+    }
+    sections = []
+    for key in preset_keys():
+        preset = load_preset(key)
+        kind = "form" if preset.look.magnitude == "none" else "curvature"
+        first = LARGE_ON.get(key, "Suzanne")
+        names = [first, *(name for name in models if name != first)]
+        drawn = [
+            display(picture_on_paper(instances[name, kind], preset.look, VIEWS[name], size, MARGIN))
+            for name, size in zip(names, (LARGE, SMALL, SMALL), strict=True)
+        ]
+        shown = np.concatenate([drawn[0], np.concatenate(drawn[1:], axis=1)])
+        colors = HATCHING_COLORS if preset.look.ink == "hatch" else COLORS
+        picture = Image.fromarray(shown).quantize(
+            colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE
         )
-    return models
-
-
-def _model(name: str, surface: Surface, matrix: np.ndarray, view: tuple[float, float]) -> Model:
-    along_form, curvature = (
-        MeshInstance(surface, matrix, generate(surface, kind, 4)) for kind in ("form", "curvature")
-    )
-    return Model(name, along_form, curvature, view)
-
-
-def _section(name: str, preset: Preset, models: dict[str, Model]) -> str:
-    first = models[LARGE_ON.get(name, "Suzanne")]
-    others = [model for model in models.values() if model is not first]
-    look = preset.look
-    small = np.concatenate([_draw(model, look, SMALL) for model in others], axis=1)
-    sheet = Image.fromarray(np.concatenate([_draw(first, look, LARGE), small]))
-    path = IMAGES / f"preset-{name}.png"
-    colors = HATCHING_COLORS if look.ink != "soft" else COLORS
-    sheet.quantize(colors, Image.Quantize.MEDIANCUT, kmeans=2, dither=Image.Dither.NONE).save(
-        path, optimize=True
-    )
-    kind = 'kind="curvature"' if uses_magnitude(look) else ""
-    return "\n\n".join(
-        [
+        picture.save(IMAGES / f"preset-{key}.png", optimize=True)
+        options = "" if kind == "form" else f'kind="{kind}"'
+        sections += [
             f"## {preset.name}",
             f"{preset.description}.",
-            f"![{preset.name} on {first.name}, {others[0].name} and {others[1].name}]"
-            f"(images/{path.name})",
-            f"    bpy.ops.rosy.field_generate({kind})\n"
-            f'    bpy.ops.rosy.preset_apply(preset="{name}"); bpy.ops.rosy.bake()',
+            f"![{preset.name} on {names[0]}, {names[1]} and {names[2]}](images/preset-{key}.png)",
+            f"    bpy.ops.rosy.field_generate({options})\n"
+            f'    bpy.ops.rosy.preset_apply(preset="{key}"); bpy.ops.rosy.bake()',
         ]
+    _replace_sections(PRESETS_PAGE, sections)
+
+
+def _write_first_pictures(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
+    """Draw the default field of sixteen meshes with some presets, antialiased."""
+    models = _made_models()
+    for title, (surface, matrix) in files.items():
+        points = surface.vertices @ matrix[:3, :3].T
+        models.append((title, build_surface(points, surface.corner_vertex, surface.face_start)))
+    instances = [
+        MeshInstance(surface, np.eye(4), generate(surface, "form", 4)) for _, surface in models
+    ]
+    sections = []
+    for key in FIRST_PRESETS:
+        preset = load_preset(key)
+        look = replace(preset.look, supersampling=max(preset.look.supersampling, 2))
+        panels = []
+        for (title, _), instance in zip(models, instances, strict=True):
+            rgba = picture_on_paper(instance, look, FIRST_VIEW, (SIDE, SIDE), FIRST_MARGIN)
+            panels.append(Panel(display(rgba), title))
+        rows = [panels[start : start + COLUMNS] for start in range(0, len(panels), COLUMNS)]
+        save(sheet(rows), IMAGES / f"first-{key}.png")
+        sections += [
+            f"## {preset.name}",
+            f"![{preset.name} on sixteen meshes](images/first-{key}.png)",
+            f"    rosyfields render mesh.obj -o mesh.png --preset {key} --size {SIDE}x{SIDE}",
+        ]
+    _replace_sections(FIRST_PAGE, sections)
+
+
+def _replace_sections(page: Path, sections: list[str]) -> None:
+    """Replace all that follows the introduction of a page."""
+    introduction = page.read_text(encoding="utf-8").split("\n## ")[0].strip()
+    page.write_text("\n\n".join([introduction, *sections]) + "\n", encoding="utf-8")
+
+
+def _made_models() -> list[tuple[str, Surface]]:
+    """Return the meshes that Blender adds, and some made of them, with their titles."""
+    import bpy
+
+    from .in_blender import evaluated_surface
+
+    add = bpy.ops.mesh
+    primitives = {
+        "Cube": add.primitive_cube_add,
+        "Plane": add.primitive_plane_add,
+        "UV sphere": add.primitive_uv_sphere_add,
+        "Icosphere": add.primitive_ico_sphere_add,
+        "Cylinder": add.primitive_cylinder_add,
+        "Cone": add.primitive_cone_add,
+        "Torus": add.primitive_torus_add,
+    }
+    rounded = evaluated_surface(add.primitive_cube_add, "BEVEL", width=0.25, segments=4)
+    return [
+        *((title, evaluated_surface(make)) for title, make in primitives.items()),
+        ("Suzanne", suzanne(0)),
+        ("Suzanne, subdivided", suzanne(3)),
+        ("Suzanne with noise of 0.1 %", _with_noise(suzanne(3), 0.001)),
+        ("Flange", _flange()),
+        ("Rounded cube", rounded),
+    ]
+
+
+def _with_noise(surface: Surface, share: float) -> Surface:
+    """Displace the vertices along their normals by a share of the diagonal of the bounding box."""
+    normal = np.zeros_like(surface.vertices)
+    np.add.at(normal, surface.corner_vertex, surface.corner_normal)
+    amplitude = share * np.linalg.norm(np.ptp(surface.vertices, axis=0))
+    noise = np.random.default_rng(0).standard_normal((len(normal), 1))
+    points = surface.vertices + amplitude * noise * normalize(normal)
+    return build_surface(points, surface.corner_vertex, surface.face_start)
+
+
+def _flange(columns: int = 96) -> Surface:
+    """Return a turned part: a disk with a bore and a hub, with a fillet between them."""
+    bend = np.linspace(0, np.pi / 2, 9)
+    fillet = np.stack([0.75 - 0.2 * np.sin(bend), 0.45 - 0.2 * np.cos(bend)], axis=1)
+    profile = np.concatenate(
+        [[[0.3, 0.0], [1.0, 0.0], [1.0, 0.25]], fillet, [[0.55, 0.9], [0.3, 0.9]]]
     )
-
-
-def _draw(model: Model, look: Look, size: tuple[int, int]) -> np.ndarray:
-    """Return a picture of a model on the paper of a look, (H, W, 3) uint8."""
-    instance = model.with_magnitude if uses_magnitude(look) else model.instance
-    points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
-    width, height = (look.supersampling * side for side in size)
-    camera = orbit_camera(points, *model.view, width, height, margin=MARGIN)
-    rgba = compose(project([instance], camera, look.display), look).rgba
-    return display(on_paper(rgba, look))
-
-
-def on_paper(rgba: np.ndarray, look: Look) -> np.ndarray:
-    """Return an (H, W, 4) picture with the paper of its look as background, if it has paper."""
-    if look.ink == "soft":
-        return rgba
-    alpha = rgba[..., 3:]
-    color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_color)) * (1 - alpha)
-    return np.concatenate([color, np.ones_like(alpha)], axis=-1)
+    angle = 2 * np.pi * np.arange(columns)[:, None] / columns
+    radius, height = profile.T
+    point = np.stack(
+        np.broadcast_arrays(radius * np.cos(angle), radius * np.sin(angle), height), axis=-1
+    )
+    return grid_surface("mesh", point, (True, True), sharp_angle=0.6)
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]))
+    write_pages(Path(sys.argv[1]))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from skimage.measure import marching_cubes
 
@@ -14,7 +12,7 @@ def plane(cells: int = 8) -> Surface:
     """Return the square from -1 to 1 in x and y, facing up."""
     axis = np.linspace(-1, 1, cells + 1)
     x, y = np.meshgrid(axis, axis, indexing="ij")
-    return _grid("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
+    return grid_surface("plane", np.stack([x, y, 0 * x], axis=-1), closed=(False, False))
 
 
 def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: int = 72) -> Surface:
@@ -25,7 +23,23 @@ def torus(radius: float = 1.0, tube: float = 0.45, around: int = 144, across: in
     point = np.stack(
         np.broadcast_arrays(ring_radius * np.cos(u), ring_radius * np.sin(u), tube * np.sin(v)), -1
     )
-    return _grid("torus", point, closed=(True, True))
+    return grid_surface("torus", point, closed=(True, True))
+
+
+def noisy_torus() -> Surface:
+    """Return a torus whose vertices have noise of 0.2 % of its size."""
+    ring = torus()
+    size = np.linalg.norm(np.ptp(ring.vertices, axis=0))
+    noise = 0.002 * size * np.random.default_rng(0).standard_normal(ring.vertices.shape)
+    return build_surface(ring.vertices + noise, ring.corner_vertex, ring.face_start)
+
+
+def box() -> Surface:
+    """Return a leaning box, made by projecting a sphere to a cube."""
+    ball = sphere()
+    points = ball.vertices / np.abs(ball.vertices).max(axis=1)[:, None]
+    points[:, 0] += 0.6 * points[:, 2]
+    return build_surface(points, ball.corner_vertex, ball.face_start, name="box", sharp_angle=0.7)
 
 
 def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
@@ -41,7 +55,7 @@ def knot(tube: float = 0.34, around: int = 384, across: int = 36) -> Surface:
     binormal = np.cross(tangent, outward)
     v = np.arange(across)[:, None] * (2 * np.pi / across)
     ring = np.cos(v)[None] * outward[:, None] + np.sin(v)[None] * binormal[:, None]
-    return _grid("knot", curve[:, None] + tube * ring, closed=(True, True))
+    return grid_surface("knot", curve[:, None] + tube * ring, closed=(True, True))
 
 
 def _trefoil(t: np.ndarray) -> np.ndarray:
@@ -123,49 +137,24 @@ def suzanne(subdivisions: int = 3) -> Surface:
     """Return Blender's monkey, subdivided."""
     import bpy
 
-    return evaluated_surface(
-        bpy.ops.mesh.primitive_monkey_add, "SUBSURF", name="Suzanne", levels=subdivisions
-    )
+    from .in_blender import evaluated_surface
+
+    add = bpy.ops.mesh.primitive_monkey_add
+    return evaluated_surface(add, "SUBSURF", name="Suzanne", levels=subdivisions)
 
 
-def evaluated_surface(
-    add: Callable[[], object], modifier: str = "", name: str = "mesh", **settings: float
-) -> Surface:
-    """Return the mesh that an operator of Blender adds, with a modifier."""
-    import bpy
-
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    add()
-    obj = bpy.context.object
-    if modifier:
-        added = obj.modifiers.new(modifier, modifier)
-        for key, value in settings.items():
-            setattr(added, key, value)
-    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
-    vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    start = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", start)
-    flat = np.zeros(len(mesh.polygons), dtype=bool)
-    if not modifier:
-        mesh.polygons.foreach_get("use_smooth", flat)
-        flat = ~flat
-    return build_surface(
-        vertices, corners, np.append(start, len(corners)), name=name, flat_faces=flat
-    )
-
-
-def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray) -> Surface:
+def _polygons(name: str, vertices: np.ndarray, faces: np.ndarray, **options: float) -> Surface:
     """Return a surface whose faces all have the same number of corners."""
     start = np.arange(len(faces) + 1) * faces.shape[1]
-    return build_surface(vertices, faces.ravel(), start, name=name)
+    return build_surface(vertices, faces.ravel(), start, name=name, **options)
 
 
-def _grid(name: str, point: np.ndarray, closed: tuple[bool, bool]) -> Surface:
-    """Return quads over an (A, B, 3) grid of points."""
-    return _polygons(name, point.reshape(-1, 3), _cells(*point.shape[:2], closed))
+def grid_surface(
+    name: str, point: np.ndarray, closed: tuple[bool, bool], **options: float
+) -> Surface:
+    """Return quads over an (A, B, 3) grid of points, each direction closed or not."""
+    cells = _cells(*point.shape[:2], closed)
+    return _polygons(name, point.reshape(-1, 3), cells, **options)
 
 
 def _cells(a: int, b: int, closed: tuple[bool, bool]) -> np.ndarray:

@@ -10,10 +10,10 @@ import pyvista as pv
 
 from rosy_addon.extras.command_line import main
 
-from .page import ROOT
+from .page import IMAGES
 
 #: The picture.
-PICTURE = ROOT / "docs" / "images" / "simulations-beam.png"
+PICTURE = IMAGES / "simulations-beam.png"
 
 #: Length, width and height of the beam, and cells along each.
 SIZES, CELLS = (4.0, 1.0, 1.0), (40, 10, 10)

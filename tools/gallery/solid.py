@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.picture import Picture
+from rosy_addon.core.color import from_hex, to_linear
 from rosy_addon.field.corner_fans import corner_angles, corner_rotations, smooth_face_values
-from rosy_addon.field.frames import normalize
+from rosy_addon.field.curvature import curvature_field
+from rosy_addon.field.directional_field import field_from_directions, tensor_field
+from rosy_addon.field.frames import dot, normalize
+from rosy_addon.field.generate import GeneratorSettings, axis_field, generate
 from rosy_addon.field.representation import (
     face_frames,
     face_representation,
@@ -22,8 +26,6 @@ from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import GBuffer, MeshInstance
 from rosy_addon.projection.project import project
-from rosy_addon.rendering.draw import draw_picture
-from rosy_addon.rendering.view_input import ViewInput
 from tests.harness.planar import DegreeLayer, degree_layers
 
 
@@ -66,6 +68,75 @@ def smoothed(surface: Surface, field: RosyField, rounds: int) -> RosyField:
     return RosyField(field.degree, from_representation(z, x, y, field.degree))
 
 
+def smoothed_a_little(surface: Surface, field: RosyField) -> RosyField:
+    """Return a slightly smoothed curvature field, without the noise of small faces."""
+    return smoothed(surface, field, 6)
+
+
+def even_curvature(surface: Surface, degree: int) -> RosyField:
+    """Return the slightly smoothed curvature field of a surface."""
+    return smoothed_a_little(surface, curvature_field(surface, degree))
+
+
+def ring_curvature(rings: Surface) -> RosyField:
+    """Return the smooth 4-RoSy field along the curvature of the triple torus."""
+    return smoothed(rings, curvature_field(rings, 4), 200)
+
+
+def pairs_of_directions(ball: Surface, degree: int) -> RosyField:
+    """Return two pairs of directions on a sphere, at angles from 90 to 25 degrees."""
+    up = 1 - np.abs(ball.face_center[:, 2])
+    half = np.radians(12.5 + (45 - 12.5) * np.clip(up, 0, 1))[:, None]
+    along = normalize(axis_field(ball, 1).vectors)
+    across = np.cross(ball.face_normal, along)
+    first, second = (np.cos(half) * along + sign * np.sin(half) * across for sign in (1, -1))
+    return field_from_directions(ball, np.stack([first, second, -first, -second], axis=1))
+
+
+def stress_of_force(ring: Surface, degree: int) -> RosyField:
+    """Return the directions of tension and compression in a ring with a force at its side."""
+    offset = ring.face_center - (1.2, -1.4, 0.6)
+    distance = np.sqrt(dot(offset, offset))[:, None, None]
+    outward = normalize(offset)
+    tensors = outward[:, :, None] * outward[:, None, :] / distance - 0.35 * np.eye(3) * distance
+    return tensor_field(ring, tensors)
+
+
+def ring_of_singularities(
+    ball: Surface, distance: float, far: float = 7.0, degree: int = 4
+) -> RosyField:
+    """Return a field on a sphere with eight singularities around the axis toward the eye.
+
+    Parameters
+    ----------
+    ball : Surface
+        The unit sphere.
+    distance : float
+        Of the center of their circle from the center of the sphere, before they are moved onto it: toward
+        the eye for those at smaller angles than `far`, away from it for the others.
+    far : float
+        In radians.
+    """
+    axes = view(ball, (-26, 8), (256, 256), 1).view[:3, :3]
+    angle = np.arange(8) * np.pi / 4 + 0.2
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes[:2]
+    centers = np.where(angle < far, distance, -distance)[:, None] * axes[2]
+    vertex = [int((ball.vertices @ point).argmax()) for point in normalize(circle + centers)]
+    settings = GeneratorSettings("prescribed", singularities=(vertex, np.ones(8, dtype=int)))
+    return generate(ball, settings, degree)
+
+
+#: Fields that are no generator's, by name: functions of a surface and a degree.
+MADE_FIELDS: dict[str, Callable[[Surface, int], RosyField]] = {
+    "around": around_field,
+    "even-curvature": even_curvature,
+    "pairs": pairs_of_directions,
+    "force": stress_of_force,
+    "two-in-front": lambda ball, degree: ring_of_singularities(ball, 2, 1.7, degree),
+    "out-of-sight": lambda ball, degree: ring_of_singularities(ball, -2, degree=degree),
+}
+
+
 def view(
     surface: Surface,
     angles: tuple[float, float],
@@ -85,20 +156,30 @@ def compose_view(surface: Surface, field: RosyField, look: Look, camera: Camera)
     return compose(project([MeshInstance(surface, np.eye(4), field)], camera, look.display), look)
 
 
+def picture_on_paper(
+    instance: MeshInstance,
+    look: Look,
+    angles: tuple[float, float],
+    size: tuple[int, int],
+    margin: float,
+) -> np.ndarray:
+    """Return the (H, W, 4) picture of a field, with the paper of its look as background if it has one."""
+    points = instance.surface.vertices @ instance.matrix[:3, :3].T + instance.matrix[:3, 3]
+    width, height = (look.supersampling * side for side in size)
+    camera = orbit_camera(points, *angles, width, height, margin=margin)
+    rgba = compose(project([instance], camera, look.display), look).rgba
+    if look.ink != "hatch":
+        return rgba
+    alpha = rgba[..., 3:]
+    color = rgba[..., :3] * alpha + to_linear(from_hex(look.paper_color)) * (1 - alpha)
+    return np.concatenate([color, np.ones_like(alpha)], axis=-1)
+
+
 def layer_in_view(surface: Surface, field: RosyField, look: Look, camera: Camera) -> DegreeLayer:
     """Return the images that `compose_view` draws a field with."""
     instance = MeshInstance(surface, np.eye(4), field)
     (layer,) = degree_layers(project([instance], camera, look.display), look)
     return layer
-
-
-def render_view(
-    surface: Surface, field: RosyField, look: Look, angles: tuple[float, float], side: int
-) -> np.ndarray:
-    """Return the (side, side, 4) linear RGBA of a field as users draw it, with its singularities."""
-    instance = MeshInstance(surface, np.eye(4), field)
-    view_input = ViewInput((instance,), view(surface, angles, (side, side), 1), look)
-    return draw_picture(view_input).rgba
 
 
 def curve_through(start: tuple, middle: tuple, stop: tuple) -> np.ndarray:

@@ -11,7 +11,7 @@ from PIL import Image
 
 import rosy_addon
 
-from .page import ROOT
+from .page import IMAGES, ROOT
 
 PAGE = ROOT / "docs" / "start" / "scripters.md"
 
@@ -26,4 +26,4 @@ def write() -> None:
             exec(compile(script, str(PAGE), "exec"), {})
         # The picture is gray: two channels instead of four.
         picture = Image.open(Path(folder) / "torus.png").convert("LA")
-        picture.save(ROOT / "docs" / "images" / "start-torus.png", optimize=True)
+        picture.save(IMAGES / "start-torus.png", optimize=True)

@@ -14,7 +14,7 @@ from rosy_addon.line_drawing.visibility import project_to_pixels
 from rosy_addon.projection.camera import Camera, orbit_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 
-from .looks_page import IMAGES
+from .page import IMAGES
 from .shapes import suzanne
 from .sheet import Panel, save, sheet
 

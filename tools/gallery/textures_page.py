@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -11,8 +12,8 @@ from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import KEY_LIGHT
 from rosy_addon.core.color import to_linear
-from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.generate import generate
+from rosy_addon.field.surface import Surface
 from rosy_addon.image_io.image_data import image_of_pixels
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
 from rosy_addon.preset_files.store import load_preset
@@ -22,7 +23,7 @@ from rosy_addon.projection.project import project
 from rosy_addon.surface_texture.charts import uv_charts
 from rosy_addon.surface_texture.draw import draw_texture
 
-from .looks_page import IMAGES
+from .page import IMAGES
 from .sheet import Panel, display, save, sheet
 
 #: Side of a picture, samples per pixel in each direction, and side of the texture.
@@ -34,42 +35,68 @@ LAMPS = (("a lamp at the left", -50.0, 35.0), ("a lamp at the right", 55.0, 25.0
 #: Views from the front and from behind, azimuth and elevation in degrees.
 FRONT, BACK = (-26.0, 8.0), (150.0, 14.0)
 
+#: A point at the forehead.
+FOREHEAD = (-0.25, -0.75, 0.55)
+
 
 def write() -> None:
     """Draw and save the pictures."""
     surface, uv = unwrapped_suzanne()
-    field = generate(surface, GeneratorSettings("form"), 4)
-    instance = MeshInstance(surface, np.eye(4), field)
+    instance = MeshInstance(surface, np.eye(4), generate(surface, "form", 4))
+    corner_uv = uv[surface.triangles]
     texture = draw_texture(instance, uv, Look(), TEXTURE_SIDE).rgba
     charts = uv_charts(surface, build_tangent_mesh(instance), uv)
     hue = np.random.default_rng(3).uniform(0.25, 0.95, (int(charts.chart.max()) + 1, 3))
     chart_color = to_linear(hue)[charts.chart]
 
     def textured(gbuffer: GBuffer) -> np.ndarray:
-        return texture_at(texture, uv[surface.triangles], gbuffer)[:, :3]
+        return texture_at(texture, corner_uv, gbuffer)[:, :3]
+
+    def by_chart(gbuffer: GBuffer) -> np.ndarray:
+        return chart_color[gbuffer.triangle]
 
     panels = [
-        Panel(view(instance, FRONT, lambda g: chart_color[g.triangle]), "the charts of the UV map"),
+        Panel(view(instance, FRONT, by_chart), "the charts of the UV map"),
         Panel(view(instance, FRONT, textured), "the texture"),
         Panel(view(instance, BACK, textured), "from behind"),
         Panel(display(_reduced(texture, SIDE)), "the file"),
     ]
     save(sheet([panels[:2], panels[2:]]), IMAGES / "textures.png")
-    close = project([instance], _zoomed(instance))
-    color = _lit(textured(close), close)
-    chart = chart_color[close.triangle]
-    crops = [_picture(close, color), _picture(close, _lit(chart, close))]
-    labels = ["the texture from near", "the charts in the same view"]
-    save(
-        sheet([[Panel(crop, label) for crop, label in zip(crops, labels, strict=True)]]),
-        IMAGES / "textures-seams.png",
-    )
-    _write_hatching(instance, uv)
-    _write_highlights(instance, uv)
+    # The forehead, from near.
+    near = surface.vertices[np.linalg.norm(surface.vertices - FOREHEAD, axis=1) < 0.32]
+    crops = [
+        Panel(view(instance, FRONT, textured, points=near), "the texture from near"),
+        Panel(view(instance, FRONT, by_chart, points=near), "the charts in the same view"),
+    ]
+    save(sheet([crops]), IMAGES / "textures-seams.png")
+    save(sheet(_hatching(instance, uv)), IMAGES / "textures-hatching.png")
+    save(sheet([_highlights(instance, uv)]), IMAGES / "textures-highlights.png")
 
 
-def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
-    """Render and save the pictures of brushed metal: one field, two guiding angles, and without a map."""
+def _hatching(instance: MeshInstance, uv: np.ndarray) -> list[list[Panel]]:
+    """Draw one texture of hatching in the light of several lamps, for two presets."""
+    corner_uv = uv[instance.surface.triangles]
+    rows = []
+    for preset in ("cross-hatch", "engraving"):
+        look = load_preset(preset).look
+        thresholds = draw_texture(instance, uv, look, TEXTURE_SIDE).rgba
+        row = []
+        for label, azimuth, elevation in LAMPS:
+            lamp = orbit_basis(FRONT[0] + azimuth, elevation)[2]
+
+            def inked(gbuffer: GBuffer, lamp=lamp, look=look, thresholds=thresholds) -> np.ndarray:
+                pixels = texture_at(thresholds, corner_uv, gbuffer)
+                lambert = np.maximum(gbuffer.normal @ (gbuffer.camera.view[:3, :3] @ lamp), 0)
+                tone = 1 - look.shading + look.shading * lambert
+                return ink_of_thresholds(pixels, tone.astype(np.float32), look, 2)[0]
+
+            row.append(Panel(view(instance, FRONT, inked, is_lit=False), label))
+        rows.append(row)
+    return rows
+
+
+def _highlights(instance: MeshInstance, uv: np.ndarray) -> list[Panel]:
+    """Render brushed metal: one field with two guiding angles."""
     import bpy
 
     from rosy_addon.scene.blender_images import new_image
@@ -78,46 +105,34 @@ def _write_highlights(instance: MeshInstance, uv: np.ndarray) -> None:
     scene, obj = bpy.context.scene, bpy.context.object
     obj.data.shade_smooth()
     _light_metal(scene)
+    uv_map = obj.data.uv_layers.active.name
     panels = []
     for label, angle in (("horizontal strokes", 0.0), ("vertical strokes", np.pi / 2)):
         look = Look(guiding_angle=angle)
         pixels = draw_texture(instance, uv, look, TEXTURE_SIDE, content="anisotropy").rgba
-        image_data = image_of_pixels(pixels, as_float=False, is_color=False)
-        image = new_image("map", image_data, is_color=False)
-        uv_map = obj.data.uv_layers.active.name
+        data = image_of_pixels(pixels, as_float=False, is_color=False)
+        image = new_image("map", data, is_color=False)
         add_shader = partial(brushed_metal_shader, uv_map=uv_map)
-        material = new_texture_material("metal", image, uv_map, add_shader)
         obj.data.materials.clear()
-        obj.data.materials.append(material)
+        obj.data.materials.append(new_texture_material("metal", image, uv_map, add_shader))
         panels.append(Panel(_rendered(scene), label))
-    save(sheet([panels]), IMAGES / "textures-highlights.png")
+    return panels
 
 
 def _light_metal(scene) -> None:
     """Add a camera, a dim world and bright panels that a metal reflects."""
     import bpy
 
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.collection.objects.link(camera)
-    scene.camera = camera
-    camera.data.lens = 85.0
-    axes = orbit_basis(*FRONT)
-    camera.matrix_world = _placed(axes, 7.0)
+    from .in_blender import add
+
+    scene.camera = add("Camera", bpy.data.cameras.new("Camera"), FRONT, 7.0)
+    scene.camera.data.lens = 85.0
     scene.world = bpy.data.worlds.new("World")
     scene.world.color = (0.15, 0.15, 0.15)
     for azimuth, elevation, power in ((-50, 30, 250), (30, 60, 300), (75, 5, 250)):
-        lamp = bpy.data.objects.new("Panel", bpy.data.lights.new("Panel", "AREA"))
-        scene.collection.objects.link(lamp)
-        lamp.data.energy, lamp.data.size = power, 1.0
-        axes = orbit_basis(FRONT[0] + azimuth, elevation)
-        lamp.matrix_world = _placed(axes, 4.0)
-
-
-def _placed(axes: np.ndarray, distance: float):
-    """Return the matrix of an object that looks at the origin along the last axis."""
-    from mathutils import Matrix
-
-    return Matrix([*np.c_[axes.T, distance * axes[2]].tolist(), [0, 0, 0, 1]])
+        light = bpy.data.lights.new("Panel", "AREA")
+        light.energy, light.size = power, 1.0
+        add("Panel", light, (FRONT[0] + azimuth, elevation), 4.0)
 
 
 def _rendered(scene) -> np.ndarray:
@@ -142,63 +157,61 @@ def _rendered(scene) -> np.ndarray:
     return display(rgba)
 
 
-def _write_hatching(instance: MeshInstance, uv: np.ndarray) -> None:
-    """Draw and save the picture of one texture of hatching in the light of several lamps."""
-    panels = []
-    for key, lamps in (("cross-hatch", LAMPS), ("engraving", LAMPS)):
-        look = load_preset(key).look
-        thresholds = draw_texture(instance, uv, look, TEXTURE_SIDE).rgba
-        for label, azimuth, elevation in lamps:
-            lamp = orbit_basis(FRONT[0] + azimuth, elevation)[2]
-
-            def inked(gbuffer: GBuffer, lamp=lamp, look=look, thresholds=thresholds) -> np.ndarray:
-                pixels = texture_at(thresholds, uv[instance.surface.triangles], gbuffer)
-                lambert = np.maximum(gbuffer.normal @ (gbuffer.camera.view[:3, :3] @ lamp), 0)
-                tone = 1 - look.shading + look.shading * lambert
-                return ink_of_thresholds(pixels, tone.astype(np.float32), look, 2)[0]
-
-            panels.append(Panel(view(instance, FRONT, inked, is_lit=False), label))
-    save(sheet([panels[:2], panels[2:]]), IMAGES / "textures-hatching.png")
-
-
 def unwrapped_suzanne() -> tuple[Surface, np.ndarray]:
     """Return Blender's monkey, subdivided and unwrapped into charts, and (C, 2) coordinates."""
     import bpy
 
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.mesh.primitive_monkey_add()
-    obj = bpy.context.object
-    obj.modifiers.new("Subdivision", "SUBSURF").levels = 2
-    bpy.ops.object.modifier_apply(modifier="Subdivision")
+    from .in_blender import add_suzanne, surface_of
+
+    mesh = add_suzanne().data
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.uv.smart_project(angle_limit=np.radians(66), island_margin=0.003)
     bpy.ops.object.mode_set(mode="OBJECT")
-    mesh = obj.data
-    vertices = np.empty((len(mesh.vertices), 3), dtype=np.float32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    start = np.empty(len(mesh.polygons), dtype=np.int32)
-    mesh.polygons.foreach_get("loop_start", start)
-    uv = np.empty((len(corners), 2), dtype=np.float32)
+    uv = np.empty((len(mesh.loops), 2), dtype=np.float32)
     mesh.uv_layers.active.uv.foreach_get("vector", uv.ravel())
-    return build_surface(vertices, corners, np.append(start, len(corners)), name="Suzanne"), uv
+    return surface_of(mesh, "Suzanne"), uv
 
 
 def view(
-    instance: MeshInstance, angles: tuple[float, float], color_of, *, is_lit: bool = True
+    instance: MeshInstance,
+    angles: tuple[float, float],
+    color_of: Callable[[GBuffer], np.ndarray],
+    *,
+    points: np.ndarray | None = None,
+    is_lit: bool = True,
 ) -> np.ndarray:
-    """Return a picture; `color_of` returns the colors of the pixels of a G-buffer, to be lit by a lamp."""
+    """Return a (SIDE, SIDE, 3) uint8 picture, with the mean of the samples of each pixel.
+
+    Parameters
+    ----------
+    instance : MeshInstance
+    angles : (float, float)
+        Azimuth and elevation in degrees.
+    color_of : function
+        Returns the colors of the pixels of a G-buffer.
+    points : (P, 3) ndarray, optional
+        What the camera frames closely; the whole surface if it is not given.
+    is_lit : bool
+        Light the colors by a lamp over the left shoulder of the viewer.
+    """
     side = SIDE * SAMPLES
-    camera = orbit_camera(instance.surface.vertices, *angles, side, side, margin=0.03)
-    gbuffer = project([instance], camera)
+    framed, margin = (instance.surface.vertices, 0.03) if points is None else (points, -0.1)
+    gbuffer = project([instance], orbit_camera(framed, *angles, side, side, margin=margin))
     color = color_of(gbuffer)
-    return _picture(gbuffer, _lit(color, gbuffer) if is_lit else color)
+    if is_lit:
+        cosine = gbuffer.normal @ KEY_LIGHT.vector.astype(np.float32)
+        color = color * (0.35 + 1.1 * np.maximum(cosine, 0))[:, None]
+    rgba = np.zeros((side * side, 4), dtype=np.float32)
+    rgba[gbuffer.pixel, :3], rgba[gbuffer.pixel, 3] = color, 1
+    rgba[:, :3] *= rgba[:, 3:]
+    mean = rgba.reshape(SIDE, SAMPLES, SIDE, SAMPLES, 4).mean(axis=(1, 3))
+    mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
+    return display(mean)
 
 
 def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
-    """(P, 4) values of a texture, interpolated as a renderer does."""
+    """Return the (P, 4) values of a texture, interpolated as a renderer does."""
     place = np.einsum("nk,nki->ni", gbuffer.barycentric, corner_uv[gbuffer.triangle])
     height, width = texture.shape[:2]
     x, y = place[:, 0] * width - 0.5, place[:, 1] * height - 0.5
@@ -209,32 +222,6 @@ def texture_at(texture: np.ndarray, corner_uv: np.ndarray, gbuffer: GBuffer) -> 
         return texture[(row + dy) % height, (column + dx) % width]
 
     return (at(0, 0) * (1 - x) + at(1, 0) * x) * (1 - y) + (at(0, 1) * (1 - x) + at(1, 1) * x) * y
-
-
-def _lit(color: np.ndarray, gbuffer: GBuffer) -> np.ndarray:
-    """Light colors by a lamp over the left shoulder of the viewer."""
-    cosine = gbuffer.normal @ KEY_LIGHT.vector.astype(np.float32)
-    return color * (0.35 + 1.1 * np.maximum(cosine, 0))[:, None]
-
-
-def _picture(gbuffer: GBuffer, color: np.ndarray) -> np.ndarray:
-    """Return (h, w, 3) uint8 from the top, with the mean of the samples of each pixel."""
-    camera = gbuffer.camera
-    rgba = np.zeros((camera.height * camera.width, 4), dtype=np.float32)
-    rgba[gbuffer.pixel, :3], rgba[gbuffer.pixel, 3] = color, 1
-    shape = camera.height // SAMPLES, SAMPLES, camera.width // SAMPLES, SAMPLES, 4
-    rgba[:, :3] *= rgba[:, 3:]
-    mean = rgba.reshape(shape).mean(axis=(1, 3))
-    mean[..., :3] /= np.maximum(mean[..., 3:], 1e-6)
-    return display(mean)
-
-
-def _zoomed(instance: MeshInstance):
-    """Return a camera that sees the forehead from near."""
-    vertices = instance.surface.vertices
-    near = vertices[np.linalg.norm(vertices - [-0.25, -0.75, 0.55], axis=1) < 0.32]
-    side = SIDE * SAMPLES
-    return orbit_camera(near, *FRONT, side, side, margin=-0.1)
 
 
 def _reduced(texture: np.ndarray, side: int) -> np.ndarray:

@@ -45,29 +45,22 @@ def on_files(files: Files, *, config) -> Files:
         source = f"docs/notebooks/{path.name}"
         files.remove(files.src_uris[source])
         markdown, pictures = _markdown(path)
-        page = NotebookPage(
-            source,
-            None,
-            config.site_dir,
-            config.use_directory_urls,
-            dest_uri=f"notebooks/{path.stem}.html",
-        )
+        page = _made(NotebookPage, source, f"notebooks/{path.stem}.html", config)
         page.content_string = markdown
         files.append(page)
         for name, content in pictures.items():
             address = f"notebooks/{path.stem}/{name}"
-            picture = File(
-                f"docs/{address}",
-                None,
-                config.site_dir,
-                config.use_directory_urls,
-                dest_uri=address,
-            )
+            picture = _made(File, f"docs/{address}", address, config)
             picture.content_bytes = content
             files.append(picture)
         # The notebook itself, for download; its name in the repository is that of the page.
         files.append(File.generated(config, f"notebooks/{path.name}", abs_src_path=str(path)))
     return files
+
+
+def _made(kind: type[File], source: str, address: str, config) -> File:
+    """Return a file of the site that is none of the repository."""
+    return kind(source, None, config.site_dir, config.use_directory_urls, dest_uri=address)
 
 
 def _notebooks() -> list[Path]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import Files
@@ -17,8 +17,7 @@ FOLDER = "presets"
 _slug = slugify(case="lower")
 
 
-@dataclass(frozen=True)
-class Preset:
+class Preset(NamedTuple):
     """A preset that comes with RoSy.
 
     Attributes
@@ -28,17 +27,15 @@ class Preset:
     name, description : str
     look : dict
         The settings that differ from the default.
+    anchor : str
+        Anchor of its section.
     """
 
     key: str
     name: str
     description: str
     look: dict[str, object]
-
-    @property
-    def anchor(self) -> str:
-        """Anchor of its section."""
-        return _slug(self.name, "-")
+    anchor: str
 
 
 def on_files(files: Files, *, config) -> Files:
@@ -73,9 +70,8 @@ def _presets() -> list[Preset]:
     presets = []
     for path in (ROOT / FOLDER).glob("*.json"):
         content = json.loads(path.read_text(encoding="utf-8"))
-        presets.append(
-            Preset(path.stem, content["name"], content["description"], content.get("look", {}))
-        )
+        name, look = content["name"], content.get("look", {})
+        presets.append(Preset(path.stem, name, content["description"], look, _slug(name, "-")))
     return sorted(presets, key=lambda preset: (preset.key != "default", preset.key))
 
 

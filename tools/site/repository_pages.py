@@ -19,6 +19,7 @@ OUTSIDE_DOCS = {
     "CHANGELOG.md": "changes.html",
     "CONTRIBUTING.md": "contributing.html",
     "SECURITY.md": "security.html",
+    "bench/NOTES.md": "laboratory-notes.html",
     "LICENSE": "files/LICENSE.txt",
     "CITATION.cff": "files/CITATION.cff",
     "examples/bake_scene.py": "files/bake_scene.py",

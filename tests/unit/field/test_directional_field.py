@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from harness.planar import degree_layers
+from harness.streaks import orientation_spectrum, peaks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapes import icosphere, plane
@@ -28,7 +29,6 @@ from rosy_addon.field.validate import validated_directions
 from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
-from tools.gallery.measure import orientation_spectrum, peaks
 
 WEAVE = Look(shading=0.0, grain=1.5, length=30)
 

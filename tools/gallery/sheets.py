@@ -1,0 +1,135 @@
+"""Draw the sheets of pictures and the films that `pictures.toml` describes."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.shading import Light
+from rosy_addon.core.cache import Cache
+from rosy_addon.field.generate import GeneratorSettings, generate
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.field.surface import Surface
+from rosy_addon.preset_files.store import load_preset
+from rosy_addon.projection.camera import Camera, look_at, perspective_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+from rosy_addon.projection.project import project
+from rosy_addon.rendering.draw import draw_picture
+from rosy_addon.rendering.turntable import draw_next, turntable, turntable_views
+from rosy_addon.rendering.view_input import ViewInput
+
+from . import shapes, table_scene
+from .page import ROOT
+from .sheet import Panel, display, save, sheet
+from .solid import MADE_FIELDS, curve_through, points_on_surface, view
+
+PAGES: dict[str, Any] = tomllib.loads(
+    Path(__file__).with_name("pictures.toml").read_text(encoding="utf-8")
+)
+
+INK, PAPER = (214, 84, 20), (255, 255, 255)
+
+
+def write_page(page: str) -> None:
+    """Draw and save the sheets and the films of a page."""
+    table = PAGES[page]
+    for name, spec in table.get("films", {}).items():
+        _write_film(table | spec, ROOT / f"{table['prefix']}{name}.gif")
+    for name, options in table.get("sheets", {}).items():
+        rows = [[draw_panel(table, options, panel) for panel in row] for row in options["rows"]]
+        save(sheet(rows), ROOT / f"{table['prefix']}{name}.png")
+
+
+def _write_film(spec: dict[str, Any], path: Path) -> None:
+    """Draw and save a turntable, or a loop of streaks that drift before a still camera."""
+    look = Look().with_settings(spec["look"])
+    surface = _surface(spec["mesh"])
+    instance = MeshInstance(surface, np.eye(4), _field(surface, spec))
+    is_still, count = look.flow != 0, spec["count"]
+    size, angles = tuple(spec["size"]), tuple(spec["view"])
+    views = turntable_views(instance, look, count, size, angles, still=is_still)
+    draw = partial(draw_next, cache=Cache()) if is_still else draw_picture
+    turntable(draw, views, count, path, spec["rate"])
+
+
+def draw_panel(*specs: dict[str, Any]) -> Panel:
+    """Return the panel of a picture that `pictures.toml` describes. Later keys replace earlier ones."""
+    spec = {key: value for part in specs for key, value in part.items()}
+    look = load_preset(spec["preset"]).look if "preset" in spec else Look()
+    for part in specs:
+        look = look.with_settings(part.get("look", {}))
+    if spec.get("turn"):
+        look = replace(look, guiding_angle=float(np.radians(spec["turn"])))
+    samples = 1 if spec.get("finished") else look.supersampling
+    if spec["mesh"] == "table":
+        instances = table_scene.instances(spec.get("tone", ""))
+    else:
+        surface = _surface(spec["mesh"])
+        field = _field(surface, spec)
+        instances = [MeshInstance(surface, np.eye(4), field)]
+    camera = _camera(spec, instances[0].surface, samples)
+    if spec.get("finished"):
+        rgba = draw_picture(ViewInput(tuple(instances), camera, look)).rgba
+    else:
+        lights = [_sun(camera, spec["sun"])] if "sun" in spec else ()
+        rgba = compose(project(instances, camera, look.display), look, lights).rgba
+    picture = display(rgba)
+    if "crop" in spec:
+        left, top, width, height = spec["crop"]
+        picture = picture[top : top + height, left : left + width]
+    for stroke in spec.get("strokes", ()):
+        picture = with_line(picture, curve_through(*stroke), 8, PAPER)
+        picture = with_line(picture, curve_through(*stroke), 4, INK)
+    return Panel(picture, spec["label"])
+
+
+@lru_cache
+def _surface(name: str) -> Surface:
+    return getattr(shapes, name)()
+
+
+def _field(surface: Surface, spec: dict[str, Any]) -> RosyField:
+    """Return a field of `MADE_FIELDS` or of a generator."""
+    kind, degree = spec["field"].split()
+    if kind in MADE_FIELDS:
+        return MADE_FIELDS[kind](surface, int(degree))
+    options = dict(spec.get("options", {}))
+    if "strokes" in spec:
+        camera = _camera(spec, surface, 2)
+        curves = [curve_through(*stroke) for stroke in spec["strokes"]]
+        options["strokes"] = [points_on_surface(surface, camera, curve) for curve in curves]
+    return generate(surface, GeneratorSettings(kind, **options), int(degree))
+
+
+def _camera(spec: dict[str, Any], surface: Surface, samples: int) -> Camera:
+    width, height = spec["size"]
+    if "eye" not in spec:
+        return view(surface, tuple(spec["view"]), (width, height), samples)
+    matrix = look_at(spec["eye"], spec.get("target", (0, 0, 0)))
+    return perspective_camera(
+        matrix, width * samples, height * samples, fov=np.radians(spec["angle"])
+    )
+
+
+def _sun(camera: Camera, direction: Sequence[float]) -> Light:
+    toward = camera.view[:3, :3] @ (direction / np.linalg.norm(direction))
+    return Light("sun", toward, np.ones(3), 1.25)
+
+
+def with_line(
+    picture: np.ndarray, line: np.ndarray, width: int, color: tuple[int, int, int]
+) -> np.ndarray:
+    """Draw a line on a square picture. Points are fractions of it, from the top left."""
+    image = Image.fromarray(picture)
+    points = [tuple(point) for point in (line * len(picture)).tolist()]
+    ImageDraw.Draw(image).line(points, fill=color, width=width, joint="curve")
+    return np.asarray(image)

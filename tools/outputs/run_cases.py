@@ -1,0 +1,174 @@
+"""Read the cases of `cases.toml`, and run some of them with one tree: the child of compare_outputs.py.
+
+    run_cases.py TREE OUTPUTS LANE NAME...
+
+Each case runs in the folder OUTPUTS/NAME, where its outputs stay.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.util
+import io
+import itertools
+import os
+import re
+import shlex
+import shutil
+import sys
+import time
+import tomllib
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+FOLDER = Path(__file__).resolve().parent
+TABLES = tomllib.loads((FOLDER / "cases.toml").read_text(encoding="utf-8"))
+PRESETS = sorted(path.stem for path in (FOLDER.parents[1] / "presets").glob("*.json"))
+
+#: What a case printed, and its exit status, which is written last.
+LOG, STATUS = "log.txt", "status.txt"
+
+#: Pattern of an input file in the code of a case, and the folder of these files beside the outputs.
+INPUT, INPUTS = r"@([\w.-]+)", "inputs"
+
+#: `numpy` is plain Python, `bpy` Blender's Python module, `card` a full Blender with a graphics card.
+LANES = ("numpy", "bpy", "card")
+
+
+class Case(NamedTuple):
+    """Python statements whose outputs are compared, and the exit status that is expected of them."""
+
+    name: str
+    lane: str
+    code: str
+    status: int
+
+
+def read_cases() -> dict[str, Case]:
+    """Return all cases by name."""
+    cases = {}
+    for group, table in TABLES["groups"].items():
+        for pattern, runs in table["cases"].items():
+            code = "; ".join(
+                table["code"].replace("{}", words)
+                for words in ([runs] if isinstance(runs, str) else runs)
+            )
+            for word, meaning in TABLES["words"].items():
+                code = code.replace(word, meaning)
+            for name, case_code in _expanded(pattern, code):
+                name = table.get("prefix", f"{group}-") + name
+                cases[name] = Case(name, table["lane"], case_code, table.get("status", 0))
+    return cases
+
+
+def _expanded(pattern: str, code: str) -> list[tuple[str, str]]:
+    """Return a name and code for each combination of the words in braces."""
+    choices = [
+        PRESETS if words == "preset" else words.split(",")
+        for words in re.findall(r"\{(.*?)\}", pattern)
+    ]
+    if not all(choices):
+        sys.exit("compare_outputs: there are no presets")
+    expanded = []
+    for chosen in itertools.product(*choices):
+        name, case_code = re.sub(r"\{.*?\}", "{}", pattern).format(*chosen), code
+        for number, word in enumerate(chosen):
+            case_code = case_code.replace(f"{{{number}}}", word)
+        expanded.append((name, case_code))
+    return expanded
+
+
+def older_words(text: str) -> list[str]:
+    """Return a text, and as it was before the latest change of words, before the last two, and so on."""
+    texts = [text]
+    for change in TABLES["older"]:
+        for words, older in change.items():
+            text = re.sub(rf"(?<![\w-]){words}(?![\w-])", older, text)
+        texts.append(text)
+    return list(dict.fromkeys(texts))
+
+
+def run_child(tree: Path, outputs: Path, lane: str, names: list[str]) -> None:
+    """Run cases with the package in `tree`."""
+    cases = read_cases()
+    sys.path[:0] = [str(tree), str(FOLDER)]
+    extension = None if lane == "numpy" else load_extension(tree)
+    parser = importlib.import_module(f"{'rosy.' * (extension is not None)}rosy_addon.cli.parser")
+    assert Path(parser.__file__).is_relative_to(tree)
+    for name in names:
+        case, log, start = cases[name], "", time.process_time()
+        for code in older_words(case.code):
+            folder = outputs / name
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+            os.chdir(folder)
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
+                try:
+                    status = str(run_case(case, code, parser.main))
+                except BaseException:
+                    status = "error"
+                    traceback.print_exc()
+            log += printed.getvalue()
+            if status == str(case.status):
+                break
+        (folder / LOG).write_text(f"{log}\n{time.process_time() - start:.2f} s of processor time\n")
+        (folder / "scene.blend").unlink(missing_ok=True)
+        (folder / STATUS).write_text(status)
+    if extension is not None:
+        extension.unregister()
+
+
+def load_extension(tree: Path) -> Any:
+    """Load a tree's root as the package `rosy`, as Blender loads an extension, and register it."""
+    spec = importlib.util.spec_from_file_location(
+        "rosy", tree / "__init__.py", submodule_search_locations=[str(tree)]
+    )
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["rosy"] = module
+    importlib.import_module("bpy")
+    spec.loader.exec_module(module)
+    module.register()
+    return module
+
+
+def run_case(case: Case, code: str, main: Callable[..., int]) -> int:
+    """Run code in the current folder, with the names of its lane; return the largest exit status."""
+    statuses = [0]
+
+    def cli(line: str) -> None:
+        words = []
+        for word in shlex.split(line):
+            words += ["--set", word] if "=" in word else [word]
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed):
+            statuses.append(main(words))
+        if "--json" in words:
+            with Path("stdout.txt").open("a") as file:
+                file.write(printed.getvalue())
+        print(printed.getvalue())
+
+    def save(**arrays: Any) -> None:
+        for key, value in arrays.items():
+            if isinstance(value, np.ndarray):
+                np.save(f"{key}.npy", value)
+            else:
+                Path(f"{key}.txt").write_text(f"{value}")
+
+    names = {"cli": cli, "save": save, "np": np, "os": os}
+    if case.lane != "numpy":
+        import blender_scene
+
+        names |= blender_scene.names_of_case(case.name)
+    exec(re.sub(INPUT, rf"../../{INPUTS}/\1", code), names)
+    return max(statuses)
+
+
+if __name__ == "__main__":
+    tree, outputs, lane, *names = sys.argv[sys.argv.index("--child") + 1 :]
+    run_child(Path(tree), Path(outputs), lane, names)

@@ -23,7 +23,7 @@ from rosy_addon.projection.project import project
 SIZE = 512
 
 #: The settings of the original program: 40 steps in each direction, noise cells of 1.5 pixels.
-LOOK = Look(length=40, step=1.0, grain=1.5)
+LOOK = Look(length=40, line_width=1.5)
 
 
 @lru_cache(maxsize=8)
@@ -122,7 +122,7 @@ def ball_scene(triangles: int) -> object:
     """Open a scene of Blender that contains only the ball, with a field of degree 4, and return it."""
     import bpy
 
-    from rosy_addon.scene.write_field import write_mesh_field
+    from rosy_addon.scene.mesh_fields import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered
 
     bpy.ops.wm.read_factory_settings(use_empty=True)

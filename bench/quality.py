@@ -22,7 +22,6 @@ from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field, generate
-from rosy_addon.field.mesh_io import read_mesh
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import orbit_camera
@@ -176,8 +175,8 @@ def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:
                 _seen(surface, axis_field(surface, n, axis))
             ]
     if data is not None:
-        bunny = read_mesh(data / "meshes" / "stanford-bunny.obj")
-        vase = read_mesh(data / "meshes" / "vase.off")
+        bunny = Surface(data / "meshes" / "stanford-bunny.obj")
+        vase = Surface(data / "meshes" / "vase.off")
         made["bunny, N = 4"] = lambda: [_seen(bunny, generate(bunny, "curvature", 4))]
         for n in (2, 4, 7):
             file = data / "fields" / f"vase-{n}.rawfield"

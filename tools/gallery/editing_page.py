@@ -10,9 +10,8 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from rosy_addon.field.closest_point import closest_triangles
-from rosy_addon.field.combing import start_combing
+from rosy_addon.field.combing import BrushStroke, GuideBrush, start_combing
 from rosy_addon.field.generate import GeneratorSettings, generate
-from rosy_addon.field.guide_brush import BrushStroke, GuideBrush
 from rosy_addon.field.guided_system import guided_system
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import find_singularities

@@ -17,7 +17,7 @@ from .sheet import Panel, chart, gray
 DEGREE, SIZE, FIELD_SIZE = 6, 256, 400
 
 #: The look of the pictures, and of the measurements of several degrees.
-LOOK, GRAY_LOOK = MEASURED.with_settings({"noise": "color"}), MEASURED
+LOOK, GRAY_LOOK = MEASURED.with_settings({"hue": "noise"}), MEASURED
 
 EXPANDED, SEEDS = 2.5, 6
 MEMBER = np.radians(12)

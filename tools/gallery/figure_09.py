@@ -22,10 +22,10 @@ LOOK = PLANE.with_settings({"density": 0.5, "gain": 2.5})
 
 #: Ways to show the magnitude: label of the picture, label of the table, and settings.
 WAYS = (
-    ("magnitude not shown", "not shown", {"magnitude": "none"}),
-    ("as color", "color", {"magnitude": "color"}),
-    ("as length of the streaks", "length", {"magnitude": "length"}),
-    ("as both", "both", {"magnitude": "both"}),
+    ("magnitude not shown", "not shown", {}),
+    ("as color", "color", {"hue": "magnitude"}),
+    ("as length of the streaks", "length", {"magnitude_length": True}),
+    ("as both", "both", {"hue": "magnitude", "magnitude_length": True}),
 )
 
 #: Zeros of the field: positions in pixels from the center, and signs of their indices.

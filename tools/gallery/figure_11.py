@@ -8,7 +8,7 @@ from rosy_addon.compositor.contrast import expected_std
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.rosy_field import RosyField
-from rosy_addon.field.singularities import euler_characteristic, find_singularities
+from rosy_addon.field.singularities import find_singularities
 from rosy_addon.field.surface import Surface
 from rosy_addon.projection.camera import Camera
 
@@ -30,7 +30,7 @@ from .solid import (
 )
 
 WIDTH = 402
-MAGNITUDE = SOLID.with_settings({"magnitude": "color", "gain": 2.0})
+MAGNITUDE = SOLID.with_settings({"hue": "magnitude", "gain": 2.0})
 
 #: Surface, look, azimuth and elevation, height in pixels, and label of each picture.
 SHOTS = (
@@ -84,7 +84,7 @@ def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
     _, index = find_singularities(surface, field)
     kinds, counts = np.unique(index, return_counts=True)
     shown = [f"{count} of {signed(kind)}" for kind, count in zip(kinds, counts, strict=True)]
-    expected = field.degree * euler_characteristic(surface)
+    expected = field.degree * surface.euler_characteristic
     listed = ", ".join(shown) or "none"
     return [name, surface.face_count, field.degree, listed, int(index.sum()), expected]
 

@@ -20,7 +20,7 @@ DEGREE, ANGLES = 4, (-26, 8)
 
 #: Width and height of the render with a key, and its look.
 RENDER_SIZE = 824, 520
-LOOK = Look(supersampling=2, magnitude="color", singularity_dots="visible")
+LOOK = Look(supersampling=2, hue="magnitude", singularity_dots="visible")
 
 #: Widths in inches and dots per inch of the sheet and of the picture on the page.
 SHEET = {"width": 7.0, "dpi": 150, "view": ANGLES, "workers": 1}
@@ -62,7 +62,7 @@ def _render_with_key() -> Image.Image:
     from rosy_addon.jobs.bake import bake
     from rosy_addon.scene.look_properties import apply_look
     from rosy_addon.scene.meshes import mesh_surface
-    from rosy_addon.scene.write_field import write_mesh_field
+    from rosy_addon.scene.mesh_fields import write_mesh_field
     from rosy_addon.ui.properties import ensure_registered
 
     from .in_blender import add, add_suzanne

@@ -46,12 +46,12 @@ VIEW = (-14.0, 4.0)
 SLANT = 0.22
 
 #: Settings in pixels, which are enlarged so that lines are visible in a small picture.
-LENGTHS = ("length", "grain", "high_pass", "outline", "overshoot")
+LENGTHS = ("length", "line_width", "line_distance", "high_pass", "outline", "overshoot")
 ENLARGED = 1.6
 
 #: Looks of the picture of fields: gray streaks, and a plaid.
-STREAKS = Look(length=80, grain=2.6, gain=2.8, shading=0.85, supersampling=2)
-WEAVE = STREAKS.with_settings({"noise": "color", "grain": 4.0, "gain": 3.0})
+STREAKS = Look(length=80, line_width=2.6, gain=2.8, shading=0.85, supersampling=2)
+WEAVE = STREAKS.with_settings({"hue": "noise", "line_width": 4.0, "gain": 3.0})
 
 #: Size of the captions, and their color.
 CAPTION, INK = 34, (40, 40, 40)
@@ -100,7 +100,7 @@ def _presets(monkey: Surface, form: RosyField) -> Image.Image:
     for name in preset_keys():
         preset = load_preset(name)
         look = preset.look.with_settings({"supersampling": 2})
-        field = form if look.magnitude == "none" else curved
+        field = form if look.hue != "magnitude" else curved
         paper = look.paper_color if look.ink == "hatch" else "#ffffff"
         shots.append((monkey, field, look, (-26.0, 6.0), preset.name, paper))
     return _labeled(shots, 4, CAPTION * 3 // 4, CAPTION + 14, 0.04)

@@ -16,11 +16,11 @@ from PIL import Image
 
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import generate
-from rosy_addon.field.mesh_io import read_mesh
+from rosy_addon.field.surface import Surface
 from rosy_addon.field.surface import Surface, build_surface
 from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.projection.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
+from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .page import IMAGES, ROOT
 from .shapes import grid_surface, suzanne
@@ -69,7 +69,7 @@ def write_pages(folder: Path) -> None:
 
 def _read(path: Path) -> tuple[Surface, np.ndarray]:
     """Return the surface of a mesh file, and the matrix that turns it so that z is up."""
-    return read_mesh(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]]
+    return Surface(path), UP_AXIS_MATRIX[UP_AXIS_BY_SUFFIX[path.suffix]]
 
 
 def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
@@ -87,7 +87,7 @@ def _write_presets(files: dict[str, tuple[Surface, np.ndarray]]) -> None:
     sections = []
     for key in preset_keys():
         preset = load_preset(key)
-        kind = "form" if preset.look.magnitude == "none" else "curvature"
+        kind = "form" if preset.look.hue != "magnitude" else "curvature"
         first = LARGE_ON.get(key, "Suzanne")
         names = [first, *(name for name in models if name != first)]
         drawn = [

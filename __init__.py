@@ -23,7 +23,7 @@ def unregister() -> None:
     import bpy
 
     from .operators import registration as operators
-    from .rosy_addon import cache
+    from .rosy_addon.core import cache
     from .rosy_addon.gpu import device
     from .rosy_addon.scene import staleness
     from .rosy_addon.ui import registration as ui

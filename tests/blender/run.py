@@ -35,6 +35,7 @@ SIMULATED_EVENTS = ("--enable-event-simulate",)
 #: are drawn in software, but with room for the menu of all presets), and further options.
 WINDOWS = {
     "panel": ("window_panel.py", 1000, 720, SIMULATED_EVENTS),
+    "tools": ("window_tools.py", 1000, 720, SIMULATED_EVENTS),
     "presets": ("window_presets.py", 1120, 900, SIMULATED_EVENTS),
     "live": ("window_live.py", 1000, 720, ()),
     "helper": ("window_helper.py", 1000, 720, SIMULATED_EVENTS),
@@ -83,7 +84,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--shots", type=Path, help="folder for the screenshots of the panel")
     parser.add_argument(
         "--windows",
-        default="panel,presets,live,helper,first-bake",
+        default="panel,tools,presets,live,helper,first-bake",
         help="which tests to run in a window, by default all; none for headless",
     )
     parser.add_argument("--only-window", action="store_true")
@@ -98,94 +99,112 @@ def parse_arguments() -> argparse.Namespace:
     return options
 
 
+class Lane:
+    """A Blender with the zip, and the counts of outcomes of its tests.
+
+    Attributes
+    ----------
+    options : Namespace
+        The command line.
+    folder : Path
+        Where files go.
+    environment : dict of str to str
+        The variables of Blender's processes.
+    counts : dict of str to int
+        How many tests passed, failed, had errors and were skipped.
+    """
+
+    def __init__(self, options: argparse.Namespace, folder: Path) -> None:
+        self.options, self.folder = options, folder
+        self.counts = {"failed": 0, "passed": 0, "skipped": 0, "errors": 0}
+        self.zip = folder / "rosy.zip"
+        shutil.copy(options.zip, self.zip)
+        self.environment = os.environ | {
+            "BLENDER_USER_RESOURCES": str(folder / "user"),
+            "ROSY_BLENDER_LANE": str(folder),
+            "ROSY_ZIP": str(self.zip),
+            "ROSY_STEPS": options.steps,
+            "ROSY_MANY": "1" if options.many else "",
+            "ROSY_BACKEND": "vulkan" if options.vulkan else "opengl",
+            "PYTHONDONTWRITEBYTECODE": "1",
+            # Beside other runs, threads of linear algebra only wait for each other.
+            "OPENBLAS_NUM_THREADS": "1",
+        }
+        self.backend = ["--gpu-backend", self.environment["ROSY_BACKEND"]]
+
+    def blender(self, verb: str, *command: str, timeout: float = 600.0, **run_options) -> Any:
+        """Run a verb of `real-blender`, and return the finished process."""
+        full_command = [str(self.options.real_blender), verb, self.options.which, *command]
+        settings = {"cwd": REPOSITORY, "env": self.environment, "check": False}
+        return subprocess.run(full_command, timeout=timeout, **settings, **run_options)
+
+    def install(self) -> bool:
+        """Install the zip, and return whether that was possible."""
+        extension = ("run", "--command", "extension")
+        if self.blender(*extension, "validate", str(self.zip)).returncode:
+            self.counts["failed"] += 1
+        installing = ("install-file", "-r", "user_default", "--enable", str(self.zip))
+        is_installed = not self.blender(*extension, *installing).returncode
+        self.counts["errors"] += not is_installed
+        return is_installed
+
+    def test_without_a_window(self) -> None:
+        """Run pytest inside Blender, and the monkey."""
+        results = self.folder / "results.xml"
+        self.blender(
+            "run", *self.backend, "--python-exit-code", "1", "-P", str(HERE / "run_pytest.py"), "--",
+            "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
+            *self.options.pytest, str(HERE),
+        )  # fmt: skip
+        add_junit(self.counts, results)
+        monkey = [sys.executable, str(HERE / "monkey.py"), str(self.zip), "--steps", "400"]
+        monkey += ["--blender", str(self.options.real_blender.resolve())]
+        monkey += ["--which", self.options.which]
+        status = subprocess.run(monkey, cwd=REPOSITORY, check=False, timeout=300.0).returncode
+        self.counts["failed" if status else "passed"] += 1
+
+    def test_in_a_window(self, script: str, width: int, height: int, options: tuple) -> None:
+        """Run the steps of a script in a window."""
+        results_file = self.folder / f"{script}.json"
+        self.environment["ROSY_RESULTS"] = str(results_file)
+        is_large = width > SCREEN[0] or height > SCREEN[1]
+        time_limit = 900 if is_large or self.options.many else 600
+        arguments = [
+            *self.backend, "--window-geometry", "0", "0", str(width), str(height), *options,
+            "--python-exit-code", "1", "-P", str(HERE / script),
+        ]  # fmt: skip
+        command = ["gui", "-s", str(time_limit), *arguments]
+        if is_large:
+            screen = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
+            command = ["sh", shlex.join([*screen, "blender", *arguments])]
+        wait_for_turn()
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        process = self.blender(*command, timeout=time_limit + 60.0, **streams)
+        add_window(self.counts, results_file)
+        add_processes(self.counts, results_file.with_suffix(".processes"))
+        # Errors in the drawing of a panel appear on the terminal alone.
+        if "Traceback" in process.stdout:
+            text = process.stdout[process.stdout.index("Traceback") :][:3000]
+            print(f"in the window:\n{text}")
+            self.counts["failed"] += 1
+
+
 def run_tests(options: argparse.Namespace, folder: Path) -> dict[str, int]:
     """Run all parts, and return how many tests passed, failed, had errors and were skipped."""
-    zipped = folder / "rosy.zip"
-    shutil.copy(options.zip, zipped)
-    environment = dict(
-        os.environ,
-        BLENDER_USER_RESOURCES=str(folder / "user"),
-        ROSY_BLENDER_LANE=str(folder),
-        ROSY_ZIP=str(zipped),
-        PYTHONDONTWRITEBYTECODE="1",
-        # Beside other runs, threads of linear algebra only wait for each other.
-        OPENBLAS_NUM_THREADS="1",
-    )
-
-    environment["ROSY_STEPS"] = options.steps
-    environment["ROSY_MANY"] = "1" if options.many else ""
-    environment["ROSY_BACKEND"] = "vulkan" if options.vulkan else "opengl"
-    backend = ["--gpu-backend", environment["ROSY_BACKEND"]]
-
-    def blender(verb: str, *command: str, timeout: float = 600.0, **run_options) -> Any:
-        full_command = [str(options.real_blender), verb, options.which, *command]
-        return subprocess.run(
-            full_command,
-            cwd=REPOSITORY,
-            env=environment,
-            timeout=timeout,
-            check=False,
-            **run_options,
-        )
-
-    counts = {"failed": 0, "passed": 0, "skipped": 0, "errors": 0}
-    if blender("run", "--command", "extension", "validate", str(zipped)).returncode:
-        counts["failed"] += 1
-    installing = ("install-file", "-r", "user_default", "--enable", str(zipped))
-    if blender("run", "--command", "extension", *installing).returncode:
-        counts["errors"] += 1
-        return counts
+    lane = Lane(options, folder)
+    if not lane.install():
+        return lane.counts
     if not options.only_window:
-        results = folder / "results.xml"
-        blender(
-            "run", *backend, "--python-exit-code", "1", "-P", str(HERE / "run_pytest.py"), "--",
-            "-c", str(HERE / "pytest.ini"), f"--rootdir={HERE}", f"--junitxml={results}",
-            *options.pytest, str(HERE),
-        )  # fmt: skip
-        add_junit(counts, results)
-        monkey = [
-            sys.executable, str(HERE / "monkey.py"), str(zipped), "--steps", "400",
-            "--blender", str(options.real_blender.resolve()), "--which", options.which,
-        ]  # fmt: skip
-        status = subprocess.run(monkey, cwd=REPOSITORY, check=False, timeout=300.0).returncode
-        counts["failed" if status else "passed"] += 1
-    windows = [WINDOWS[name] for name in options.windows.split(",") if name != "none"]
-    if windows:
-        shots = folder / "shots"
-        shots.mkdir()
-        environment["ROSY_SHOTS"] = str(shots)
-        for script, width, height, further_options in windows:
-            results_file = folder / f"{script}.json"
-            environment["ROSY_RESULTS"] = str(results_file)
-            is_large = width > SCREEN[0] or height > SCREEN[1]
-            time_limit = 900 if is_large or options.many else 600
-            arguments = [
-                *backend, "--window-geometry", "0", "0", str(width), str(height), *further_options,
-                "--python-exit-code", "1", "-P", str(HERE / script),
-            ]  # fmt: skip
-            command = ["gui", "-s", str(time_limit), *arguments]
-            if is_large:
-                screen = ["xvfb-run", "-a", "-s", f"-screen 0 {width}x{height}x24"]
-                command = ["sh", shlex.join([*screen, "blender", *arguments])]
-            wait_for_turn()
-            process = blender(
-                *command,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                timeout=time_limit + 60.0,
-            )
-            add_window(counts, results_file)
-            add_processes(counts, results_file.with_suffix(".processes"))
-            # Errors in the drawing of a panel appear on the terminal alone.
-            if "Traceback" in process.stdout:
-                print(
-                    "in the window:\n" + process.stdout[process.stdout.index("Traceback") :][:3000]
-                )
-                counts["failed"] += 1
-        if options.shots is not None:
-            shutil.copytree(shots, options.shots, dirs_exist_ok=True)
-    return counts
+        lane.test_without_a_window()
+    shots = folder / "shots"
+    shots.mkdir()
+    lane.environment["ROSY_SHOTS"] = str(shots)
+    for name in options.windows.split(","):
+        if name != "none":
+            lane.test_in_a_window(*WINDOWS[name])
+    if options.shots is not None:
+        shutil.copytree(shots, options.shots, dirs_exist_ok=True)
+    return lane.counts
 
 
 def wait_for_turn() -> None:

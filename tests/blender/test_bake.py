@@ -7,7 +7,7 @@ import subprocess
 import bpy
 import numpy as np
 import pytest
-from conftest import add_camera, contents, error_of
+from conftest import contents, error_of
 
 
 def baked_images():
@@ -37,15 +37,6 @@ def render(scene, folder):
     scene.render.filepath = str(folder / "cycles.png")
     bpy.ops.render.render(write_still=True)
     return pixels(bpy.data.images.load(scene.render.filepath))
-
-
-def test_bake_makes_a_picture(baked, scene):
-    (image,) = baked_images()
-    assert tuple(image.size) == (160, 120)
-    picture = pixels(image)
-    covered = picture[..., 3] > 0.5
-    assert 0.05 < covered.mean() < 0.9
-    assert picture[covered][:, 0].std() > 0.1
 
 
 RENDER_ALONE = """
@@ -146,61 +137,8 @@ def test_undo(with_field, scene, previous):
         np.testing.assert_array_equal(pixels(image), picture)
 
 
-def test_remove(with_field):
-    before = contents()
-    bpy.ops.rosy.bake()
-    assert contents() != before
-    assert bpy.ops.rosy.remove() == {"FINISHED"}
-    assert contents() == before
-
-
-def test_all_cameras(with_field, scene):
-    add_camera("Behind", (0.0, 6.0, 0.0), (np.pi / 2, 0.0, np.pi))
-    assert bpy.ops.rosy.bake(camera="ALL") == {"FINISHED"}
-    assert len(baked_images()) == 2
-    material_names = {material_of(with_field).name}
-    for bake in scene.rosy.bakes:
-        assert bpy.ops.rosy.show(camera=bake.name) == {"FINISHED"}
-        assert material_of(with_field) == bake.material
-        material_names.add(material_of(with_field).name)
-    assert len(material_names) == 2
-    assert "Nobody" in error_of(bpy.ops.rosy.show, camera="Nobody")
-
-
-def test_errors(with_field, scene):
-    before = contents()
-    camera = scene.camera
-    scene.camera = None
-    assert "camera" in error_of(bpy.ops.rosy.bake)
-    scene.camera = camera
-    camera.data.type = "PANO"
-    assert "Camera" in error_of(bpy.ops.rosy.bake)
-    camera.data.type = "PERSP"
-    camera.location.y = 1e6
-    assert error_of(bpy.ops.rosy.bake)
-    assert contents() == before
-
-
 def test_current_view_needs_a_view(with_field):
     assert "view" in error_of(bpy.ops.rosy.bake, camera="VIEW")
-
-
-def test_edit_mode_and_shared_mesh(with_field, scene):
-    other = bpy.data.objects.new("Other", with_field.data)
-    other.location.x = 2.5
-    scene.collection.objects.link(other)
-    assert bpy.ops.rosy.bake() == {"FINISHED"}
-    assert len(baked_images()) == 1
-    bpy.ops.rosy.remove()
-    bpy.ops.object.mode_set(mode="EDIT")
-    before = contents()
-    try:
-        result = bpy.ops.rosy.bake()
-    except RuntimeError:
-        assert contents() == before
-    else:
-        assert result == {"FINISHED"}
-    bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def test_bake_animation(with_field, tmp_path):
@@ -234,21 +172,6 @@ def test_turntable(with_field, tmp_path):
     clip = bpy.data.movieclips.load(str(tmp_path / "film.mp4"))
     assert clip.frame_duration == 4
     assert len(bpy.data.scenes) == 1
-
-
-def test_a_turntable_is_lit_by_the_scene(with_field, scene, tmp_path):
-    scene.rosy.look.shading, scene.rosy.look.light = 1.0, "scene"
-    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-    sun.rotation_euler = (1.2, 0.0, 0.5)
-    scene.collection.objects.link(sun)
-    videos = []
-    for energy in (0.0, 3.0):
-        sun.data.energy = energy
-        path = tmp_path / f"{energy}.gif"
-        settings = {"filepath": str(path), "film": ".gif", "width": 48, "height": 48}
-        assert bpy.ops.rosy.turntable(pictures=2, **settings) == {"FINISHED"}
-        videos.append(path.read_bytes())
-    assert videos[0] != videos[1]
 
 
 def test_a_turntable_uses_the_device_of_the_scene(with_field, scene, tmp_path):

@@ -128,18 +128,3 @@ def test_unwrapping_is_undone_if_the_bake_fails(with_field, scene):
     assert "no UV map 'None'" in error_of(bpy.ops.rosy.bake_texture, unwrap=True)
     assert contents() == before
     assert bpy.context.object == cube and len(bpy.context.selected_objects) == 2
-
-
-def test_undo_and_remove(with_field, scene):
-    scene.rosy.texture_size = 64
-    before = contents()
-    bpy.ops.ed.undo_push(message="before")
-    bpy.ops.rosy.bake_texture()
-    after = contents()
-    bpy.ops.ed.undo_push(message="after")
-    bpy.ops.ed.undo()
-    assert contents() == before
-    bpy.ops.ed.redo()
-    assert contents() == after
-    assert bpy.ops.rosy.remove() == {"FINISHED"}
-    assert contents() == before

@@ -15,6 +15,7 @@ import bpy
 from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
+import window_steps
 from window_steps import (
     MANY,
     capture,
@@ -188,12 +189,7 @@ def live_suzanne():
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 1.0
     space = view()[1].spaces.active
-    space.show_region_ui = True
-    yield 0.5
-    for _ in range(3):
-        view()[3].active_panel_category = "RoSy"
-        view()[1].tag_redraw()
-        yield 0.3
+    yield from window_steps.open_tab()
     with in_view():
         bpy.ops.mesh.primitive_monkey_add()
         modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")

@@ -8,10 +8,8 @@ checks that no process of `PROCESSES` is left.
 from __future__ import annotations
 
 import json
-import math
 import os
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -20,16 +18,18 @@ import bpy
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from conftest import add_camera, contents
+from conftest import contents
 from window_steps import (
     RESULTS,
-    SHOTS,
     descendants,
+    fresh_scene,
     in_view,
     is_running,
     preferences,
+    press,
     rosy,
     run_steps,
+    status,
     view,
     wait_until,
 )
@@ -46,32 +46,10 @@ LARGEST_PAUSE = 0.4
 
 def suzanne(size=(320, 240)):
     """Create a scene with Suzanne, her field and a camera."""
-    bpy.ops.wm.read_homefile(use_empty=True)
-    yield 0.5
+    yield from fresh_scene(size)
     with in_view():
-        bpy.ops.mesh.primitive_monkey_add()
-        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
-        modifier.levels = modifier.render_levels = 2
-        camera = add_camera("Camera", (0.0, -4.5, 1.0), (math.radians(78), 0.0, 0.0))
-        bpy.context.scene.camera = camera
-        bpy.ops.object.select_all(action="DESELECT")
-        monkey = bpy.data.objects["Suzanne"]
-        monkey.select_set(True)
-        bpy.context.view_layer.objects.active = monkey
         bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="curvature", degree=4)
         bpy.ops.ed.undo_push(message="field")
-    render = bpy.context.scene.render
-    render.resolution_x, render.resolution_y = size
-    area = view()[1]
-    area.spaces.active.show_region_ui = True
-    yield 0.3
-    view()[3].active_panel_category = "RoSy"
-    area.tag_redraw()
-    yield 0.3
-
-
-def status():
-    return rosy("rosy_addon.ui.job_status")
 
 
 def helper_id():
@@ -98,12 +76,6 @@ def start_long_bake():
     start_bake()
     yield from wait_until(lambda: status().current is None or status().current.fraction > 0.1)
     assert status().current is not None, "the job ended before it could be interrupted"
-
-
-def note(name, *seconds):
-    """Add measured seconds to the file of them beside the screenshots."""
-    with (SHOTS / "helper-seconds.txt").open("a") as file:
-        print(name, *(f"{value:.3f}" for value in seconds), file=file)
 
 
 def baked_pixels():
@@ -136,16 +108,12 @@ def picture_from_the_helper():
     start_bake()
     longest = yield from wait_for_job()
     seconds = time.monotonic() - start
-    note("longest pause, and the whole bake", longest, seconds)
     assert longest < LARGEST_PAUSE * seconds, (longest, seconds)
     assert helper_id() == first and is_running(first)
     picture = baked_pixels()
     with in_view():
         bpy.ops.rosy.bake("EXEC_DEFAULT", True)
     np.testing.assert_array_equal(baked_pixels(), picture)
-    subprocess.run(
-        ["import", "-window", "root", str(SHOTS / "helper-baked.png")], check=True, timeout=20
-    )
 
 
 def another_look_is_quick():
@@ -160,7 +128,6 @@ def another_look_is_quick():
         yield from wait_for_job()
         seconds.append(helper_cpu_seconds() - start)
     preferences().workers = 0
-    note("bakes with three looks, by the processor", *seconds)
     assert min(seconds[1:]) < 0.9 * seconds[0], seconds
 
 
@@ -178,17 +145,11 @@ def escape_ends_the_helper_at_once():
 
     job_class.stop = timed_stop
     try:
-        window, _, region, _ = view()
-        x, y = region.x + region.width // 2, region.y + region.height // 2
-        start = time.monotonic()
-        window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
-        window.event_simulate(type="ESC", value="RELEASE", x=x, y=y)
+        press("ESC")
         yield from wait_until(lambda: status().current is None)
-        note("from ESC to the end, with the drawing of the window", time.monotonic() - start)
     finally:
         job_class.stop = stop
     ((reason, seconds, is_left),) = stopped
-    note("from ESC to the end", seconds)
     assert reason == "cancelled" and seconds < STOP_SECONDS and not is_left, stopped
     assert contents() == before
     yield 0.3

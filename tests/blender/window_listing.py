@@ -16,6 +16,7 @@ from window_steps import (
     SHOTS,
     capture,
     in_view,
+    open_tab,
     preferences,
     rosy,
     run_steps,
@@ -46,16 +47,6 @@ def save_view(name):
     bottom = area.y + area.height - SIZE[1]
     save_part(f"screen-{name}", name, area.x, bottom, *SIZE)
     (SHOTS / f"screen-{name}.png").unlink()
-
-
-def open_tab():
-    """Show the tab of RoSy. It takes several redraws to be there."""
-    view()[1].spaces.active.show_region_ui = True
-    for _ in range(4):
-        yield 0.4
-        if view()[3].width > 1:
-            view()[3].active_panel_category = "RoSy"
-        view()[1].tag_redraw()
 
 
 def live():

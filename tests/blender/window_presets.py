@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
-from window_steps import MANY, capture, in_view, rosy, run_steps, save_part, view
+from window_steps import capture, in_view, open_tab, press, rosy, run_steps, save_part, view
 
 EXTENSION = "bl_ext.user_default.rosy"
 
@@ -30,13 +30,7 @@ def open_look():
     """Open an empty scene, and RoSy's tab of the sidebar."""
     bpy.ops.wm.read_homefile(use_empty=True)
     yield 0.5
-    area = view()[1]
-    area.spaces.active.show_region_ui = True
-    yield 0.5
-    for _ in range(3):
-        view()[3].active_panel_category = "RoSy"
-        area.tag_redraw()
-        yield 0.3
+    yield from open_tab()
 
 
 def wait_for_previews():
@@ -81,9 +75,8 @@ def click(x, y):
     yield 0.5
 
 
-def press(kind):
-    for value in ("PRESS", "RELEASE"):
-        view()[0].event_simulate(type=kind, value=value, x=400, y=300)
+def press_key(key):
+    press(key)
     yield 0.5
 
 
@@ -123,7 +116,7 @@ def preset_saved_by_a_dialog():
         bpy.ops.rosy.preset_save("INVOKE_DEFAULT", name="Mine", sentence="Long streaks")
     yield 1.0
     yield from save_screenshot("presets-4-save")
-    yield from press("RET")
+    yield from press_key("RET")
     assert settings.preset == "mine" and library().user_preset_keys() == ["mine"]
     yield from save_screenshot("presets-5-saved")
     assert not library().is_changed(settings)
@@ -138,8 +131,8 @@ def preset_replaced_only_on_request():
         bpy.ops.rosy.preset_save("INVOKE_DEFAULT")
     yield 1.0
     yield from save_screenshot("presets-6-replace")
-    yield from press("RET")
-    yield from press("ESC")  # closes the error message
+    yield from press_key("RET")
+    yield from press_key("ESC")  # closes the error message
     assert library().active_entry(settings).preset.look.ink == "soft" and library().is_changed(
         settings
     )
@@ -157,7 +150,7 @@ def menu_with_an_unreadable_file():
         bpy.ops.wm.call_menu(name="VIEW3D_MT_rosy_presets")
     yield 1.0
     yield from save_screenshot("presets-8-menu")
-    yield from press("ESC")
+    yield from press_key("ESC")
     (folder / "broken.json").unlink()
 
 
@@ -167,22 +160,19 @@ def preset_deleted_only_if_confirmed():
             bpy.ops.rosy.preset_remove("INVOKE_DEFAULT")
         yield 1.0
         yield from save_screenshot(f"presets-9-delete-{key.lower()}")
-        yield from press(key)
+        yield from press_key(key)
         assert library().user_preset_keys() == remaining, key
     yield from save_screenshot("presets-10-deleted")
 
 
 def previews_are_freed_with_the_extension():
-    for _ in range(3 if MANY else 1):
-        yield from wait_for_previews()
-        previews = library()._LIBRARY.previews
-        assert len(previews) == len(library().entries())
-        bpy.ops.preferences.addon_disable(module=EXTENSION)
-        assert not len(previews)
-        yield 0.2
-        bpy.ops.preferences.addon_enable(module=EXTENSION)
-        yield from wait_for_previews()
-        view()[3].active_panel_category = "RoSy"
+    yield from wait_for_previews()
+    previews = library()._LIBRARY.previews
+    assert len(previews) == len(library().entries())
+    bpy.ops.preferences.addon_disable(module=EXTENSION)
+    assert not len(previews)
+    yield 0.2
+    bpy.ops.preferences.addon_enable(module=EXTENSION)
 
 
 run_steps(

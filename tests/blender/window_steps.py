@@ -7,15 +7,20 @@ results are written to the file of ROSY_RESULTS, as {step: [error or "", seconds
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
 import time
 import traceback
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+from conftest import add_camera
 
 SHOTS = Path(os.environ["ROSY_SHOTS"])
 RESULTS = Path(os.environ["ROSY_RESULTS"])
@@ -101,6 +106,45 @@ def view():
     return window, area, regions["WINDOW"], regions["UI"]
 
 
+def status():
+    """Return the module that knows how far the running job has come."""
+    return rosy("rosy_addon.ui.job_status")
+
+
+def open_tab():
+    """Open RoSy's tab of the sidebar. Blender knows it once the sidebar has been drawn."""
+    view()[1].spaces.active.show_region_ui = True
+    for _ in range(3):
+        yield 0.3
+        view()[3].active_panel_category = "RoSy"
+        view()[1].tag_redraw()
+    yield 0.3
+
+
+def fresh_scene(size=(320, 240)):
+    """Create a scene with Suzanne, a light and a camera, and open RoSy's tab of the sidebar."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = size
+    view()[1].spaces.active.shading.type = "SOLID"
+    yield from open_tab()
+    with in_view():
+        bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.3, 0.2))
+        scene.camera = add_camera("Camera", (0.0, -4.5, 1.0), (math.radians(78), 0.0, 0.0))
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = 2
+        bpy.ops.ed.undo_push(message="fresh scene")
+
+
+def press(key):
+    """Press and release a key over the window that has opened last, such as a file browser."""
+    window = bpy.context.window_manager.windows[-1]
+    for value in ("PRESS", "RELEASE"):
+        window.event_simulate(type=key, value=value, x=window.width // 3, y=window.height // 2)
+
+
 def in_view():
     """Return a context in which operators find the 3D view."""
     window, area, region, _ = view()
@@ -141,16 +185,29 @@ def descendants():
     return sorted(found)
 
 
-def redraw_view():
-    """Yield until the 3D view has been drawn once more, so that its matrices are those of its settings."""
+@contextmanager
+def redraws(record=None):
+    """Return a list that gets an entry whenever a 3D view was drawn; `record` is called then, too."""
     drawn = []
+
+    def note():
+        drawn.append(True)
+        if record is not None:
+            record()
+
     space = bpy.types.SpaceView3D
-    handler = space.draw_handler_add(lambda: drawn.append(True), (), "WINDOW", "POST_PIXEL")
+    handler = space.draw_handler_add(note, (), "WINDOW", "POST_PIXEL")
     try:
-        view()[1].tag_redraw()
-        yield from wait_until(lambda: drawn)
+        yield drawn
     finally:
         space.draw_handler_remove(handler, "WINDOW")
+
+
+def redraw_view():
+    """Yield until the 3D view has been drawn once more, so that its matrices are those of its settings."""
+    with redraws() as drawn:
+        view()[1].tag_redraw()
+        yield from wait_until(lambda: drawn)
 
 
 def capture(name, region):
@@ -172,13 +229,15 @@ def capture(name, region):
     return part.astype(np.float32) / 255
 
 
-def save_part(screenshot, name, x, y, width, height):
+def save_part(screenshot, name, x, y, width, height, colors=PICTURE_COLORS):
     """Save a part of the screenshot of `capture` as NAME.png, for the documentation.
 
-    `x` and `y` are pixels from the lower left of the window, which is that of the screen.
+    `x` and `y` are pixels from the lower left of the window and of the screen. The number of colors is
+    not reduced if it is None.
     """
     crop = f"{width}x{height}+{x}+{y}"
-    cropping = ["-gravity", "SouthWest", "-crop", crop, "+repage", "-strip"]
-    colors = ["+dither", "-colors", str(PICTURE_COLORS)]
-    command = ["convert", SHOTS / f"{screenshot}.png", *cropping, *colors, SHOTS / f"{name}.png"]
+    options = ["-gravity", "SouthWest", "-crop", crop, "+repage"]
+    if colors is not None:
+        options += ["-strip", "+dither", "-colors", str(colors)]
+    command = ["convert", SHOTS / f"{screenshot}.png", *options, SHOTS / f"{name}.png"]
     subprocess.run(command, check=True, timeout=20)

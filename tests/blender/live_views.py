@@ -1,0 +1,247 @@
+"""What the tests of the live view in a window share: its scenes, and what the screen has to show."""
+
+from __future__ import annotations
+
+import functools
+import math
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Euler
+
+sys.path.insert(0, str(Path(__file__).parent))
+from window_steps import capture, in_view, redraws, rosy, view, wait_until
+
+#: Seconds for which a window at rest is measured, and CPU seconds that it may take in each of them:
+#: it looks for closed views, and draws no pixel.
+REST_SECONDS, REST_LOAD = 0.8, 0.08
+
+
+def session_module():
+    return rosy("rosy_addon.viewport.session")
+
+
+def messages():
+    """Return what the live view says."""
+    return session_module().messages(view()[1])
+
+
+def switch(show, **options):
+    with in_view():
+        assert bpy.ops.rosy.viewport(show=show, **options) == {"FINISHED"}
+
+
+def bare_view():
+    """Hide everything in the 3D view but the scene, and return its space."""
+    _, area, _, _ = view()
+    space = area.spaces.active
+    space.overlay.show_overlays = space.show_gizmo = False
+    space.show_region_header = space.show_region_tool_header = False
+    space.show_region_toolbar = space.show_region_ui = False
+    space.shading.type = "SOLID"
+    return space
+
+
+def fresh_scene(levels=2):
+    """Create a scene with Suzanne and a field, in a bare view."""
+    session_module().stop()
+    bpy.ops.wm.read_homefile(use_empty=True)
+    yield 0.5
+    with in_view():
+        bpy.ops.mesh.primitive_monkey_add()
+        modifier = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+        modifier.levels = modifier.render_levels = levels
+        bpy.ops.object.shade_smooth()
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
+        bpy.ops.object.select_all(action="DESELECT")
+    space = bare_view()
+    space.region_3d.view_distance = 7.0
+    space.region_3d.view_perspective = "PERSP"
+    look_from(0.3, -0.3)
+    yield 0.5
+
+
+def look_from(azimuth, elevation):
+    region_3d = bare_view().region_3d
+    rotation = Euler((math.pi / 2 + elevation, 0.0, azimuth)).to_quaternion()
+    region_3d.view_rotation = rotation
+    view()[1].tag_redraw()
+
+
+def wait_for_final_pictures():
+    """Wait until all views have drawn their final pictures."""
+
+    def rests():
+        view()[1].tag_redraw()
+        session = session_module()._session
+        final_downscale = session.progressive.renderer.downscale_factors[1]
+        views = session.progressive.views.values()
+        return (
+            len(drawn) >= 3
+            and views
+            and all(
+                state.texture_key == state.requested_key
+                and state.downscale == final_downscale
+                and state.requested_key is not None
+                for state in views
+            )
+        )
+
+    with redraws() as drawn:
+        yield from wait_until(rests)
+        drawn.clear()
+        yield from wait_until(rests)
+    yield 0.2
+
+
+def bake_of_view(region=None, region_3d=None, method="brute"):
+    """Return the picture that a bake draws of a region, (h, w, 4) display values."""
+    region = region or view()[2]
+    region_3d = region_3d or view()[1].spaces.active.region_3d
+    camera = rosy("rosy_addon.scene.cameras").camera_of_view(region, region_3d)
+    scene = bpy.context.scene
+    look = replace(rosy("rosy_addon.scene.look_properties").read_look(scene.rosy), method=method)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    request = rosy("rosy_addon.scene.read_request").read_request(scene, look)
+    instances = rosy("rosy_addon.scene.scene_reader").read_scene(depsgraph, None, request).instances
+    lights = rosy("rosy_addon.scene.lights").read_lights(depsgraph, camera.view)
+    gbuffer = rosy("rosy_addon.projection.project").project(instances, camera, look.display)
+    compose = rosy("rosy_addon.compositor.compose").compose
+    picture = compose(gbuffer, look, lights).rgba.copy()
+    picture[..., :3] = rosy("rosy_addon.core.color").to_display(picture[..., :3])
+    return picture
+
+
+def check_is_bake(name, min_correlation=0.98, max_difference=0.01, **options):
+    """Check that the screen shows the picture that `bake_of_view` draws, and return both."""
+    yield from wait_for_final_pictures()
+    drawn = bake_of_view(**options)
+    seen = capture(name, options.get("region") or view()[2])
+    inside = eroded(drawn[..., 3] > 0)
+    seen_tones, drawn_tones = seen[inside].mean(axis=1), drawn[inside][:, :3].mean(axis=1)
+    correlation = np.corrcoef(seen_tones, drawn_tones)[0, 1]
+    means = seen_tones.mean(), drawn_tones.mean()
+    assert correlation >= min_correlation, f"{name}: correlation {correlation:.4f}"
+    assert abs(means[0] - means[1]) < max_difference, f"{name}: {means}"
+    return seen, drawn
+
+
+def eroded(mask):
+    """Return a mask without its border, which Blender may draw differently."""
+    inside = mask.copy()
+    for axis in (0, 1):
+        for step in (-1, 1):
+            inside &= np.roll(mask, step, axis)
+    return inside
+
+
+def live(levels=2):
+    """Return a decorator for a step: it begins with a live view of Suzanne, and the view is off afterwards."""
+
+    def decorate(step):
+        @functools.wraps(step)
+        def run():
+            yield from fresh_scene(levels)
+            switch("ON")
+            yield from wait_for_final_pictures()
+            yield from step(bpy.data.objects["Suzanne"])
+            switch("OFF")
+            yield 0.5
+            check_nothing_is_left()
+
+        return run
+
+    return decorate
+
+
+def check_nothing_is_left():
+    assert session_module()._session is None
+    for name in dir(bpy.app.handlers):
+        handlers = getattr(bpy.app.handlers, name)
+        for handler in handlers if isinstance(handlers, list) else ():
+            assert "viewport" not in getattr(handler, "__module__", ""), name
+
+
+def visible_instances():
+    """Return the instances that the live view draws now."""
+    session = session_module()._session
+    (layer,) = session.layers._layers.values()
+    space = view()[1].spaces.active
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    is_visible = rosy("rosy_addon.viewport.view3d").is_visible
+    return [
+        entry for entry in layer.instances if is_visible(entry.visibility_object, depsgraph, space)
+    ]
+
+
+def load_at_rest():
+    """Wait until the window rests, and return the CPU seconds that it takes in each second."""
+    yield 0.7
+    start = time.process_time()
+    yield REST_SECONDS
+    return (time.process_time() - start) / REST_SECONDS
+
+
+def is_live():
+    return session_module().is_live(view()[1].spaces.active)
+
+
+def _remeshed(monkey):
+    modifier = monkey.modifiers.new("Rebuild", "REMESH")
+    modifier.mode, modifier.voxel_size = "VOXEL", 0.1
+    yield
+    monkey.modifiers.remove(modifier)
+
+
+def _not_finite(monkey):
+    attribute = monkey.data.attributes["rosy"]
+    vector = attribute.data[7].vector.copy()
+    attribute.data[7].vector = (math.nan, 0.0, 0.0)
+    monkey.data.update()
+    yield
+    attribute = monkey.data.attributes["rosy"]
+    attribute.data[7].vector = vector
+    monkey.data.update()
+
+
+def _edit_mode(monkey):
+    attributes = monkey.data.attributes
+    attributes.new("painted", "FLOAT_VECTOR", "POINT")
+    monkey.data.rosy.attribute = "painted"
+    bpy.context.view_layer.objects.active = monkey
+    with in_view():
+        bpy.ops.object.mode_set(mode="EDIT")
+    yield
+    with in_view():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    monkey.data.rosy.attribute = "rosy"
+    attributes.remove(attributes["painted"])
+    monkey.select_set(False)
+
+
+def _no_memory(monkey):
+    renderer = type(session_module()._session.progressive.renderer)
+    original = renderer.texture_steps
+
+    def fail(*_, **__):
+        raise MemoryError
+
+    renderer.texture_steps = fail
+    bpy.context.scene.rosy.look.seed += 1
+    yield
+    renderer.texture_steps = original
+    bpy.context.scene.rosy.look.seed += 1
+
+
+#: Causes of a view that shows no field, one of each kind: a modifier, an attribute, a mode, and an error;
+#: and words of the message.
+CAUSES = (
+    (_remeshed, ("'Suzanne'", "Rebuild", "no attribute 'rosy'")),
+    (_not_finite, ("'Suzanne'", "not finite")),
+    (_edit_mode, ("'Suzanne'", "edit mode")),
+    (_no_memory, ("not enough memory",)),
+)

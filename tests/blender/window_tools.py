@@ -1,0 +1,225 @@
+"""The tools of RoSy in a window, used with the mouse: singularities, the comb, and annotations as guides.
+
+Run by run.py, as window_panel.py is.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+sys.path.insert(0, str(Path(__file__).parent))
+from window_steps import fresh_scene, in_view, redraw_view, rosy, run_steps, view, wait_until
+
+
+def annotations_guide_a_field():
+    """A stroke of the Annotate tool across the middle of a sphere, drawn on its surface."""
+    yield from fresh_scene()
+    scene = bpy.context.scene
+    with in_view():
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(0.5, 0.0, 0.0))
+        bpy.ops.view3d.view_axis(type="FRONT")
+    view()[1].spaces.active.region_3d.view_distance = 5.0
+    view()[1].spaces.active.region_3d.view_perspective = "ORTHO"
+    yield 0.5
+    scene.tool_settings.annotation_stroke_placement_view3d = "SURFACE"
+    region = view()[2]
+    region_3d = view()[1].spaces.active.region_3d
+    ends = np.linspace((0.0, -1.0, -0.5), (1.0, -1.0, 0.5), 30)
+    points = [
+        {
+            "name": "",
+            "location": (0.0, 0.0, 0.0),
+            "mouse": location_3d_to_region_2d(region, region_3d, point),
+            "mouse_event": (0.0, 0.0),
+            "pressure": 1.0,
+            "size": 1.0,
+            "pen_flip": False,
+            "x_tilt": 0.0,
+            "y_tilt": 0.0,
+            "time": 0.1 * index,
+            "is_start": index == 0,
+        }
+        for index, point in enumerate(ends)
+    ]
+    # Blender asks for all properties of its version, and for no others.
+    names = bpy.types.OperatorStrokeElement.bl_rna.properties.keys()
+    stroke = [{name: point[name] for name in point if name in names} for point in points]
+    with in_view():
+        bpy.ops.gpencil.annotate("EXEC_DEFAULT", mode="DRAW", stroke=stroke, wait_for_input=False)
+        bpy.ops.rosy.field_generate(
+            "EXEC_DEFAULT", True, kind="guided", degree=2, guides={"ANNOTATIONS"}
+        )
+    mesh = bpy.context.object.data
+    vectors = np.empty(3 * len(mesh.polygons), dtype=np.float32)
+    mesh.attributes["rosy"].data.foreach_get("vector", vectors)
+    center = np.array([face.center for face in mesh.polygons])
+    x, y, z = center.T
+    near = (np.abs(x - z) < 0.05) & (np.abs(x) < 0.4) & (y < 0.0)
+    assert near.sum() > 5
+    direction = vectors.reshape(-1, 3)[near]
+    angle = np.degrees(np.arctan2(direction[:, 2], direction[:, 0])) % 180.0
+    assert np.abs(angle - 45.0).max() < 5.0, angle
+
+
+def singularities_dragged_with_the_tool():
+    """Move one, undo that, and drag a new pair apart with Ctrl."""
+    yield from fresh_scene()
+    with in_view():
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+        # Four singularities are around the middle of the view. The smoothest field has them anywhere, as
+        # Blender orders the faces differently each time: also below the sidebar or the navigation gizmo.
+        bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="axis", degree=4, axis=(0, 1, 0))
+        bpy.ops.view3d.view_axis(type="FRONT")
+        bpy.ops.view3d.view_selected()
+        bpy.ops.wm.tool_set_by_id(name="rosy.singularities_tool")
+        tool = bpy.context.workspace.tools.from_space_view3d_mode("OBJECT")
+        tool.operator_properties("rosy.drag_singularity").reach = 0.3
+    overlay = rosy("rosy_addon.ui.overlay")
+    yield from redraw_view()
+    yield from move_mouse((0.0, -1.0, 0.0))
+    yield from wait_until(lambda: overlay.shown("Sphere") is not None)
+    before = shown_singularities()
+    points = {vertex: bpy.context.object.data.vertices[vertex].co.copy() for vertex in before}
+    source = min(points, key=lambda vertex: (points[vertex] - Vector((0.2, -1.0, 0.0))).length)
+    start = points[source]
+    assert 0.1 < start.x < 0.2 and start.y < -0.9, start
+    yield from drag(start, (0.1, -0.9, 0.3))
+    yield from wait_until(lambda: shown_singularities() != before)
+    moved = shown_singularities()
+    assert math.isclose(bpy.context.window_manager.operators[-1].reach, 0.3, rel_tol=1e-6)
+    assert source not in moved and len(moved) == len(before)
+    with in_view():
+        bpy.ops.ed.undo()
+    yield 0.3
+    assert shown_singularities() == before
+    yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))  # beside them: selects
+    yield 0.5
+    assert bpy.context.object.location.length == 0 and bpy.context.selected_objects
+    assert shown_singularities() == before
+    yield from drag((-0.4, -0.8, -0.4), (0.4, -0.8, -0.4), ctrl=True)
+    yield from wait_until(lambda: shown_singularities() != before)
+    added = dict(shown_singularities().items() - before.items())
+    assert sorted(added.values()) == [-1, 1]
+    with in_view():
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+
+
+def field_combed_with_the_tool():
+    """Comb with modifiers, undo, redo, replay the stroke from a script; in Object Mode and in Sculpt Mode."""
+    for mode in ("OBJECT", "SCULPT"):
+        yield from fresh_scene()
+        with in_view():
+            bpy.ops.object.select_all(action="SELECT")
+            bpy.ops.object.delete()
+            bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24)
+            bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+            bpy.context.object.modifiers.new("Wave", "CAST").factor = -0.2
+            bpy.ops.rosy.field_generate("EXEC_DEFAULT", True, kind="smoothest", degree=4)
+            bpy.ops.object.mode_set(mode=mode)
+            bpy.ops.view3d.view_axis(type="FRONT")
+            bpy.ops.view3d.view_selected()
+            name = "rosy.comb_tool" if mode == "OBJECT" else "rosy.comb_sculpt_tool"
+            bpy.ops.wm.tool_set_by_id(name=name)
+            bpy.ops.ed.undo_push(message="Before the stroke")
+        yield from redraw_view()
+        before = field_bytes()
+        yield from drag((-0.4, -0.9, 0.2), (0.4, -0.8, 0.3))
+        yield from wait_until(lambda: "rosy_guides" in bpy.context.object.data.attributes)
+        combed = field_bytes()
+        assert combed != before
+        operator = bpy.context.window_manager.operators[-1]
+        assert operator.bl_idname == "ROSY_OT_field_comb", operator.bl_idname
+        stroke = [
+            {
+                "name": "",
+                "location": tuple(point.location),
+                "pressure": point.pressure,
+                "is_start": point.is_start,
+            }
+            for point in operator.stroke
+        ]
+        settings = {"radius": operator.radius, "strength": operator.strength}
+        with in_view():
+            bpy.ops.ed.undo()
+        yield 0.3
+        assert field_bytes() == before
+        assert "rosy_guides" not in bpy.context.object.data.attributes
+        with in_view():
+            bpy.ops.ed.redo()
+        yield 0.3
+        assert field_bytes() == combed
+        with in_view():
+            bpy.ops.ed.undo()
+            yield 0.3
+        with in_view():
+            bpy.ops.rosy.field_comb("EXEC_DEFAULT", True, stroke=stroke, **settings)
+        assert field_bytes() == combed
+        # ESC takes a stroke back.
+        yield from move_mouse((-0.4, -0.9, -0.2), "LEFTMOUSE", "PRESS")
+        yield from move_mouse((0.3, -0.9, -0.3))
+        assert field_bytes() != combed
+        yield from move_mouse((0.3, -0.9, -0.3), "ESC", "PRESS")
+        assert field_bytes() == combed
+        # A stroke may begin beside the mesh.
+        yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))
+        yield from wait_until(lambda old=combed: field_bytes() != old)
+        assert bpy.context.object.location.length == 0
+        if mode == "OBJECT":
+            yield from drag((-1.15, -0.9, 0.3), (-1.15, -0.9, -0.3))
+            yield 0.3
+            assert bpy.context.selected_objects
+            yield from drag((-1.15, -0.9, 0.0), (-1.15, -0.9, 0.0))
+            yield from wait_until(lambda: not bpy.context.selected_objects)
+        with in_view():
+            bpy.ops.wm.tool_set_by_id(
+                name="builtin.select_box" if mode == "OBJECT" else "builtin.brush"
+            )
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def field_bytes():
+    """Return the vectors of the active object's field."""
+    attribute = bpy.context.object.data.attributes["rosy"]
+    vectors = np.empty(3 * len(attribute.data), dtype=np.float32)
+    attribute.data.foreach_get("vector", vectors)
+    return vectors.tobytes()
+
+
+def shown_singularities():
+    """Return the indices of the sphere's singularities that the overlay shows, by their vertices."""
+    shown = rosy("rosy_addon.ui.overlay").shown("Sphere")
+    return dict(zip(shown.vertex.tolist(), shown.index.tolist(), strict=True))
+
+
+def move_mouse(point, kind="MOUSEMOVE", value="NOTHING", **keys):
+    """Move the mouse to a point of the scene, and let another event happen there."""
+    window, _, region, _ = view()
+    place = location_3d_to_region_2d(region, view()[1].spaces.active.region_3d, Vector(point))
+    x, y = region.x + round(place.x), region.y + round(place.y)
+    window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y, **keys)
+    yield 0.1
+    if kind != "MOUSEMOVE":
+        window.event_simulate(type=kind, value=value, x=x, y=y, **keys)
+        yield 0.1
+
+
+def drag(start, end, **keys):
+    """Drag from a point of the scene to another one."""
+    yield from move_mouse(start, "LEFTMOUSE", "PRESS", **keys)
+    yield from move_mouse((Vector(start) + Vector(end)) / 2, **keys)
+    yield from move_mouse(end, "LEFTMOUSE", "RELEASE")
+
+
+run_steps(
+    singularities_dragged_with_the_tool, field_combed_with_the_tool, annotations_guide_a_field
+)

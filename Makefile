@@ -14,7 +14,7 @@
 #
 # LONG=1 adds cases to a lane that take minutes. Full Blenders are tested by tests/blender/run.py.
 #
-#   make fuzz      random hostile files, options and scenes, for FUZZ_SECONDS from FUZZ_SEED on
+#   make fuzz      random hostile files and options, for FUZZ_SECONDS from FUZZ_SEED on
 #   make monkey    random actions in a full Blender: make monkey BLENDER=/path/to/blender
 #   make zip       the extension for Blender: dist/rosy-VERSION.zip
 #   make dist      all files of a release: zip, wheel, sdist and dist/SHA256SUMS
@@ -123,10 +123,8 @@ site: test-notebooks
 	NO_MKDOCS_2_WARNING=1 $(EXTRAS) -m mkdocs build --strict
 	$(EXTRAS) tools/site/check.py dist/site
 
-fuzz: .venv/ready .venv-bpy42/ready
-	$(DEV) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2))
-	$(OLDEST) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $$(($(FUZZ_SECONDS) / 2)) \
-		--category scenes --category animations
+fuzz: .venv/ready
+	$(DEV) -m tests.fuzz --seed $(FUZZ_SEED) --seconds $(FUZZ_SECONDS)
 
 zip: .venv-bpy42/ready
 	$(OLDEST) tools/build_zip.py dist

@@ -36,7 +36,7 @@ def test_hatching_follows_the_tone(scene, tmp_path):
     bpy.ops.mesh.primitive_plane_add(size=8.0, rotation=(np.pi / 2, 0.0, 0.0))
     plane = bpy.context.object
     bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(1.0, 0.0, 0.3))
-    scene.rosy.texture_size = 1024
+    scene.rosy.texture_size = 512
     scene.view_settings.view_transform = "Standard"
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 8.0
     scene.camera.location, scene.camera.rotation_euler = (0.0, -5.0, 0.0), (np.pi / 2, 0.0, 0.0)
@@ -48,7 +48,7 @@ def test_hatching_follows_the_tone(scene, tmp_path):
         tree = node.id_data
         tree.links.remove(node.inputs["Tone"].links[0])
         colors = [node.inputs[name].default_value[0] for name in ("Ink", "Paper")]
-        for tone in (0.0, 0.25, 0.5, 0.75, 1.0):
+        for tone in (0.0, 0.25, 0.75):
             node.inputs["Tone"].default_value = tone
             mean = to_linear(render(scene, tmp_path)[..., 0]).mean()
             share = 1 - tone if not light_ink else tone

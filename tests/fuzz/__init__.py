@@ -6,14 +6,12 @@ that it leaves. `python -m tests.fuzz --help` lists the options; `make fuzz` run
 
 Modules in order of dependence:
 
-    shapes                          polygon meshes with faults of geometry and topology
-    damage                          faults of the bytes and words of a file
-    mesh_files, field_files,        writers of files of each format
-    picture_files, preset_files
-    options                         command lines, from the parser itself
-    cases                           the categories: files, a command line, and what it may write
-    scenes                          categories of Blender files and animations
-    execution                       the processes
-    verdicts                        what is wrong with a run
-    runner                          many cases, and a table of the outcomes
+    damage      faults of the bytes and words of a file
+    options     options of a command, from its parser, and values of settings
+    meshes      polygon meshes with faults of geometry and topology, and their files
+    files       files of fields, guides, pictures and presets
+    cases       the categories: files, a command line, and what it may write
+    execution   the processes
+    verdicts    what is wrong with a run
+    runner      many cases, and a table of the outcomes
 """

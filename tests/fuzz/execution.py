@@ -9,11 +9,12 @@ import stat
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 from ..harness.forked import fork_command
-from .cases import Case, hash_file
+from .cases import Case
 
 #: Seconds of the processor after which a run counts as hanging; seconds after which it does so even
 #: if it only waits; and bytes of address space that it may take beyond those of this process.
@@ -53,11 +54,7 @@ def execute(case: Case, folder: Path) -> Run:
     before = listing(folder)
     streams = [folder.with_suffix(suffix) for suffix in (".stdout", ".stderr")]
     pid = (_start_process if case.own_process else _fork)(case, folder, streams)
-    status, usage = _wait(pid, case, folder)
-    if case.expected and status == -signal.SIGKILL:
-        again = replace(case, kill_after=None, kill_when_writing=False)
-        pid = _start_process(again, folder, streams)
-        status, usage = _wait(pid, again, folder)
+    status, usage = _wait(pid, case)
     seconds = usage.ru_utime + usage.ru_stime
     stdout, stderr = (path.read_bytes() for path in streams)
     for path in streams:
@@ -66,30 +63,13 @@ def execute(case: Case, folder: Path) -> Run:
     return Run(status, stdout, stderr, before, listing(folder), seconds, peak)
 
 
-def opens_in_blender(path: Path) -> bool:
-    """Whether Blender alone opens a .blend file, within the limits of a case."""
-    code = "import sys, bpy; bpy.ops.wm.open_mainfile(filepath=sys.argv[1])"
-    try:
-        subprocess.run(
-            [sys.executable, "-c", code, str(path)],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=TIME_LIMIT,
-            check=True,
-            preexec_fn=_set_limits,
-        )
-    except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
-        return False
-    return True
-
-
 def listing(folder: Path) -> dict[str, str]:
     """Return the contents of a folder: the hash of each file, the kind of what is not one."""
     contents = {}
     for path in sorted(folder.rglob("*")):
         mode = path.lstat().st_mode
         if stat.S_ISREG(mode):
-            text = hash_file(path)
+            text = sha256(path.read_bytes()).hexdigest()
         elif stat.S_ISLNK(mode):
             text = f"link to {os.readlink(path)}"
         else:
@@ -143,28 +123,20 @@ def _set_limits() -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_LIMIT, CPU_LIMIT + 5))
 
 
-def _wait(pid: int, case: Case, folder: Path) -> tuple[int | None, resource.struct_rusage]:
-    """Wait for a process, and send it the signals of the case."""
-    start = time.perf_counter()
-    signals = []
-    if case.interrupt_after is not None:
-        signals.append((start + case.interrupt_after, signal.SIGINT))
-    if case.kill_after is not None:
-        signals.append((start + case.kill_after, signal.SIGKILL))
-    signals.append((start + TIME_LIMIT, signal.SIGKILL))
-    pause, timed_out = 0.001, False
+def _wait(pid: int, case: Case) -> tuple[int | None, resource.struct_rusage]:
+    """Wait for a process, and stop it when the case says so."""
+    start, pause, was_stopped, timed_out = time.perf_counter(), 0.001, False, False
     while True:
         done, status, usage = os.wait4(pid, os.WNOHANG)
         if done:
             status = os.waitstatus_to_exitcode(status)
             return None if timed_out or status == -signal.SIGXCPU else status, usage
-        if time.perf_counter() >= signals[0][0]:
-            timed_out = len(signals) == 1
-            os.kill(pid, signals.pop(0)[1])
-            signals = signals or [(float("inf"), signal.SIGKILL)]
-        if case.kill_when_writing:
-            if any(folder.rglob(".rosy-*")):
-                os.kill(pid, signal.SIGKILL)
-            continue
+        seconds = time.perf_counter() - start
+        if case.stop_after is not None and seconds > case.stop_after and not was_stopped:
+            was_stopped = True
+            os.kill(pid, case.stop_signal)
+        elif seconds > TIME_LIMIT and not timed_out:
+            timed_out = True
+            os.kill(pid, signal.SIGKILL)
         time.sleep(pause)
         pause = min(pause * 1.2, 0.02)

@@ -1,36 +1,37 @@
-"""Random options for a command, taken from its parser."""
+"""Random options of a command, from its parser: the values are texts that the parser accepts."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection
+from collections.abc import Collection
+from functools import cache
+from typing import Any
 
 from numpy.random import Generator
 
 from rosy_addon.cli.parser import _build_parser
 from rosy_addon.compositor.look import Look
-from rosy_addon.core.settings import settings_of
+from rosy_addon.core.settings import Choice, Color, Setting, Switch, settings_of
 from rosy_addon.preset_files.store import preset_keys
 
-from .damage import WORDS
-from .preset_files import setting_value
+from .damage import random_word
 
 #: Options that `random_options` does not choose: cases give these files and names themselves.
-FILE_OPTIONS = {
-    *("help", "mesh", "field", "output", "strokes", "guides", "field_mesh", "against", "scene"),
-    *(
-        "tone_image",
-        "tone_picture",
-        "tone_values",
-        "color_values",
-        "uv",
-        "object",
-        "camera",
-        "frames",
-    ),
-    *("singularities", "all_cameras", "out", "save", "jobs", "scheduler", "array", "step"),
-    "fields",
-}
+_FILES = "mesh field fields output strokes guides field_mesh against singularities tone_image tone_picture"
+_OTHERS = "help scene tone_values color_values uv object camera frames all_cameras out save jobs"
+FILE_OPTIONS = frozenset(f"{_FILES} {_OTHERS} scheduler array step".split())
+
+#: Texts that are tried as the value of an option.
+_NUMBERS = "1 2 3 4 4 4 6 12 0 0.02 0.05 0.3 0.5 9.5 14.0 30.0 80.0 -22.5 100 512 1e-6 1e4"
+_TUPLES = "1,0,0 1,2,3 -1,0.3,2 0,0,0 1e-30,2,1e30 30,20 -90,400 64x48 30x30 7x90 1x1 1x4000"
+_TEXTS = "red #000,#f00 url(#a) rgb(1,2,3) mm $x_ \U0001f600é"
+CANDIDATES = (
+    *f"{_NUMBERS} {_TUPLES} {_TEXTS}".split(),
+    *('"/><script>', "a caption " * 40, "", "two\nlines", r"$\frac{1}{$"),
+)
+
+#: Largest values of options that would take minutes.
+LIMITS = {"pictures": 4, "workers": 4, "dpi": 80, "columns": 4}
 
 
 def random_options(
@@ -56,124 +57,58 @@ def random_options(
     """
     words = []
     for action in _actions(command):
-        if action.dest in FILE_OPTIONS or action.dest in leave_out or not action.option_strings:
+        if action.dest in leave_out:
             continue
         for _ in range(rng.integers(1, 4) if action.dest == "set" else 1):
-            if rng.random() < rate:
-                words += _option(rng, action, wild)
+            if rng.random() >= rate:
+                continue
+            name = action.option_strings[rng.integers(len(action.option_strings))]
+            if action.nargs == 0:
+                words.append(name)
+                continue
+            value = (
+                random_word(rng).replace("\0", "") if rng.random() < wild else _value(rng, action)
+            )
+            words += [name, value] if rng.random() < 0.5 else [f"{name}={value}"]
     return words
 
 
+@cache
 def _actions(command: str) -> list[argparse.Action]:
+    """Return the options of a command that can be chosen at random."""
     parser = _build_parser("rosy")
     (subparsers,) = (a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
-    return subparsers.choices[command]._actions
+    actions = subparsers.choices[command]._actions
+    return [a for a in actions if a.option_strings and a.dest not in FILE_OPTIONS]
 
 
-def _option(rng: Generator, action: argparse.Action, wild: float) -> list[str]:
-    name = action.option_strings[rng.integers(len(action.option_strings))]
-    if action.nargs == 0:
-        return [name]
-    if rng.random() < wild:
-        value = WORDS[rng.integers(len(WORDS))].replace("\0", "")
-    elif action.choices:
-        value = str(list(action.choices)[rng.integers(len(action.choices))])
-    else:
-        value = _VALUES[action.dest](rng)
-    return [name, value] if rng.random() < 0.5 else [f"{name}={value}"]
+def _value(rng: Generator, action: argparse.Action) -> str:
+    if action.dest == "set":
+        settings = list(settings_of(Look).values())
+        setting = settings[rng.integers(len(settings))]
+        return f"{setting.name}={setting_value(rng, setting)}"
+    values = list(action.choices or (preset_keys() if action.dest == "preset" else ()))
+    values = values or [text for text in CANDIDATES if _accepts(action, text)]
+    return str(values[rng.integers(len(values))])
 
 
-def _number(low: float, high: float, common: tuple[float, ...]) -> Callable[[Generator], str]:
-    """Return a function that chooses a common value, or any in a range, or one of its ends."""
-
-    def choose(rng: Generator) -> str:
-        kind = rng.random()
-        if kind < 0.6:
-            return repr(float(rng.choice(common)))
-        return repr(float(rng.choice([low, high]) if kind < 0.75 else rng.uniform(low, high)))
-
-    return choose
+def _accepts(action: argparse.Action, text: str) -> bool:
+    try:
+        value = text if action.type is None else action.type(text)
+    except (argparse.ArgumentTypeError, ValueError, TypeError):
+        return False
+    return action.dest not in LIMITS or value <= LIMITS[action.dest]
 
 
-def _numbers(count: int, spread: float) -> Callable[[Generator], str]:
-    def choose(rng: Generator) -> str:
-        values = rng.normal(0, spread, count) * (rng.random(count) < 0.8)
-        if rng.random() < 0.1:
-            values *= 10.0 ** rng.uniform(-300, 300)
-        return ",".join(map(repr, values.tolist()))
-
-    return choose
-
-
-def _size(rng: Generator) -> str:
-    if rng.random() < 0.05:
-        return ("0x0", "1x1", "16384x1", "1x4000", "99999x99999", "16384x2", "20x-3")[
-            rng.integers(7)
-        ]
-    width, height = rng.integers(1, 120, 2)
-    return f"{width}x{height}"
-
-
-def _degree(rng: Generator) -> str:
-    return str(rng.choice([1, 2, 3, 4, 4, 4, 5, 6, 7, 8, 12, 12, 0, 13]))
-
-
-def _preset(rng: Generator) -> str:
-    keys = preset_keys()
-    return keys[rng.integers(len(keys))]
-
-
-def _setting(rng: Generator) -> str:
-    settings = list(settings_of(Look).values())
-    setting = settings[rng.integers(len(settings))]
-    return f"{setting.name}={setting_value(rng, setting)}"
-
-
-def _colors(rng: Generator) -> str:
-    return ("red", "#000,#f00", "", "url(#a)", '"/><script>', "rgb(1,2,3)")[rng.integers(6)]
-
-
-def _text(rng: Generator) -> str:
-    return ("mm", "a caption " * 40, "", "$x_", r"$\frac{1}{$", "two\nlines", "\U0001f600é")[
-        rng.integers(7)
-    ]
-
-
-#: A value of each option that takes one.
-_VALUES: dict[str, Callable[[Generator], str]] = {
-    "degree": _degree,
-    "to_degree": _degree,
-    "axis": _numbers(3, 1.0),
-    "reach": _number(0, 10, (0.0, 0.05, 0.3)),
-    "sharp_angle": _number(0, 180, (30.0, 80.0)),
-    "view": _numbers(2, 60.0),
-    "light_direction": _numbers(3, 1.0),
-    "size": _size,
-    "margin": lambda rng: str(rng.choice([0, 1, 4, 16, 512, -1])),
-    "workers": lambda rng: str(rng.integers(-1, 5)),
-    "preset": _preset,
-    "set": _setting,
-    "pictures": lambda rng: str(rng.integers(1, 5)),
-    "rate": _number(0.1, 1000, (24.0, 1.0)),
-    "turn": _number(-360, 360, (0.0, 22.5)),
-    "smooth": _number(0, 10, (0.0, 0.02, 0.2)),
-    "cancel_pairs": _number(0, 10, (0.0, 0.02, 0.2)),
-    "spacing": _number(0.5, 512, (4.0, 9.0, 14.0)),
-    "distance": _number(1e-6, 1e6, (0.1, 0.3)),
-    "layering": _number(0, 1, (0.3,)),
-    "swell": _number(0, 1, (0.5, 1.0)),
-    "curvature": _number(0, 1, (0.5,)),
-    "gaps": _number(0, 4, (0.3,)),
-    "taper": _number(0, 50, (3.0,)),
-    "arrows": _number(0, 1000, (5.0, 12.0)),
-    "overshoot": _number(0, 256, (5.0,)),
-    "singularity_size": _number(1, 256, (9.0, 20.0)),
-    "width": _number(0.01, 1000, (1.6,)),
-    "columns": lambda rng: str(rng.integers(0, 5)),
-    "dpi": lambda rng: str(rng.integers(9, 70)),
-    "caption": _text,
-    "scale_bar": _text,
-    "color_label": _text,
-    "millimeters": _number(1, 1e5, (200.0,)),
-    "colors": _colors,
-}
+def setting_value(rng: Generator, setting: Setting) -> Any:
+    """Return a value of a setting: an end of its range, any in it, or one near the default."""
+    if isinstance(setting, Switch):
+        return bool(rng.random() < 0.5)
+    if isinstance(setting, Choice):
+        return list(setting.options)[rng.integers(len(setting.options))]
+    if isinstance(setting, Color):
+        return f"#{rng.integers(1 << 24):06x}"
+    low, high, default = setting.low, setting.high, setting.default
+    near = min(max(default * 10.0 ** rng.uniform(-1, 1), low), high)
+    value = (low, high, rng.uniform(low, high), near, near, near)[rng.integers(6)]
+    return round(value) if isinstance(default, int) else float(value)

@@ -23,17 +23,13 @@ from .execution import Run
 #: Most resident memory of a run. Pictures of cases are small.
 MEMORY_BYTES = 2 << 30
 
-#: Lines that Blender prints to standard output.
-_BLENDER_LINE = re.compile("Info|Warning|Error|Read |Saved")
-
 
 class Verdict(Enum):
-    """The outcome of a run. All after `UNREADABLE` are faults of the program."""
+    """The outcome of a run. All after `ENDED` are faults of the program."""
 
     DONE = "done"
     REFUSED = "refused in one line"
     ENDED = "ended by its signal or stream"
-    UNREADABLE = "Blender alone hangs, too"
     TRACEBACK = "traceback"
     WARNING = "warning"
     STATUS = "wrong status"
@@ -49,7 +45,7 @@ class Verdict(Enum):
     @property
     def is_fault(self) -> bool:
         """Whether it is a fault of the program."""
-        return self not in (Verdict.DONE, Verdict.REFUSED, Verdict.ENDED, Verdict.UNREADABLE)
+        return self not in (Verdict.DONE, Verdict.REFUSED, Verdict.ENDED)
 
 
 def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
@@ -65,17 +61,17 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
     stderr = run.stderr.decode("utf-8", "replace")
     if run.status is None:
         return Verdict.HANG, f"{run.seconds:.0f} s"
-    if case.interrupt_after is not None and _stopped_early(run, stderr):
+    interrupted = case.stop_after is not None and case.stop_signal == signal.SIGINT
+    if interrupted and _stopped_early(run, stderr):
         return Verdict.ENDED, "interrupted before RoSy started"
     if "Traceback" in stderr:
         return Verdict.TRACEBACK, stderr.strip().splitlines()[-1]
-    may_be_killed = case.kill_after is not None or case.kill_when_writing
-    killed = may_be_killed and run.status == -signal.SIGKILL
+    killed = case.stop_after is not None and run.status == -signal.SIGKILL
     if run.status < 0 and not killed:
         return Verdict.CRASH, signal.Signals(-run.status).name
     if re.search(r"\w+Warning\b", stderr):
         return Verdict.WARNING, stderr.strip()[:300]
-    for text in (stderr, _own_output(run.stdout)):
+    for text in (stderr, run.stdout.decode("utf-8", "replace")):
         if unsafe := UNSAFE.search(text):
             return Verdict.CONTROL, repr(text[max(unsafe.start() - 40, 0) :][:80])
     if run.peak_bytes > MEMORY_BYTES:
@@ -88,16 +84,8 @@ def judge(case: Case, run: Run, folder: Path) -> tuple[Verdict, str]:
         if run.after[name] != run.before.get(name) and (folder / name).is_file():
             if fault := _file_fault(folder / name):
                 return Verdict.HALF_WRITTEN, f"{name}: {fault}"
-            if (
-                run.status not in (0, 130, 141, -signal.SIGKILL, 1)
-                and "--frames" not in case.arguments
-            ):
+            if run.status not in (0, 130, 141, -signal.SIGKILL, 1):
                 return Verdict.STATUS, f"status {run.status}, but {name} was written"
-    if run.status == 0 and case.expected:
-        found = {name: text for name, text in run.after.items() if (folder / name).is_file()}
-        found = {name: text for name, text in found.items() if case.may_write(name)}
-        if wrong := sorted(case.expected.items() ^ found.items()):
-            return Verdict.NOT_REPEATED, f"{wrong[0][0]} is not as after the first run"
     return _judge_status(case, run, stderr, killed)
 
 
@@ -112,24 +100,22 @@ def _judge_status(case: Case, run: Run, stderr: str, killed: bool) -> tuple[Verd
             if not all(line.startswith("rosy: ") for line in lines):
                 return Verdict.MESSAGE, stderr.strip()[:300]
             written = [
-                name
-                for name in filter(case.may_write, run.after)
-                if run.after[name] != run.before.get(name)
+                case.may_write(name) and text != run.before.get(name)
+                for name, text in run.after.items()
             ]
-            if "-o" in case.arguments and not written:
+            if "-o" in case.arguments and not any(written):
                 # The same bytes as before are right, but no case begins with these.
                 return Verdict.STATUS, "status 0, but nothing was written"
             return Verdict.DONE, ""
         case 2:
             usage = bool(lines) and lines[0].startswith("usage:")
             errors = [line for line in lines if re.match(r"(rosy|[\w. -]*): ", line)]
-            # Blender and videos print what they do.
             if not lines or (run.stdout and case.arguments[0] in ("render", "field", "info")):
                 return Verdict.MESSAGE, f"stdout {run.stdout[:80]!r}, stderr {stderr[:80]!r}"
             if not usage and (len(errors) != len(lines) or len(lines) > 3):
                 return Verdict.MESSAGE, stderr.strip()[:300]
             return Verdict.REFUSED, lines[-1]
-        case 130 if case.interrupt_after is not None:
+        case 130 if case.stop_after is not None:
             if lines[-1:] != ["rosy: stopped"]:
                 return Verdict.MESSAGE, stderr.strip()[:300]
             return Verdict.ENDED, lines[-1]
@@ -147,12 +133,6 @@ def _stopped_early(run: Run, stderr: str) -> bool:
     return interrupted and "rosy_addon" not in stderr
 
 
-def _own_output(stdout: bytes) -> str:
-    """Return standard output without the lines that Blender prints."""
-    lines = stdout.decode("utf-8", "replace").split("\n")
-    return "\n".join(line for line in lines if not _BLENDER_LINE.match(line))
-
-
 def _stray_files(case: Case, run: Run, killed: bool) -> str:
     """Return what was changed that should not have been, or an empty text."""
     for name in sorted(run.before.keys() | run.after.keys()):
@@ -167,19 +147,15 @@ def _stray_files(case: Case, run: Run, killed: bool) -> str:
 
 def _stdout_fault(case: Case, run: Run) -> str:
     """Return what is wrong with JSON on standard output."""
-    if "--json" not in case.arguments or case.stdout != "file" or "--help" in case.arguments:
-        return ""
-    return _json_fault(run.stdout.decode())
 
-
-def _json_fault(text: str) -> str:
     def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is not JSON")
 
-    try:
-        json.loads(text, parse_constant=refuse)
-    except ValueError as error:
-        return str(error)
+    if "--json" in case.arguments and case.stdout == "file" and "--help" not in case.arguments:
+        try:
+            json.loads(run.stdout, parse_constant=refuse)
+        except ValueError as error:
+            return str(error)
     return ""
 
 

@@ -35,7 +35,7 @@ LOOP_PAUSE = 0.005
 #: Names of the only steps to run; all if there is none.
 ONLY = os.environ.get("ROSY_STEPS", "").split(",")
 
-#: Whether to run more cases, and steps that others cover for the most part: `run.py --many`.
+#: Whether to take pictures for the documentation, which needs further steps: `run.py --many`.
 MANY = bool(os.environ.get("ROSY_MANY"))
 
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def long(*cases):
-    """Parameters of a test that only `make test-long` runs. A tuple holds several arguments."""
+    """Parameters of a test that only `make test LONG=1` runs. A tuple holds several arguments."""
     return [
         pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.long)
         for case in cases
@@ -25,7 +25,7 @@ def long(*cases):
 
 
 def mainly(common, cases):
-    """Parameters of all cases; `make test` runs the common ones, `make test-long` all."""
+    """Parameters of all cases; `make test` runs the common ones, `make test LONG=1` all."""
     common, cases = set(common), list(cases)
     return [
         *(case for case in cases if case in common),

@@ -87,8 +87,9 @@ test: test-unit test-oldest
 test-unit: .venv/ready .venv-bpy42/ready
 	ROSY_OTHER_PYTHON=$(abspath $(OLDEST)) $(DEV) $(PYTEST) $(CASES) $(or $(TESTS),tests/unit)
 
-# The oldest Blender has the oldest numpy that RoSy supports; OLD_NUMPY are the quick unit tests of what
-# depends on its version.
+# The oldest Blender has the oldest numpy that RoSy supports. The quick unit tests of these rooms run with
+# it; what draws is covered by tests/bpy, and by `test_numpy_versions.py` in the unit lane.
+OLD_NUMPY = tests/unit/field tests/unit/line_drawing tests/unit/image_io
 test-oldest: .venv-bpy42/ready
 	$(OLDEST) $(PYTEST) $(CASES) $(or $(TESTS),tests/bpy)
 	$(if $(TESTS),,$(OLDEST) $(QUICK) $(OLD_NUMPY))

@@ -28,31 +28,10 @@ from monkey_checks import (
 
 #: Names that a user, or a script, can give, and names of data that RoSy or the monkey makes.
 NAMES = (
-    *(
-        "a/b\\c",
-        "line\nbreak\ttab",
-        "\x01\x1b[31m",
-        "é 日本 🙂",
-        "x" * 200,
-        "",
-        " ",
-        ".",
-        "..",
-        "con",
-    ),
-    *("%s {0} {x}", "'quote\" `", "-flag", "a.001", "RoSy Camera", "rosy", "rosy_guides", "dir0"),
-    *(
-        "position",
-        "Suzanne",
-        "Eye",
-        "UVMap",
-        "Weights",
-        "Occlusion",
-        "default",
-        "engraving",
-        "mine",
-    ),
-)
+    "a/b\\c", "line\nbreak\ttab", "\x01\x1b[31m", "é 日本 🙂", "x" * 200, "", " ", ".", "..", "con",
+    "%s {0} {x}", "'quote\" `", "-flag", "a.001", "RoSy Camera", "rosy", "rosy_guides", "dir0", "mine",
+    "position", "Suzanne", "Eye", "UVMap", "Weights", "Occlusion", "default", "engraving",
+)  # fmt: skip
 
 #: Largest number of faces, vertices and objects that the monkey makes.
 MAX_FACES, MAX_OBJECTS = 1500, 14
@@ -67,12 +46,9 @@ LIMITS = {
 
 #: Suffixes of the files that operators write or read.
 SUFFIXES = {
-    "field_export": ".rosy",
-    "field_import": ".rosy",
-    "turntable": ".gif",
-    "preset_export": ".json",
+    "field_export": ".rosy", "field_import": ".rosy", "turntable": ".gif", "preset_export": ".json",
     "preset_import": ".json",
-}
+}  # fmt: skip
 
 #: Operators that are not called at random: they need a window, or are actions of their own.
 OTHER_OPERATORS = {"drag_singularity", "show_here", "viewport", "flow_play", "bake", "strokes"}
@@ -269,6 +245,7 @@ def field_in_view(monkey: Monkey) -> None:
     render.resolution_percentage, render.pixel_aspect_x = 100, 1.0
     for name in ("percentage", "store"):
         scene.rosy.property_unset(name)
+    scene.rosy.texture_size = 64
     scene.rosy.look.property_unset("tone")
     eye = next((o for o in bpy.data.objects if o.name == "Eye" and not o.library), None)
     if eye is None or eye.type != "CAMERA":

@@ -20,9 +20,8 @@ EXTENSION = "bl_ext.user_default.rosy"
 
 #: Datablocks of Blender's interface and brushes, and others that no operator of RoSy can reach.
 IGNORED_COLLECTIONS = {
-    *("all_ids", "window_managers", "screens", "workspaces", "brushes", "fonts", "palettes"),
-    "libraries",
-}
+    "all_ids", "window_managers", "screens", "workspaces", "brushes", "fonts", "palettes", "libraries",
+}  # fmt: skip
 
 #: The property of an attribute's values, by its data type; others hold vectors.
 VALUE_PROPERTIES = {
@@ -61,11 +60,10 @@ def all_datablocks() -> Iterator[tuple[str, bpy.types.ID]]:
 # --- what an action changes ---------------------------------------------------------------------
 
 
-def fingerprint(pixels: bool = False) -> Fingerprint:
+def fingerprint() -> Fingerprint:
     """Return the state of the file and the context.
 
-    RoSy's own datablocks are under ``owned/``, its modifiers under ``picture/``. With `pixels`, the
-    state includes the pixels of RoSy's images.
+    RoSy's own datablocks are under ``owned/``, its modifiers under ``picture/``.
     """
     state: Fingerprint = {}
     for kind, datablock in all_datablocks():
@@ -73,7 +71,7 @@ def fingerprint(pixels: bool = False) -> Fingerprint:
         if kind == "objects" and datablock.type == "CAMERA" and not datablock.users_collection:
             continue  # a camera that the user has deleted, and that the record of a bake keeps
         if is_owned(datablock):
-            state[f"owned/{path}"] = _pixels(datablock) if pixels else None
+            state[f"owned/{path}"] = None
             continue
         state[path] = datablock.use_fake_user
         if kind in _ADDERS:
@@ -100,17 +98,6 @@ def full_name(datablock: bpy.types.ID) -> str:
 def _user_name(datablock: bpy.types.ID | None) -> str | None:
     """Return the name of a datablock of the user; None if there is none, or RoSy made it."""
     return None if datablock is None or is_owned(datablock) else datablock.name
-
-
-def _pixels(datablock: bpy.types.ID) -> Any:
-    """Return the size and a digest of an image that the user has not changed."""
-    if not isinstance(datablock, bpy.types.Image) or datablock.source != "FILE":
-        return None
-    if datablock.is_dirty:  # not saved with the file
-        return None
-    values = np.empty(len(datablock.pixels), dtype=np.float32)
-    datablock.pixels.foreach_get(values)
-    return tuple(datablock.size), _digest(values)
 
 
 def _digest(values: np.ndarray) -> str:

@@ -89,7 +89,9 @@ def parse_arguments() -> argparse.Namespace:
     )
     parser.add_argument("--only-window", action="store_true")
     parser.add_argument("--steps", default="", help="names of the only steps to run in a window")
-    parser.add_argument("--many", action="store_true", help="take pictures for the documentation, too")
+    parser.add_argument(
+        "--many", action="store_true", help="take pictures for the documentation, too"
+    )
     parser.add_argument("--vulkan", action="store_true", help="draw with Vulkan instead of OpenGL")
     options, options.pytest = parser.parse_known_args()
     if not options.zip.is_file():

@@ -137,10 +137,6 @@ def test_undo(with_field, scene, previous):
         np.testing.assert_array_equal(pixels(image), picture)
 
 
-def test_current_view_needs_a_view(with_field):
-    assert "view" in error_of(bpy.ops.rosy.bake, camera="VIEW")
-
-
 def test_bake_animation(with_field, tmp_path):
     scene = bpy.context.scene
     for frame, x in ((1, -0.4), (4, 0.4)):

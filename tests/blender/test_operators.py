@@ -60,17 +60,6 @@ def test_an_object_without_features_does_not_stop_the_others(suzanne, capfd):
     assert "on 'Cube'" in output
 
 
-def test_generate_undo(suzanne):
-    bpy.ops.ed.undo_push(message="before")
-    bpy.ops.rosy.field_generate(kind="axis", degree=5)
-    bpy.ops.ed.undo_push(message="after")
-    bpy.ops.ed.undo()
-    assert "rosy" not in bpy.context.object.data.attributes
-    bpy.ops.ed.redo()
-    assert bpy.context.object.data.rosy.degree == 5
-    assert "rosy" in bpy.context.object.data.attributes
-
-
 def test_lack_of_memory_is_reported(with_field, monkeypatch):
     memory = sys.modules["bl_ext.user_default.rosy.rosy_addon.core.memory"]
 
@@ -174,18 +163,6 @@ def add_curve(ball):
     return add_object(curve)
 
 
-def add_bezier(ball):
-    curve = bpy.data.curves.new("Bezier", "CURVE")
-    curve.dimensions = "3D"
-    points = arc_on(ball)[::6]
-    spline = curve.splines.new("BEZIER")
-    spline.bezier_points.add(len(points) - 1)
-    spline.bezier_points.foreach_set("co", points.ravel())
-    for point in spline.bezier_points:
-        point.handle_left_type = point.handle_right_type = "AUTO"
-    return add_object(curve)
-
-
 def add_hair(ball):
     points = arc_on(ball)
     curves = bpy.data.hair_curves.new("Hair")
@@ -212,7 +189,7 @@ def add_object(data):
     return obj
 
 
-@pytest.mark.parametrize("add", [add_curve, add_bezier, add_hair, add_grease_pencil])
+@pytest.mark.parametrize("add", [add_curve, add_hair, add_grease_pencil])
 def test_strokes_are_followed(scene, add):
     ball, guide = add_ball_and_guide(add)
     named = guide.name if add is add_curve else ""
@@ -245,15 +222,6 @@ def test_an_empty_is_followed(scene):
     axis -= normal * (axis @ normal)
     axis /= np.linalg.norm(axis)
     assert member_vectors(ball.data)[face.index] @ axis > 0.999
-
-
-def test_marked_edges_uv_and_vectors_together(suzanne):
-    assert bpy.ops.rosy.field_generate(kind="axis", degree=4, attribute="wind") == {"FINISHED"}
-    result = bpy.ops.rosy.field_generate(
-        kind="guided", degree=4, guides={"EDGES", "UV", "ATTRIBUTE"}, vectors="wind", reach=0.02
-    )
-    assert result == {"FINISHED"}
-    assert np.linalg.norm(member_vectors(suzanne.data), axis=1).min() > 0.5
 
 
 # --- conversions -----------------------------------------------------------------------------
@@ -361,22 +329,6 @@ def test_combing_goes_on_where_something_else_has_changed_the_field(scene):
     assert cosine[is_first].min() > 0.999
 
 
-def test_combing_a_posed_object_stores_the_rest_shape(scene):
-    bpy.ops.mesh.primitive_uv_sphere_add()
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
-    sphere = bpy.context.object
-    stroke = stroke_of(arc(0.0, 1.0))
-    bpy.ops.rosy.field_comb(stroke=stroke, radius=0.2)
-    expected = member_vectors(sphere.data, "rosy_guides")
-    bpy.ops.object.transform_apply()
-    sphere.rotation_euler = (0.3, 0.4, 0.5)
-    sphere.modifiers.new("Bend", "SIMPLE_DEFORM").angle = 1.0
-    sphere.data.attributes.remove(sphere.data.attributes["rosy_guides"])
-    bpy.ops.rosy.field_generate(kind="smoothest", degree=4)
-    bpy.ops.rosy.field_comb(stroke=stroke, radius=0.2)
-    assert member_vectors(sphere.data, "rosy_guides") == pytest.approx(expected, abs=1e-5)
-
-
 # --- singularities ---------------------------------------------------------------------------
 
 
@@ -437,15 +389,6 @@ def test_singularities_are_where_their_points_are_moved(scene):
     expected_order = np.lexsort(expected.T)
     np.testing.assert_allclose(found.points[order], expected[expected_order], atol=1e-6)
     np.testing.assert_array_equal(found.index[order], index[kept][expected_order])
-    assert "of degree 3 has no singularity" in error_of(
-        bpy.ops.rosy.field_generate, kind="prescribed", degree=3
-    )
-    # With twice the degree, the indices are twice as large.
-    index[:] = 1
-    points.data.attributes["index"].data.foreach_set("value", index)
-    assert bpy.ops.rosy.field_generate(kind="prescribed", degree=8) == {"FINISHED"}
-    doubled = read_singularities(sphere, bpy.context.evaluated_depsgraph_get())
-    assert doubled.index.tolist() == [2] * count
 
 
 def editable_singularities(obj):
@@ -484,22 +427,6 @@ def test_a_singularity_is_moved(scene):
     ):
         assert message in error_of(move, **settings)
     np.testing.assert_array_equal(member_vectors(sphere.data), vectors)
-
-
-def test_singularities_of_fields_without_any_or_lost(scene):
-    bpy.ops.mesh.primitive_plane_add()
-    plane = bpy.context.object
-    bpy.ops.rosy.field_generate(kind="axis", axis=(1, 0, 0))
-    assert bpy.ops.rosy.singularities(show="BOTH") == {"FINISHED"}
-    modifier = plane.modifiers.new("Remesh", "REMESH")
-    modifier.mode, modifier.octree_depth = "BLOCKS", 2
-    # What is shown can be made again and hidden, although the field cannot be read.
-    assert "has no" in error_of(bpy.ops.rosy.singularities, show="BOTH")
-    assert bpy.ops.rosy.field_generate(kind="axis", axis=(1, 0, 0)) == {"FINISHED"}
-    overlay = sys.modules["bl_ext.user_default.rosy.rosy_addon.ui.overlay"]
-    assert not overlay.is_shown("Plane")
-    assert bpy.ops.rosy.singularities(show="NONE") == {"FINISHED"}
-    assert [obj.name for obj in bpy.data.objects if "singularities" in obj.name] == []
 
 
 def test_opening_a_file_hides_singularities(scene):

@@ -115,8 +115,8 @@ def singularities_dragged_with_the_tool():
 
 
 def field_combed_with_the_tool():
-    """Comb with modifiers, undo, redo, replay the stroke from a script; in Object Mode and in Sculpt Mode."""
-    for mode in ("OBJECT", "SCULPT"):
+    """Comb a mesh with modifiers, and undo, replay and take back strokes; in Object Mode and in Sculpt Mode."""
+    for mode, tool in (("OBJECT", "rosy.comb_tool"), ("SCULPT", "rosy.comb_sculpt_tool")):
         yield from fresh_scene()
         with in_view():
             bpy.ops.object.select_all(action="SELECT")
@@ -128,63 +128,54 @@ def field_combed_with_the_tool():
             bpy.ops.object.mode_set(mode=mode)
             bpy.ops.view3d.view_axis(type="FRONT")
             bpy.ops.view3d.view_selected()
-            name = "rosy.comb_tool" if mode == "OBJECT" else "rosy.comb_sculpt_tool"
-            bpy.ops.wm.tool_set_by_id(name=name)
+            bpy.ops.wm.tool_set_by_id(name=tool)
             bpy.ops.ed.undo_push(message="Before the stroke")
         yield from redraw_view()
-        before = field_bytes()
-        yield from drag((-0.4, -0.9, 0.2), (0.4, -0.8, 0.3))
-        yield from wait_until(lambda: "rosy_guides" in bpy.context.object.data.attributes)
-        combed = field_bytes()
-        assert combed != before
-        operator = bpy.context.window_manager.operators[-1]
-        assert operator.bl_idname == "ROSY_OT_field_comb", operator.bl_idname
-        stroke = [
-            {
-                "name": "",
-                "location": tuple(point.location),
-                "pressure": point.pressure,
-                "is_start": point.is_start,
-            }
-            for point in operator.stroke
-        ]
-        settings = {"radius": operator.radius, "strength": operator.strength}
-        with in_view():
-            bpy.ops.ed.undo()
-        yield 0.3
-        assert field_bytes() == before
-        assert "rosy_guides" not in bpy.context.object.data.attributes
-        with in_view():
-            bpy.ops.ed.redo()
-        yield 0.3
-        assert field_bytes() == combed
-        with in_view():
-            bpy.ops.ed.undo()
-            yield 0.3
-        with in_view():
-            bpy.ops.rosy.field_comb("EXEC_DEFAULT", True, stroke=stroke, **settings)
-        assert field_bytes() == combed
-        # ESC takes a stroke back.
-        yield from move_mouse((-0.4, -0.9, -0.2), "LEFTMOUSE", "PRESS")
-        yield from move_mouse((0.3, -0.9, -0.3))
-        assert field_bytes() != combed
-        yield from move_mouse((0.3, -0.9, -0.3), "ESC", "PRESS")
-        assert field_bytes() == combed
-        # A stroke may begin beside the mesh.
-        yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))
-        yield from wait_until(lambda old=combed: field_bytes() != old)
-        assert bpy.context.object.location.length == 0
-        if mode == "OBJECT":
+        yield from comb()
+        if mode == "OBJECT":  # drags that do not meet the mesh select
             yield from drag((-1.15, -0.9, 0.3), (-1.15, -0.9, -0.3))
             yield 0.3
             assert bpy.context.selected_objects
             yield from drag((-1.15, -0.9, 0.0), (-1.15, -0.9, 0.0))
             yield from wait_until(lambda: not bpy.context.selected_objects)
         with in_view():
-            bpy.ops.wm.tool_set_by_id(
-                name="builtin.select_box" if mode == "OBJECT" else "builtin.brush"
-            )
+            brush = "builtin.select_box" if mode == "OBJECT" else "builtin.brush"
+            bpy.ops.wm.tool_set_by_id(name=brush)
             bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def comb():
+    """Comb the sphere, undo that, replay the stroke as a script does, and take back another stroke with ESC."""
+    before = field_bytes()
+    yield from drag((-0.4, -0.9, 0.2), (0.4, -0.8, 0.3))
+    yield from wait_until(lambda: "rosy_guides" in bpy.context.object.data.attributes)
+    combed = field_bytes()
+    assert combed != before
+    operator = bpy.context.window_manager.operators[-1]
+    assert operator.bl_idname == "ROSY_OT_field_comb", operator.bl_idname
+    names = ("name", "location", "pressure", "is_start")
+    stroke = [{name: getattr(point, name) for name in names} for point in operator.stroke]
+    stroke = [{**point, "location": tuple(point["location"])} for point in stroke]
+    settings = {"radius": operator.radius, "strength": operator.strength}
+    for undo_or_redo, expected in (
+        *((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, combed), (bpy.ops.ed.undo, before)),
+    ):
+        with in_view():
+            undo_or_redo()
+        yield 0.3
+        assert field_bytes() == expected
+    with in_view():
+        bpy.ops.rosy.field_comb("EXEC_DEFAULT", True, stroke=stroke, **settings)
+    assert field_bytes() == combed
+    yield from move_mouse((-0.4, -0.9, -0.2), "LEFTMOUSE", "PRESS")
+    yield from move_mouse((0.3, -0.9, -0.3))
+    assert field_bytes() != combed
+    yield from move_mouse((0.3, -0.9, -0.3), "ESC", "PRESS")
+    assert field_bytes() == combed
+    # A stroke may begin beside the mesh.
+    yield from drag((-1.15, -0.9, 0.0), (0.2, -0.9, -0.3))
+    yield from wait_until(lambda: field_bytes() != combed)
+    assert bpy.context.object.location.length == 0
 
 
 def field_bytes():

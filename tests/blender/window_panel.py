@@ -21,6 +21,7 @@ from window_steps import (
     capture,
     fresh_scene,
     in_view,
+    preferences,
     press,
     rosy,
     run_steps,
@@ -247,6 +248,7 @@ def stop_when_the_scene_changes():
     def switch_off():
         for switch in (bpy.ops.preferences.addon_disable, bpy.ops.preferences.addon_enable):
             switch(module="bl_ext.user_default.rosy")
+        preferences().live_first_field = False
 
     for action in (
         bpy.ops.object.delete,

@@ -267,7 +267,7 @@ def field_in_view(monkey: Monkey) -> None:
 def any_operator(monkey: Monkey) -> None:
     """Call any operator of RoSy with random settings."""
     operator = monkey.pick(name for name in dir(bpy.ops.rosy) if name not in OTHER_OPERATORS)
-    if monkey.chance(0.6):
+    if monkey.chance(0.8):
         field_in_view(monkey)
     elif monkey.chance(0.8):
         select_mesh(monkey)
@@ -319,7 +319,7 @@ def any_property(monkey: Monkey) -> None:
 
 @action(6)
 def bake(monkey: Monkey) -> None:
-    if monkey.chance(0.5):
+    if monkey.chance(0.8):
         field_in_view(monkey)
     camera = monkey.pick(["SCENE", "SCENE", "SCENE", "ALL"])
     monkey.rosy("bake", camera=camera)
@@ -327,7 +327,7 @@ def bake(monkey: Monkey) -> None:
 
 @action(3)
 def strokes(monkey: Monkey) -> None:
-    if monkey.chance(0.5):
+    if monkey.chance(0.8):
         field_in_view(monkey)
     # Strokes on what is much larger than the frame, and any number of strokes, take minutes.
     is_large = any(max(o.dimensions) > 30 or min(map(abs, o.scale)) < 1e-3 for o in meshes())

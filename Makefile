@@ -48,7 +48,8 @@ QUICK  = $(PYTEST) -m "not slow and not long"
 CASES  = $(if $(LONG),-m "long or not long")
 
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
-export PYTHONDONTWRITEBYTECODE = 1
+# Tests start many processes: bytecode in __pycache__ saves half of the time until a test starts.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Tests run in a process per core. Threads of these, for linear algebra and for software OpenGL, only wait
 # for each other, which may take ten times as long.

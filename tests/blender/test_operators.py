@@ -88,7 +88,7 @@ ERRORS = [
     ("field_import", {"filepath": "/none/missing.rosy"}, "missing.rosy"),
     ("field_export", {"filepath": "/none/field.rosy"}, "field.rosy"),
     ("field_comb", {}, "The stroke has no points"),
-    ("field_compare", {"other": "missing"}, "another name of the attribute"),
+    ("field_compare", {"other": "missing"}, "no attribute 'missing'"),
     ("bake", {"camera": "VIEW"}, "view"),
     ("strokes", {"camera": "VIEW"}, "view"),
     ("strokes", {"kind": "FILE", "filepath": "/none/a.png"}, ".svg"),

@@ -36,7 +36,7 @@ def test_hatching_follows_the_tone(scene, tmp_path):
     bpy.ops.mesh.primitive_plane_add(size=8.0, rotation=(np.pi / 2, 0.0, 0.0))
     plane = bpy.context.object
     bpy.ops.rosy.field_generate(kind="axis", degree=4, axis=(1.0, 0.0, 0.3))
-    scene.rosy.texture_size = 512
+    scene.rosy.texture_size = 1024
     scene.view_settings.view_transform = "Standard"
     scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 8.0
     scene.camera.location, scene.camera.rotation_euler = (0.0, -5.0, 0.0), (np.pi / 2, 0.0, 0.0)

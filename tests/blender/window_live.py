@@ -48,9 +48,8 @@ from window_steps import (
 @live()
 def every_view_is_a_bake(monkey):
     """From several sides, perspective and orthographic."""
-    for azimuth, elevation, perspective in (
-        *((0.0, -0.6, "PERSP"), (2.1, 0.2, "PERSP"), (4.2, -0.2, "ORTHO")),
-    ):
+    views = ((0.0, -0.6, "PERSP"), (2.1, 0.2, "PERSP"), (4.2, -0.2, "ORTHO"))
+    for azimuth, elevation, perspective in views:
         look_from(azimuth, elevation)
         view()[1].spaces.active.region_3d.view_perspective = perspective
         yield from check_is_bake(f"live-view-{azimuth}")
@@ -354,33 +353,28 @@ def two_windows_with_two_scenes_rest():
 
 def the_first_field_is_shown():
     """Make Field makes its view live once, unless the user or the preferences do not want that."""
-    session_module().stop()
-    preferences().live_first_field = True
 
-    def make_field(name, how="EXEC_DEFAULT"):
+    def make_field(how="EXEC_DEFAULT"):
         bpy.ops.mesh.primitive_ico_sphere_add()
-        bpy.context.object.name = name
         bpy.ops.rosy.field_generate(how, True, kind="axis", degree=2)
 
     try:
         for wanted, how in ((True, "INVOKE_DEFAULT"), (False, "EXEC_DEFAULT")):
+            session_module().stop()
             bpy.ops.wm.read_homefile(use_empty=True)
             yield 0.5
             preferences().live_first_field = wanted
             with in_view():
-                make_field("First", how)
-            if wanted:
-                yield from wait_until(is_live)
-            else:
-                yield 0.5
-                assert not is_live()
+                make_field(how)
+            yield 0.5
+            assert is_live() == wanted
         preferences().live_first_field = True
         with in_view():
-            make_field("Second")
+            make_field()
         assert not is_live(), "the second field came on"
         bpy.ops.wm.read_homefile(use_empty=True)
         yield 0.5
-        make_field("Script")
+        make_field()
         assert not is_live(), "a script without a view made one live"
     finally:
         preferences().live_first_field = False
@@ -392,11 +386,7 @@ def live_views_are_remembered():
     """A file shows its live views again if the scene says so, and only then."""
     yield from fresh_scene(levels=0)
     path = str(SHOTS / "remembered.blend")
-    for remember, is_on, expected in (
-        (False, True, False),
-        (True, True, True),
-        (True, False, False),
-    ):
+    for remember, is_on in ((False, True), (True, True), (True, False)):
         bpy.context.scene.rosy.remember_live = remember
         switch("ON" if is_on else "OFF")
         bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -405,7 +395,7 @@ def live_views_are_remembered():
         assert session_module()._session is None
         bpy.ops.wm.open_mainfile(filepath=path)
         yield 0.5
-        assert is_live() == expected, (remember, is_on)
+        assert is_live() == (remember and is_on), (remember, is_on)
     os.remove(path)
     switch("OFF")
     yield 0.3

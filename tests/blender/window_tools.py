@@ -157,11 +157,10 @@ def comb():
     stroke = [{name: getattr(point, name) for name in names} for point in operator.stroke]
     stroke = [{**point, "location": tuple(point["location"])} for point in stroke]
     settings = {"radius": operator.radius, "strength": operator.strength}
-    for undo_or_redo, expected in (
-        *((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, combed), (bpy.ops.ed.undo, before)),
-    ):
+    undo, redo = bpy.ops.ed.undo, bpy.ops.ed.redo
+    for operator, expected in ((undo, before), (redo, combed), (undo, before)):
         with in_view():
-            undo_or_redo()
+            operator()
         yield 0.3
         assert field_bytes() == expected
     with in_view():

@@ -7,7 +7,7 @@ import subprocess
 import bpy
 import numpy as np
 import pytest
-from conftest import contents, error_of
+from conftest import contents
 
 
 def baked_images():
@@ -168,13 +168,3 @@ def test_turntable(with_field, tmp_path):
     clip = bpy.data.movieclips.load(str(tmp_path / "film.mp4"))
     assert clip.frame_duration == 4
     assert len(bpy.data.scenes) == 1
-
-
-def test_a_turntable_uses_the_device_of_the_scene(with_field, scene, tmp_path):
-    """The graphics card refuses the method "members", the processor draws it."""
-    scene.rosy.look.method = "members"
-    settings = {"filepath": str(tmp_path / "film.gif"), "film": ".gif", "pictures": 2}
-    scene.rosy.device = "GPU"
-    assert "graphics" in error_of(bpy.ops.rosy.turntable, width=32, height=32, **settings).lower()
-    scene.rosy.device = "CPU"
-    assert bpy.ops.rosy.turntable(width=32, height=32, **settings) == {"FINISHED"}

@@ -204,26 +204,6 @@ def test_strokes_are_followed(scene, add):
     assert np.degrees(np.arccos(cosine.clip(0, 1))).max() < 5
 
 
-def test_an_empty_is_followed(scene):
-    def add(ball):
-        empty = bpy.data.objects.new("Guide", None)
-        bpy.context.scene.collection.objects.link(empty)
-        empty.location = ball.matrix_world @ ball.data.vertices[0].co
-        empty.rotation_euler = (0.0, 1.2, 0.0)
-        empty.empty_display_size = 0.4
-        return empty
-
-    ball, guide = add_ball_and_guide(add)
-    assert bpy.ops.rosy.field_generate(kind="guided", degree=1) == {"FINISHED"}
-    position = ball.matrix_world.inverted() @ guide.location
-    face = min(ball.data.polygons, key=lambda face: (face.center - position).length)
-    axis = np.array((ball.matrix_world.inverted() @ guide.matrix_world).col[2][:3])
-    normal = np.array(face.normal)
-    axis -= normal * (axis @ normal)
-    axis /= np.linalg.norm(axis)
-    assert member_vectors(ball.data)[face.index] @ axis > 0.999
-
-
 # --- conversions -----------------------------------------------------------------------------
 
 
@@ -292,23 +272,6 @@ def test_combed_field_runs_along_the_stroke_and_is_made_again_from_its_guides(sc
         "FINISHED"
     }
     assert deviation() < 0.5
-
-
-def test_combed_guides_can_be_exported(scene, tmp_path):
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
-    bpy.ops.rosy.field_generate(kind="axis", degree=2)
-    path = tmp_path / "guides.rosy"
-    write = bpy.ops.rosy.field_export
-    message = error_of(write, filepath=str(path), content="GUIDES")
-    assert "has no combed guides" in message and not path.exists()
-    bpy.ops.rosy.field_comb(stroke=stroke_of(arc(0.0, 1.0)), radius=0.3)
-    assert write(filepath=str(path), content="GUIDES") == {"FINISHED"}
-    rows = path.read_text().splitlines()
-    vectors = np.array([row.split() for row in rows if len(row.split()) == 3], dtype=float)
-    assert vectors == pytest.approx(member_vectors(bpy.context.object.data, "rosy_guides"))
-    singular = tmp_path / "guides.sings"
-    message = error_of(write, filepath=str(singular), content="GUIDES")
-    assert "cannot keep the firmness" in message and not singular.exists()
 
 
 def test_combing_goes_on_where_something_else_has_changed_the_field(scene):

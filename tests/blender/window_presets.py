@@ -122,38 +122,6 @@ def preset_saved_by_a_dialog():
     assert not library().is_changed(settings)
 
 
-def preset_replaced_only_on_request():
-    """The dialog refuses to replace unless its box is checked. Afterwards the preview is new."""
-    settings = bpy.context.scene.rosy
-    before = preview_tones((yield from save_screenshot("presets-5-saved")))
-    settings.look.ink = "hatch"
-    with in_view():
-        bpy.ops.rosy.preset_save("INVOKE_DEFAULT")
-    yield 1.0
-    yield from save_screenshot("presets-6-replace")
-    yield from press_key("RET")
-    yield from press_key("ESC")  # closes the error message
-    assert library().active_entry(settings).preset.look.ink == "soft" and library().is_changed(
-        settings
-    )
-    yield 1.0  # Blender compares the times of preview files in whole seconds
-    with in_view():
-        bpy.ops.rosy.preset_save(name="Mine", sentence="Ink", replace=True)
-    after = preview_tones((yield from save_screenshot("presets-7-replaced")))
-    assert after.mean() > before.mean() + 0.15, (after.mean(), before.mean())
-
-
-def menu_with_an_unreadable_file():
-    folder = Path(bpy.utils.extension_path_user(EXTENSION, path="presets"))
-    (folder / "broken.json").write_text("{")
-    with in_view():
-        bpy.ops.wm.call_menu(name="VIEW3D_MT_rosy_presets")
-    yield 1.0
-    yield from save_screenshot("presets-8-menu")
-    yield from press_key("ESC")
-    (folder / "broken.json").unlink()
-
-
 def preset_deleted_only_if_confirmed():
     for key, remaining in (("ESC", ["mine"]), ("RET", [])):
         with in_view():
@@ -179,8 +147,6 @@ run_steps(
     panel_with_previews,
     preset_chosen_by_its_preview,
     preset_saved_by_a_dialog,
-    preset_replaced_only_on_request,
-    menu_with_an_unreadable_file,
     preset_deleted_only_if_confirmed,
     previews_are_freed_with_the_extension,
 )

@@ -366,6 +366,8 @@ def the_first_field_is_shown():
             preferences().live_first_field = wanted
             with in_view():
                 make_field(how)
+            if wanted:
+                yield from wait_until(is_live)
             yield 0.5
             assert is_live() == wanted
         preferences().live_first_field = True

@@ -103,15 +103,10 @@ def bake_of_view(region=None, region_3d=None, method="brute"):
     region = region or view()[2]
     region_3d = region_3d or view()[1].spaces.active.region_3d
     camera = rosy("rosy_addon.scene.cameras").camera_of_view(region, region_3d)
-    scene = bpy.context.scene
+    scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     look = replace(rosy("rosy_addon.scene.look_properties").read_look(scene.rosy), method=method)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    request = rosy("rosy_addon.scene.read_request").read_request(scene, look)
-    instances = rosy("rosy_addon.scene.scene_reader").read_scene(depsgraph, None, request).instances
-    lights = rosy("rosy_addon.scene.lights").read_lights(depsgraph, camera.view)
-    gbuffer = rosy("rosy_addon.projection.project").project(instances, camera, look.display)
-    compose = rosy("rosy_addon.compositor.compose").compose
-    picture = compose(gbuffer, look, lights).rgba.copy()
+    (drawn,) = rosy("rosy_addon.scene.read_view").read_views(scene, depsgraph, [camera], look).views
+    picture = rosy("rosy_addon.rendering.draw").draw_picture(drawn).rgba.copy()
     picture[..., :3] = rosy("rosy_addon.core.color").to_display(picture[..., :3])
     return picture
 

@@ -53,7 +53,6 @@ SUFFIXES = {
 #: Operators that are not called at random: they need a window, or are actions of their own.
 OTHER_OPERATORS = {"drag_singularity", "show_here", "viewport", "flow_play", "bake", "strokes"}
 
-
 #: How often each action is chosen.
 ACTIONS: dict[Callable[[Monkey], None], float] = {}
 
@@ -145,10 +144,15 @@ class Monkey:
         value = self.pick([low, high, prop.default, value, value, value])
         return int(max(min(value, high), low)) if prop.type == "INT" else float(value)
 
-    def set_properties(self, group: bpy.types.PropertyGroup, probability: float) -> None:
+    def set_properties(self, group: bpy.types.bpy_struct, probability: float) -> None:
         """Set some properties of a group to random values, or to their defaults."""
         for prop in group.bl_rna.properties:
-            if prop.is_readonly or prop.type in ("POINTER", "COLLECTION") or prop.is_hidden:
+            if (
+                prop.identifier in bpy.types.ID.bl_rna.properties
+                or prop.is_readonly
+                or prop.type in ("POINTER", "COLLECTION")
+                or prop.is_hidden
+            ):
                 continue
             if self.chance(probability):
                 if self.chance(0.4):

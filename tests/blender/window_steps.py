@@ -6,6 +6,7 @@ results are written to the file of ROSY_RESULTS, as {step: [error or "", seconds
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 import os
@@ -90,7 +91,7 @@ def _run_all(steps):
 
 def rosy(name):
     """Return a module of the extension."""
-    return sys.modules[f"bl_ext.user_default.rosy.{name}"]
+    return importlib.import_module(f"bl_ext.user_default.rosy.{name}")
 
 
 def preferences():

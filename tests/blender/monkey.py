@@ -28,7 +28,7 @@ HERE = Path(__file__).resolve().parent
 #: Texts in the output that mean that something is wrong.
 BAD_TEXTS = ("monkey failed: ", "Traceback (most recent call last)", "EXCEPTION_ACCESS_VIOLATION")
 
-#: The last line of the output of a run that has passed begins with it.
+#: A line of the output of a run that has passed begins with it.
 DONE = "monkey done: "
 
 #: Number of lines of the output, up to the fault, that are printed.
@@ -92,9 +92,10 @@ def run_seed(
     for number, line in enumerate(lines):
         if any(text in line for text in BAD_TEXTS):
             return lines[: number + 30], line.strip()
-    if done.returncode or not any(line.startswith(DONE) for line in lines[-3:]):
+    summary = [line for line in lines if line.startswith(DONE)]
+    if done.returncode or not summary:
         return lines, f"Blender ended with status {done.returncode}"
-    return [line for line in lines if line.startswith(DONE)], None
+    return summary, None
 
 
 if __name__ == "__main__":

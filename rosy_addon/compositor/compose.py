@@ -355,8 +355,7 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
         layer.look,
         method=method,
         length=overshoot_steps(layer.look),
-        taper=False,
-        oriented=False,
+        fade="none",
         flow=0.0,
         antialiased=False,
     )

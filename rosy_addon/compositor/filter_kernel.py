@@ -28,16 +28,18 @@ WEIGHT_SLOPES: dict[Kernel, tuple[float, float]] = {
 }
 
 
+#: The kernel of each value of `Look.fade`.
+KERNEL_OF_FADE: dict[str, Kernel] = {"none": "box", "ends": "taper", "tail": "ramp"}
+
+
 def look_for_symmetry(look: Look, symmetry: FieldSymmetry) -> Look:
-    """Return the look without orientation, if the lines of a field point both ways."""
-    return replace(look, oriented=False) if look.oriented and symmetry.has_opposites else look
+    """Return the look without a fading tail, if the lines of a field point both ways."""
+    return replace(look, fade="none") if look.fade == "tail" and symmetry.has_opposites else look
 
 
 def kernel_of(look: Look) -> Kernel:
     """Return the kernel of a look that is for the symmetry of a field."""
-    if look.oriented:
-        return "ramp"
-    return "taper" if look.taper else "box"
+    return KERNEL_OF_FADE[look.fade]
 
 
 def sample_weights(position: np.ndarray, length: float, kernel: Kernel) -> np.ndarray:

@@ -130,7 +130,7 @@ def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) ->
     with progress(0.0, 0.05):
         covering = build_covering(field, look, np.zeros((len(field.pixel), 1), np.float32))
     with progress(0.05, 0.1):
-        sheets = _Sheets(covering, is_upstream=not look.oriented)
+        sheets = _Sheets(covering, is_upstream=kernel_of(look) != "ramp")
     with progress(0.1):
         decays = [_decay(field, each) for each in looks]
         doublings = max(_doubling_count(float(np.max(decay))) for decay in decays)
@@ -185,7 +185,7 @@ def _step_turn(look: Look) -> float:
         return 0.0
     angle = 2 * np.pi * look.step / cycle_distance(look)
     # What comes from upstream left there earlier. What is downstream will be there later.
-    return angle if look.oriented else -angle
+    return angle if kernel_of(look) == "ramp" else -angle
 
 
 def _is_two_sided(field: PixelField, look: Look) -> bool:
@@ -640,7 +640,7 @@ def _line_waves(field: PixelField, covering: Covering, look: Look, sums: _Sums) 
             )
             if covering.has_directions:
                 is_along = bool(covering.is_along_member(state[:1])[0])
-                opposite = first_sheet + (lines if is_along == (not look.oriented) else 0)
+                opposite = first_sheet + (lines if is_along == (kernel_of(look) != "ramp") else 0)
                 values, weight, squares = sums.at(opposite, block)
             else:
                 forward = covering.forward_share(state) if flows else np.float32(0.5)

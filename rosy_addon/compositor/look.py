@@ -167,16 +167,16 @@ class Look:
         panel="streaks",
         applies=_has_streaks,
     )
-    taper: bool = switch(
-        False,
-        "Fade streaks toward their ends. Lines end in points and change less when the view zooms",
-        panel="streaks",
-        applies=_has_streaks,
-    )
-    oriented: bool = switch(
-        False,
-        "Fade streaks from head to tail, so that they show which way they point. For fields of odd degree; "
-        "sparse streaks, of low density, show it best",
+    fade: str = choice(
+        "none",
+        "Where streaks fade",
+        {
+            "none": "Nowhere: streaks have the same strength from end to end",
+            "ends": "Toward both ends. Lines end in points and change less when the view zooms",
+            "tail": "From head to tail, so that they show which way they point. For fields of odd degree; "
+            "sparse streaks, of low density, show it best",
+        },
+        option_labels={"none": "Nowhere", "ends": "At Both Ends", "tail": "At the Tail"},
         panel="streaks",
         applies=_has_streaks,
     )
@@ -184,20 +184,11 @@ class Look:
         0.0,
         0.0,
         65536.0,
-        "Least distance in pixels between arrowheads over the lines, which show which way they point. For "
-        "fields of odd degree. 0: none",
+        "Least distance in pixels between arrowheads over the lines, which show which way they point. They "
+        "are a quarter as long. For fields of odd degree. 0: none",
         label="Arrowheads",
         is_pixel_length=True,
         **_shading("streaks"),
-    )
-    arrow_size: float = number(
-        12.0,
-        0.0,
-        65536.0,
-        "Length of the arrowheads in pixels, which is at least 3",
-        label="Arrowhead Size",
-        is_pixel_length=True,
-        **_shading("streaks", lambda look: look.arrows > 0),
     )
     flow: float = number(
         0.0,

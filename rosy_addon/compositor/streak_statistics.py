@@ -52,7 +52,7 @@ STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 #: The settings of a look that the statistics depend on.
 STATISTICS_SETTINGS = (
-    *("length", "step", "grain", "density", "high_pass", "taper", "oriented", "anchor"),
+    *("length", "step", "grain", "density", "high_pass", "fade", "anchor"),
     *("crispness", "breaks", "wobble", "paper_grain", "supersampling"),
 )
 

@@ -22,8 +22,12 @@ from ..core.progress import progress
 from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
-#: Least length of an arrowhead, pixels.
-MIN_SIZE = 3.0
+#: Length of an arrowhead, relative to the least distance between places. The arrowheads of up to five directions
+#: reach 1.75 lengths from their place, outline included, so half a length stays free between those of neighbors.
+ARROW_LENGTH = 0.25
+
+#: Least length of an arrowhead, pixels. In a smaller one, the outline leaves nothing of the fill.
+MIN_ARROW_LENGTH = 3.0
 
 
 def has_marks(look: Look) -> bool:
@@ -77,7 +81,7 @@ def view_arrows(
         view.instances,
         view.camera,
         look.arrows,
-        max(look.arrow_size, MIN_SIZE),
+        max(ARROW_LENGTH * look.arrows, MIN_ARROW_LENGTH),
         display=look.display,
         clip_planes=view.clip_planes,
         cache=cache,

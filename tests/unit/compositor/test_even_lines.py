@@ -170,7 +170,7 @@ def test_settings_that_do_not_apply_do_not_change_the_picture(effect):
     if effect != "plain":
         look = replace(look, **{effect: 6.0 if effect == "overshoot" else 0.5})
     expected = picture(instance, camera, look)
-    others = {"length": 7, "taper": True}
+    others = {"length": 7, "fade": "ends"}
     applied = {name for name in others if settings_of(Look)[name].applies(look)}
     assert applied == (set(others) if effect in ("breaks", "wobble") else set())
     for name, setting in settings_of(Look).items():

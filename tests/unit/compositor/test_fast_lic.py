@@ -25,7 +25,7 @@ SIZE = 256
 LOOK = Look(method="sheets", gain=1.0, density=0.5, high_pass=0.0)
 
 #: Settings that choose a kernel.
-KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
+KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def make_noise(field, look=LOOK, channels=1):

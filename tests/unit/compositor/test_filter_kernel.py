@@ -35,7 +35,7 @@ def test_other_kernels_have_three_quarters_of_the_samples():
     for length in (40, 400):
         plain, tapered, oriented = (
             full_sample_count(Look(length=length, **settings))
-            for settings in ({}, {"taper": True}, {"oriented": True})
+            for settings in ({}, {"fade": "ends"}, {"fade": "tail"})
         )
         assert plain == 2 * length + 1
         assert abs(tapered / plain - 0.75) < 0.01 and abs(oriented / plain - 0.75) < 0.01

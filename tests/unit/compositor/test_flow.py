@@ -26,7 +26,7 @@ SIZE = 320
 #: Pixels at the border that are not compared: streamlines end there.
 MARGIN = 64
 
-KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
+KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def member(angle, degree, look):

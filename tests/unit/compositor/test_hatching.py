@@ -55,7 +55,13 @@ PRESETS = {name: load_preset(name).look for name in preset_keys()}
 HATCHED = [name for name, look in PRESETS.items() if look.ink == "hatch"]
 
 INK = Look(
-    taper=True, ink="hatch", anchor="surface", light="lamp", shading=1.0, grain=2.5, supersampling=2
+    fade="ends",
+    ink="hatch",
+    anchor="surface",
+    light="lamp",
+    shading=1.0,
+    grain=2.5,
+    supersampling=2,
 )
 
 

@@ -92,9 +92,9 @@ DRIFTING = {"flow": 2.0, "flow_phase": 0.3}
     ("degree", "settings"),
     [
         (4, {}),
-        (1, {"taper": True}),
+        (1, {"fade": "ends"}),
         (4, DRIFTING),
-        *long((1, {}), (4, {"taper": True}), (1, DRIFTING)),
+        *long((1, {}), (4, {"fade": "ends"}), (1, DRIFTING)),
     ],
     ids=str,
 )
@@ -338,7 +338,7 @@ def test_undefined_pixels_are_gray():
         {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
         {"anchor": "surface", "flow": 1.0},
         {"magnitude": "both"},
-        {"foreshorten": True, "oriented": True},
+        {"foreshorten": True, "fade": "tail"},
         {"ink": "hatch", "lines": "even", "breaks": 0.5, "flow": 1.0},
         {"length": 1, "step": 0.3},
     ],

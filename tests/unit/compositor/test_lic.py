@@ -46,7 +46,7 @@ def make_noise(size, grain=1.5, seed=0):
 
 
 #: Settings that choose a kernel.
-KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
+KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def kernel_window(length, kernel):
@@ -127,7 +127,7 @@ def test_the_decomposition_agrees_with_brute_force(degree, kernel):
 
 
 #: Settings of the noise, and of kernels.
-NOISES = ({}, {"oriented": True}, {"high_pass": 16.0, "density": 0.1}, {"taper": True})
+NOISES = ({}, {"fade": "tail"}, {"high_pass": 16.0, "density": 0.1}, {"fade": "ends"})
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -136,7 +136,7 @@ def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     size = 64
     angles = pair_angle(*pixel_centers(size), size, degree)
     rotation = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
-    look = plain(method=method, length=10, oriented=True)
+    look = plain(method=method, length=10, fade="tail")
     # Where rounding moves a position across the border of a pixel, one sample of 21 differs.
     difference = np.abs(tone(angles, degree, look) - tone(angles + rotation, degree, look))
     assert np.mean(difference > 1e-5) < 0.002
@@ -146,7 +146,7 @@ def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     ("method", "degree", "noise"),
     [
         ("members", 7, {}),
-        ("sheets", 7, {"oriented": True}),
+        ("sheets", 7, {"fade": "tail"}),
         *long(*product(["members", "sheets"], [2, 3, 4, 5, 6, 7], NOISES)),
     ],
 )

@@ -549,8 +549,8 @@ LOOKS = {
     "magnitude as both": {"magnitude": "both", "color_map": "magma"},
     "magnitude as both, with a range": {"magnitude": "both", "magnitude_range": 0.9, "degree": 2},
     "families, of a field without families": {"hue": "families"},
-    "oriented, three directions": {"oriented": True, "degree": 3, "density": 0.03},
-    "oriented, of lines without a direction": {"oriented": True},
+    "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.03},
+    "oriented, of lines without a direction": {"fade": "tail"},
     "foreshortened": {"foreshorten": True},
     "foreshortened, three directions": {"foreshorten": True, "degree": 3},
     "supersampled": {"supersampling": 2},
@@ -571,7 +571,7 @@ LOOKS = {
     "hatched, oriented": {
         "ink": "hatch",
         "shading": 1.0,
-        "oriented": True,
+        "fade": "tail",
         "degree": 5,
         "breaks": 0.4,
     },
@@ -753,9 +753,9 @@ LOOKS = {
 DRIFTING = {"flow": 2.0, "flow_phase": 0.2}
 DRIFTING_LOOKS = {
     "drifting": DRIFTING,
-    "drifting, oriented": DRIFTING | {"oriented": True, "degree": 1, "density": 0.03},
+    "drifting, oriented": DRIFTING | {"fade": "tail", "degree": 1, "density": 0.03},
     "drifting, two directions, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
-    "drifting, three directions": DRIFTING | {"taper": True, "degree": 3, "flow_distance": 13.0},
+    "drifting, three directions": DRIFTING | {"fade": "ends", "degree": 3, "flow_distance": 13.0},
     "drifting on the surface": DRIFTING | {"anchor": "surface"},
     "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
     "drifting, short streaks": DRIFTING
@@ -1281,7 +1281,7 @@ UNDEFINED_LOOKS = {
     "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
     "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
     "drifting": DRIFTING,
-    "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "taper": True},
+    "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "fade": "ends"},
 }
 
 
@@ -1498,7 +1498,7 @@ def test_clip_planes(card):
 
 
 @pytest.mark.parametrize(
-    "degree, settings", [(4, {"singularity_dots": "all"}), (3, {"arrows": 30.0, "arrow_size": 8.0})]
+    "degree, settings", [(4, {"singularity_dots": "all"}), (3, {"arrows": 32.0})]
 )
 def test_singularities_and_arrowheads_are_drawn_over_the_picture(card, degree, settings):
     """At the same pixels as numpy's."""

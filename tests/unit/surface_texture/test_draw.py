@@ -55,7 +55,7 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     for changes in (
         {"noise": "color"},
         {"magnitude": "both"},
-        {"taper": True},
+        {"fade": "ends"},
         {"method": "ibfv"},
     ):
         look = WIDER.with_settings(changes)

@@ -128,8 +128,8 @@ RENDERS = {
     "flat-hatch": f"@bumpy.ply display=flat {HATCH}",
     "ortho-view": "@pair.stl --ortho --view 40,60 --generate axis --axis 1,0.5,0",
     "up-z": "@wave.obj --up z --view -30,-25 --generate features --sharp-angle 20",
-    "world-unit": "@bumpy.ply unit=world unit_size=0.012",
-    "world-unit-hatch": f"@torus.obj {HATCH} unit=world unit_size=0.01 anchor=surface outline=1",
+    "world-unit": "@bumpy.ply unit_size=0.012",
+    "world-unit-hatch": f"@torus.obj {HATCH} unit_size=0.01 anchor=surface outline=1",
     "noise-color": "@wave.obj noise=color supersampling=1",
     "noise-color-surface": "@wave.obj noise=color anchor=surface grain=3",
     "surface-anchor": "@suzanne.obj anchor=surface",
@@ -517,7 +517,7 @@ CARD = {
     "scene-light-hatch": f"{HATCH} light=scene shadows=on wobble=0.6 paper_grain=0.4",
     "outline-overshoot": f"{HATCH} outline=2 overshoot=10 supersampling=2",
     "magnitude-flat": "magnitude=both color_map=magma display=flat supersampling=2",
-    "all-cameras": "--all-cameras noise=color unit=world unit_size=0.012",
+    "all-cameras": "--all-cameras noise=color unit_size=0.012",
 }
 
 

@@ -333,7 +333,7 @@ def _mean_turn(first: Field, second: Field) -> float:
 
 def _steady_between(turn: float, look: Look) -> int:
     """Return how many pictures between two fields keep streaks steady."""
-    if look.unit != "pixels":
+    if look.unit_size:
         return 0
     steady = STEADY_TURN * look.grain / (look.length * look.step)
     return min(max(int(np.ceil(turn / steady - 1e-9)) - 1, 0), MAX_BETWEEN)

@@ -143,7 +143,7 @@ def texture(
     **settings
         Settings of the look, after the preset: ``grain=3, seed=3``. A pixel is that of a square with the
         area of the surface and 1024 pixels on each side, whatever the size of the texture. With
-        ``unit="world", unit_size=0.002`` it is that many units of length.
+        ``unit_size=0.002`` it is that many units of length.
 
     Returns
     -------

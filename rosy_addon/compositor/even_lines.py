@@ -416,7 +416,7 @@ class _InstanceLines:
         if gbuffer.camera.is_perspective:
             scale /= -gbuffer.position[entries, 2]
         octaves = None
-        if look.unit == "pixels":
+        if not look.unit_size:
             octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
         across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
         defined = (field.representation != 0) & (heading != 0)

@@ -84,7 +84,7 @@ def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
 class Look:
     """All settings that determine how a field is drawn, as in presets and panels.
 
-    Lengths are in pixels of the finished picture or, with the unit "world", in multiples of
+    Lengths are in pixels of the finished picture or, if `unit_size` is not 0, in multiples of
     `unit_size` Blender units.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
@@ -138,25 +138,15 @@ class Look:
         panel_before="method",
         stage=Stage.GBUFFER,
     )
-    unit: str = choice(
-        "pixels",
-        "Unit of lengths",
-        {
-            "pixels": "Pixels of the picture: line width does not depend on the distance",
-            "world": "Blender units: lines belong to the object, as if engraved, and are wider when "
-            "near",
-        },
-        panel="streaks",
-    )
     unit_size: float = number(
-        0.01,
-        1e-6,
+        0.0,
+        0.0,
         1e6,
-        "Size in Blender units that replaces one pixel in lengths",
+        "Blender units that replace one pixel in lengths: lines belong to the object, as if engraved, and are "
+        "wider when near. 0: lengths are in pixels of the picture, whatever the distance",
         unit="length",
         panel="streaks",
         panel_label="Pixel Size",
-        applies=lambda look: look.unit != "pixels",
     )
     length: int = number(
         40,

@@ -51,7 +51,7 @@ def supersampled_look(look: Look) -> PixelLook:
 def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> Look:
     """Return the look with its lengths converted from Blender units to pixels.
 
-    The scale is that of a pixel at the center of the meshes. A look whose unit is "pixels" is
+    The scale is that of a pixel at the center of the meshes. A look whose lengths are in pixels is
     returned unchanged.
 
     Parameters
@@ -68,7 +68,9 @@ def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]
         Its `unit_size` is the size of a pixel at that center, in Blender units.
     """
     bounds = [instance.world_bounds() for instance in instances if instance.field is not None]
-    if look.unit == "pixels" or not bounds:
+    if not look.unit_size:
+        return look
+    if not bounds:
         return look
     exact_scale = look.unit_size / (
         pixel_world_size(np.concatenate(bounds), camera) * look.supersampling
@@ -87,18 +89,16 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
     step : float
         Length of a step of streamlines, in Blender units.
     pixel : float
-        Blender units that replace a pixel, if the unit of the look is "pixels".
+        Blender units that replace a pixel, if the lengths of the look are in pixels.
 
     Returns
     -------
     Look
         Foreshortened, as steps have one length on the surface.
     """
-    unit_size = pixel if look.unit == "pixels" else look.unit_size
+    unit_size = look.unit_size or pixel
     look = replace(
         look,
-        unit="world",
-        unit_size=float(np.clip(unit_size, *_range_of("unit_size"))),
         method="sheets",
         anchor="surface",
         foreshorten=True,
@@ -117,8 +117,7 @@ def scaled_look(look: Look, scale: float) -> Look:
     for setting in pixel_lengths(Look):
         length = getattr(look, setting.name) * scale
         lengths[setting.name] = max(round(length), 1) if setting.is_integer else length
-    unit_size = float(np.clip(look.unit_size / scale, *_range_of("unit_size")))
-    return replace(look, **lengths, unit_size=unit_size)
+    return replace(look, **lengths, unit_size=look.unit_size / scale)
 
 
 def preview_look(look: Look, downscale: int) -> Look:
@@ -131,7 +130,7 @@ def preview_look(look: Look, downscale: int) -> Look:
         Pixels of the view along each side of a pixel of the preview.
     """
     settings: dict[str, Any] = {"supersampling": 1}
-    if look.unit == "pixels":
+    if not look.unit_size:
         for setting in pixel_lengths(Look):
             value = getattr(look, setting.name)
             value = value // downscale if setting.is_integer else value / downscale
@@ -166,9 +165,9 @@ def instance_line_spacing(
     camera : Camera
         Of the frame.
     instance : MeshInstance
-        With the unit "pixels", the distance is that of pixels at its center.
+        If the lengths of the look are in pixels, the distance is that of pixels at its center.
     """
-    if look.unit != "pixels":
+    if look.unit_size:
         return grains * look.grain * look.unit_size
     exact = grains * look.grain * pixel_world_size(instance.world_bounds(), camera)
     step = np.rint(np.log2(exact) * SPACING_STEPS_PER_OCTAVE)
@@ -183,15 +182,9 @@ def cell_size_args(look: Look) -> dict[str, Any]:
     look : Look
         In pixels of the frame; see `look_in_pixels` and `supersampled_look`.
     """
-    if look.unit == "pixels":
+    if not look.unit_size:
         return {"pixel": 0.0, "smallest": 0.0}
     return {"pixel": look.unit_size, "smallest": float(look.supersampling)}
-
-
-def _range_of(name: str) -> tuple[float, float]:
-    """Return the least and the largest value of a setting."""
-    setting = settings_of(Look)[name]
-    return setting.low, setting.high
 
 
 def _scale_limits(look: Look) -> tuple[float, float]:

@@ -274,7 +274,7 @@ def even_line_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, 
     `look` is in pixels of the frame, whose camera is `camera`.
     """
     spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
-    asked_pixels = SPACING_GRAINS * look.grain if look.unit == "pixels" else 0.0
+    asked_pixels = SPACING_GRAINS * look.grain if not look.unit_size else 0.0
     return {
         **covering_uniforms(item.kind),
         **screen_direction_uniforms(item.kind, look, camera),

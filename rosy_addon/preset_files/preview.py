@@ -62,7 +62,7 @@ def _fast_look(look: Look) -> Look:
         {
             "method": "sheets" if look.method == "brute" else look.method,
             "supersampling": 1 if look.method == "members" else 2,
-            "unit": "pixels",
+            "unit_size": 0.0,
             "tone": "light",
             "values_low": 0.0,
             "values_high": 0.0,

@@ -62,7 +62,6 @@ TEXTURE_SETTINGS = (
     *(
         "ink",
         "display",
-        "unit",
         "unit_size",
         "length",
         "fade",
@@ -164,8 +163,8 @@ def draw_texture(
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        The light and the settings of a camera have no effect. With the unit "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
-        each side.
+        The light and the settings of a camera have no effect. If its lengths are in pixels, a pixel is that of a
+        square with the area of the surface and `SURFACE_PIXELS` pixels on each side.
     size : int
         Texels on each side of the texture, or of a tile of it.
     margin : int

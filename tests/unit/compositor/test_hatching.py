@@ -697,7 +697,7 @@ def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
     if look.lines == "even" and motion == "zoomed":
         # At distances in pixels, a zoom needs other lines.
-        look = replace(look, unit="world", unit_size=0.006)
+        look = replace(look, unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
@@ -723,7 +723,7 @@ def test_lines_in_blender_units_scale_with_the_zoom():
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     look = replace(INK, light="scene", shading=0.4)
-    world_look = replace(look, unit="world", unit_size=4 / SIZE)
+    world_look = replace(look, unit_size=4 / SIZE)
     widths = []
     for zoom in (1.0, 1.6, 4.0):
         camera = orthographic_camera(
@@ -746,7 +746,7 @@ def test_lines_in_blender_units_scale_with_the_distance():
         matrix[:3, 3] = left, distance, 0
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 2, (1.0, 0, 0))))
     camera = perspective_camera(look_at((0, 0, 0), (0, 1, 0)), SIZE, SIZE, fov=2 * np.arctan(0.5))
-    look = replace(INK, light="scene", shading=0.5, unit="world", unit_size=0.04)
+    look = replace(INK, light="scene", shading=0.5, unit_size=0.04)
     picture = compose(project(walls, supersampled(camera, 2)), look).rgba[..., 0]
     near, far = picture[:, 8 : SIZE // 2 - 8], picture[:, SIZE // 2 + 8 : -8]
     assert line_width(near) / line_width(far) == pytest.approx(2, rel=0.2)
@@ -757,7 +757,7 @@ def test_lines_in_blender_units_scale_with_the_distance():
     "motion", ["zoomed", *long(*(name for name in MOTIONS if name != "zoomed"))]
 )
 def test_lines_in_blender_units_stay_on_the_surface(motion):
-    look = replace(INK, light="scene", shading=0.35, unit="world", unit_size=0.006)
+    look = replace(INK, light="scene", shading=0.35, unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 

@@ -129,7 +129,7 @@ def test_unit_is_blender_units():
     instance, uv = instance_of(surface, 4), torus_uv()
     area = 4 * np.pi**2 * 0.4
     size = float(np.sqrt(area)) / SURFACE_PIXELS
-    world = WIDER.with_settings({"unit": "world", "unit_size": size})
+    world = WIDER.with_settings({"unit_size": size})
     by_pixels, by_units = (draw_texture(instance, uv, look, 256).rgba for look in (WIDER, world))
     colors = [picture[..., 0].ravel() for picture in (by_pixels, by_units)]
     assert np.corrcoef(colors)[0, 1] > 0.95

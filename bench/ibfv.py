@@ -98,7 +98,7 @@ def _seen_field(path: Path, degree: int) -> PixelField:
     gbuffer = project(
         [instance], orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     )
-    return surface_pixel_field(gbuffer, degree, cases.LOOK.crease_angle, False)
+    return surface_pixel_field(gbuffer, degree, cases.LOOK.crease_angle)
 
 
 def _direction_errors(field: PixelField, method: str) -> np.ndarray:

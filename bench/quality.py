@@ -214,7 +214,7 @@ def _pixel_fields_of(surface: Surface, field: RosyField) -> list[PixelField]:
     """Return the field as a camera sees it, in a list of one."""
     camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)]
+    return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle)]
 
 
 if __name__ == "__main__":

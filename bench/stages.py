@@ -42,7 +42,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     look, camera, instance = cases.LOOK, cases.camera(), cases.instance(triangles, DEGREE)
     cache = Cache()
     gbuffer = project([instance], camera, look.display, cache)
-    field = surface_pixel_field(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
+    field = surface_pixel_field(gbuffer, DEGREE, look.crease_angle)
     noise = look_noise(field, look)
     points = np.column_stack([instance.surface.vertices, np.ones(len(instance.surface.vertices))])
     clip = points @ (camera.projection @ camera.view).T
@@ -54,9 +54,7 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
         "project": lambda: project([instance], camera, look.display, cache),
         "  of which rasterize": lambda: rasterize(clip, triangle, camera.width, camera.height),
         "compose": lambda: compose(gbuffer, look),
-        "  of which neighbor links": lambda: neighbor_masks(
-            gbuffer, look.crease_angle, look.cross_creases
-        ),
+        "  of which neighbor links": lambda: neighbor_masks(gbuffer, look.crease_angle),
         "  of which directions on screen": lambda: screen_jacobians(gbuffer),
         "  of which noise": lambda: look_noise(field, look),
         "  of which streamlines": lambda: lic(field, look, noise),

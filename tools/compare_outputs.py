@@ -143,7 +143,7 @@ RENDERS = {
     "even-lines": f"@suzanne.obj {HATCH} lines=even",
     "even-lines-3": f"@torus.obj --degree 3 {HATCH} lines=even anchor=surface outline=1",
     "creases": "@cube.off --generate features",
-    "cross-creases": "@cube.off --generate smoothest cross_creases=on",
+    "cross-creases": "@cube.off --generate smoothest crease_angle=3.1416",
     "crease-angle": "@cube.off --generate smoothest crease_angle=2.5 noise=color",
     "magnitude-color": "@bumpy.ply magnitude=color shading=0",
     "magnitude-length-magma": "@bumpy.ply magnitude=length color_map=magma",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,6 +34,11 @@ def colors_magnitude(look: Any) -> bool:
 def colors_values(look: Any) -> bool:
     """Return whether numbers on the surface drive the color of the lines."""
     return look.hue == "values" and not colors_magnitude(look)
+
+
+def crease_angle_of(look: Any) -> float | None:
+    """Return the least angle between normals at a crease, in radians. None if there are no creases."""
+    return look.crease_angle if look.crease_angle < math.pi else None
 
 
 def is_hatched(look: Any) -> bool:
@@ -319,15 +325,14 @@ class Look:
         "Shorten streaks where the surface is slanted, instead of keeping their length in the picture",
         panel="streaks",
     )
-    cross_creases: bool = switch(False, "Continue streaks across sharp creases", panel="streaks")
     crease_angle: float = number(
         0.7,
         0.0,
         3.1416,
-        "Minimum angle between the normals of adjacent pixels at a sharp crease",
+        "Minimum angle between the normals on both sides of a sharp crease, where streaks end and outlines are "
+        "drawn. 180 degrees: no creases",
         unit="angle",
         panel="streaks",
-        applies=lambda look: not look.cross_creases,
     )
     magnitude: str = choice(
         "none",

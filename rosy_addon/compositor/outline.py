@@ -21,7 +21,7 @@ from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
 from ..projection.project import project_samples
-from .look import Look
+from .look import Look, crease_angle_of
 from .look_units import supersampled_look
 from .reported_blocks import reported_blocks
 
@@ -44,7 +44,7 @@ MAX_OUTLINE_SAMPLES = 1 << 20
 PART_BORDER, EMPTY_BORDER = 1, 2
 
 #: The settings of a look that an outline depends on.
-OUTLINE_SETTINGS = ("outline", "crease_angle", "cross_creases", "supersampling", "display")
+OUTLINE_SETTINGS = ("outline", "crease_angle", "supersampling", "display")
 
 #: Label of all steps.
 STEP_LABEL = "drawing outlines"
@@ -62,8 +62,7 @@ def outline_coverage(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -
         Creases are drawn if its instances are known. If its pixels have several samples, outlines are
         drawn at the samples near them.
     look : Look
-        In pixels of the frame. Its `outline`, `crease_angle`, `cross_creases`, `supersampling` and
-        `display` are used.
+        In pixels of the frame. Its `outline`, `crease_angle`, `supersampling` and `display` are used.
     cache : Cache, optional
         Stores what does not depend on the view.
 
@@ -200,7 +199,7 @@ class _Edges:
             self._depth[block], _, _, self._tolerance[block] = depth_slopes(gbuffer, block)
         with progress(0.2, 0.6, STEP_LABEL):
             #: The `neighbor_masks` without creases.
-            self._mask = neighbor_masks(gbuffer, look.crease_angle, True)
+            self._mask = neighbor_masks(gbuffer, None)
         self.line_width = np.zeros(count, dtype=np.float32)
         #: (P,) bits `PART_BORDER` and `EMPTY_BORDER`.
         self._border = np.zeros(count, dtype=np.uint8)
@@ -253,7 +252,7 @@ class _Edges:
         """
         gbuffer, look, defined = self._gbuffer, self._look, self._defined
         instance = gbuffer.instances[instance_id]
-        crease_angle = None if look.cross_creases else look.crease_angle
+        crease_angle = crease_angle_of(look)
         with progress(0.0, 0.5):
             mesh = cached_outline_mesh(instance.surface, instance.matrix, crease_angle, cache)
         if len(mesh.crease_ends):

@@ -18,7 +18,7 @@ from .flow import unconvolved_noise
 from .ibfv import streak_waves, wave_images
 from .lic import lic_lengths, look_noise, noise_args
 from .lic_images import LicImages
-from .look import Look, has_flow, lic_key
+from .look import Look, crease_angle_of, has_flow, lic_key
 from .look_units import cell_size_args
 from .outline import OUTLINE_SETTINGS, outline_coverage
 from .paper_grain import surface_paper_grain_args
@@ -54,10 +54,10 @@ class ComposeStages:
 
     def pixel_field(self, degree: int, look: Look) -> PixelField:
         """Pixel field of one degree, rotated by the wobble of the look."""
-        settings = look.crease_angle, look.cross_creases
+        crease_angle = crease_angle_of(look)
         field = self._cache.get_or_create(
-            ("pixel field", self._gbuffer, degree, *settings),
-            partial(surface_pixel_field, self._gbuffer, degree, *settings),
+            ("pixel field", self._gbuffer, degree, crease_angle),
+            partial(surface_pixel_field, self._gbuffer, degree, crease_angle),
         )
         if not has_wobble(look):
             return field

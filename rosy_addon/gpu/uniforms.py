@@ -31,7 +31,7 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_values, has_flow, is_hatched
+from ..compositor.look import Look, colors_values, crease_angle_of, has_flow, is_hatched
 from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -254,7 +254,8 @@ def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str,
 
 def min_normal_cosine(look: Look) -> float:
     """Return the cosine of the largest angle between the normals of pixels that continue each other."""
-    return -2.0 if look.cross_creases else float(np.cos(look.crease_angle))
+    angle = crease_angle_of(look)
+    return -2.0 if angle is None else float(np.cos(angle))
 
 
 def screen_direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:

@@ -19,7 +19,13 @@ from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import noise_channel_count, with_cycle_distance
 from ..compositor.lic import lic_lengths
 from ..compositor.lic_images import with_magnitude_range
-from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
+from ..compositor.look import (
+    Look,
+    colors_magnitude,
+    colors_values,
+    crease_angle_of,
+    is_hatched,
+)
 from ..compositor.look_units import look_on_surface
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
@@ -72,7 +78,7 @@ TEXTURE_SETTINGS = (
         "grain",
         "density",
     ),
-    *("high_pass", "noise", "hue", "seed", "gain", "cross_creases", "crease_angle"),
+    *("high_pass", "noise", "hue", "seed", "gain", "crease_angle"),
     *("magnitude", "magnitude_range", "values_low", "values_high", "color_map"),
     *("lines", "breaks", "wobble", "paper_grain", "guiding_angle"),
 )
@@ -91,7 +97,7 @@ CONTENTS = {
 }
 
 #: The settings of a look that a map of directions is drawn with.
-DIRECTION_SETTINGS = ("display", "cross_creases", "crease_angle", "guiding_angle")
+DIRECTION_SETTINGS = ("display", "crease_angle", "guiding_angle")
 
 #: Smallest fraction of the UV map under other charts that is mentioned. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
@@ -194,11 +200,12 @@ def draw_texture(
     if texture_colors_values(look, content):
         check_color_values(look, [instance])
     raise_mmap_threshold()
+    crease_angle = crease_angle_of(look)
     with progress(0.0, 0.05):
         mesh = build_tangent_mesh(
             instance,
             display=look.display,
-            cross_creases=look.cross_creases,
+            cross_creases=crease_angle is None,
             crease_angle=look.crease_angle,
             cache=cache,
         )
@@ -211,7 +218,7 @@ def draw_texture(
     step = step_length(mesh, charts, texels)
     on = TexelSurface(instance, mesh, charts, texels, step)
     with progress(0.15, 0.3):
-        field = texel_field(on, None if look.cross_creases else look.crease_angle)
+        field = texel_field(on, crease_angle)
     surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
     surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"

@@ -67,7 +67,7 @@ def picture(instance, camera, look=LOOK):
 
 def lines_at_pixels(instance, camera, look=LOOK, cache=None):
     gbuffer = project([instance], camera)
-    field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle, False)
+    field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle)
     return even_lines(gbuffer, field, look, cache=cache), gbuffer
 
 
@@ -131,7 +131,7 @@ def test_members_get_the_lines_along_them(degree, side):
     instance = wall_instance(degree, 0.4)
     camera = camera_above(eye=(0, 0, 5 * side))
     gbuffer = project([instance], camera)
-    field = surface_pixel_field(gbuffer, degree, 0.7, False)
+    field = surface_pixel_field(gbuffer, degree, 0.7)
     look = replace(LOOK, grain=8.0, guiding_angle=0.3)
     lines = even_lines(gbuffer, field, look)
     members = all_members(field, look.guiding_angle)

@@ -885,7 +885,7 @@ def test_lines_of_creases_are_half_on_each_side():
     covered = outline_coverage(gbuffer, Look(outline=4.0))
     inner = middle & (np.abs(gbuffer.position[:, 1] * 120) < 40)
     assert (covered[inner] == (np.abs(x[inner]) < 2)).all()
-    assert not outline_coverage(gbuffer, Look(outline=4.0, cross_creases=True))[inner].any()
+    assert not outline_coverage(gbuffer, Look(outline=4.0, crease_angle=np.pi))[inner].any()
 
 
 def test_outlines_are_drawn_in_ink():

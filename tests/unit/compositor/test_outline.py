@@ -203,7 +203,7 @@ def test_parts_that_intersect_have_a_line_between_them():
     near = 0.4 * np.sign(eye[:2])
     for end in ((-near[0], near[1]), (near[0], -near[1])):
         assert line_is_covered(coverage, camera, (*near, 0.1), (*end, 0.1))
-    crossing = outline_of(instance_of(boxes), camera, cross_creases=True)
+    crossing = outline_of(instance_of(boxes), camera, crease_angle=np.pi)
     assert not line_is_covered(crossing, camera, (*near, 0.1), (-near[0], near[1], 0.1))
 
 

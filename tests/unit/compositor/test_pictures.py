@@ -137,7 +137,7 @@ def test_silhouettes_end_streamlines():
     surface = torus(96, 48)
     field = axis_field(surface, 1, (0, 0, 1))
     gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
-    pixel_field = surface_pixel_field(gbuffer, 1, 0.7, False)
+    pixel_field = surface_pixel_field(gbuffer, 1, 0.7)
     linked = neighbor_table(pixel_field)[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])

@@ -257,7 +257,7 @@ def test_kinds_agree_with_the_pixel_field_of_numpy():
         sign_changing_tensors(surface),
     ):
         gbuffer = rooms().project([MeshInstance(surface, np.eye(4), field)], camera)
-        pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7, False)
+        pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7)
         (kind,) = field_kinds([field]).values()
         assert (kind.line_count, kind.sheets_per_turn) == (
             pixel_field.line_count,
@@ -558,7 +558,7 @@ LOOKS = {
     "guided": {"guiding_angle": 0.7},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
     "flat": {"display": "flat"},
-    "flat, across creases": {"display": "flat", "cross_creases": True},
+    "flat, across creases": {"display": "flat", "crease_angle": 3.1416},
     "shaded": {"shading": 0.7},
     "short steps": {"step": 0.4, "length": 60},
     "white noise": {"density": 0.5, "high_pass": 0.0, "gain": 1.0},
@@ -1045,7 +1045,7 @@ def test_creases_of_a_cube(card, crossing, degree, display):
     )
     field = axis_field(surface, degree, (0.9, 0.4, 0.1))
     instance = MeshInstance(surface, placed(2 * np.eye(3), (-1, -1, -1)), field)
-    look = replace(LOOK, cross_creases=crossing, display=display)
+    look = replace(LOOK, crease_angle=np.pi if crossing else 0.7, display=display)
     for perspective in (True, False):
         assert_parity(card, [instance], view(perspective=perspective, distance=8.0), look)
         outlined = replace(look, ink="hatch", outline=3.0)

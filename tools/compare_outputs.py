@@ -133,7 +133,7 @@ RENDERS = {
     "noise-color": "@wave.obj noise=color supersampling=1",
     "noise-color-surface": "@wave.obj noise=color anchor=surface grain=3",
     "surface-anchor": "@suzanne.obj anchor=surface",
-    "noise-settings": "@bumpy.ply step=0.5 grain=3 density=0.4 high_pass=5 seed=7 gain=4 fade=ends",
+    "noise-settings": "@bumpy.ply grain=3 density=0.4 high_pass=5 seed=7 gain=4 fade=ends",
     "long-streamlines": "@bumpy.ply length=300 supersampling=1",
     "foreshorten": "@torus.obj foreshorten=on --view 10,15",
     "detail": "@suzanne.obj detail=0.7",

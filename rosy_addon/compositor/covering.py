@@ -239,7 +239,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
     field : PixelField
         At least one pixel.
     look : Look
-        In pixels of the frame. Its `step`, `guiding_angle` and `foreshorten` are used.
+        In pixels of the frame. Its `guiding_angle` and `foreshorten` are used.
     noise : (P, K) float32 ndarray
 
     Returns
@@ -304,7 +304,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         packed_phase=packed_phase,
         state_table=state_table.reshape(-1, state_table.shape[2]),
         state_scales=(
-            look.step / INT16_MAX,
+            1 / INT16_MAX,
             max_noise / INT16_MAX,
             max_slope / INT16_MAX,
         ),

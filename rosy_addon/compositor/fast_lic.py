@@ -309,7 +309,7 @@ def _cover_all_lines(
     total = len(missing)
     fine = is_fine(look)
     max_uncovered = FINE_UNCOVERED_FRACTION if fine else MAX_UNCOVERED_FRACTION
-    spacing = max(int(SEED_SPACING_FACTOR * half_window * look.step), 1)
+    spacing = max(int(SEED_SPACING_FACTOR * half_window), 1)
     seeds = _grid_seeds(covering, averages[0], spacing)
     batch_size = _batch_size(half_window + streamline_reach(look))
     batch = StreamlineBatch(covering, looks, step_limits, half_window, batch_size, fine)

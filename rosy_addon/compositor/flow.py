@@ -53,7 +53,7 @@ def cycle_distance(look: Look) -> float:
     """Return the pixels that streaks drift in a cycle."""
     if look.flow_distance:
         return look.flow_distance
-    return look.length * look.step * (IBFV_DISTANCE if look.method == "ibfv" else 1.0)
+    return look.length * (IBFV_DISTANCE if look.method == "ibfv" else 1.0)
 
 
 def with_cycle_distance(look: Look) -> Look:
@@ -102,7 +102,7 @@ def channel_weights(phase: float) -> np.ndarray:
 
 def channel_shifts(look: Look) -> np.ndarray:
     """Return the (3,) float64 steps that the streaks of the channels have drifted, either way."""
-    return (_channel_positions(look.flow_phase) - 0.5) * (cycle_distance(look) / look.step)
+    return (_channel_positions(look.flow_phase) - 0.5) * cycle_distance(look)
 
 
 def blend_channels(noise: np.ndarray, look: Look) -> np.ndarray:
@@ -122,7 +122,7 @@ def streamline_reach(look: Look) -> int:
     """Return how many steps the kernel of a look reaches from its pixel, at most, in each direction."""
     if not has_flow(look):
         return look.length
-    return look.length + math.ceil(cycle_distance(look) / (2 * look.step)) + MAX_AXIAL_STEPS + 1
+    return look.length + math.ceil(cycle_distance(look) / 2) + MAX_AXIAL_STEPS + 1
 
 
 def forward_share(cosine: np.ndarray) -> np.ndarray:

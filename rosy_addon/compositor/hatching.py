@@ -312,7 +312,7 @@ def has_overshoot(look: Look) -> bool:
 
 def overshoot_steps(look: Look) -> int:
     """Return the steps in each direction over which the tone is averaged for the overshoot."""
-    return max(round(look.overshoot / look.step), 1)
+    return max(round(look.overshoot), 1)
 
 
 def has_outline(look: Look) -> bool:

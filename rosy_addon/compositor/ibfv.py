@@ -183,7 +183,7 @@ def _step_turn(look: Look) -> float:
     """The angle by which the phase of the noise differs from that of the noise a step nearer."""
     if not has_flow(look):
         return 0.0
-    angle = 2 * np.pi * look.step / cycle_distance(look)
+    angle = 2 * np.pi / cycle_distance(look)
     # What comes from upstream left there earlier. What is downstream will be there later.
     return angle if kernel_of(look) == "ramp" else -angle
 

@@ -158,7 +158,7 @@ class Look:
         40,
         1,
         8000,
-        "Length of the streaks: the number of steps in each direction",
+        "Length of the streaks in pixels, in each direction",
         is_pixel_length=True,
         panel="streaks",
         applies=_has_streaks,
@@ -215,7 +215,6 @@ class Look:
         panel="streaks",
         applies=has_flow,
     )
-    step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
     grain: float = number(
         1.5,
         0.5,

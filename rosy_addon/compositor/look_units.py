@@ -104,8 +104,6 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
         foreshorten=True,
         supersampling=1,
         guiding_angle=0.0,
-        step=1.0,
-        length=max(round(look.length * look.step), 1),
     )
     return scaled_look(look, unit_size / step)
 

@@ -294,7 +294,7 @@ def integrate_noise(
     samples : (B,) float32 ndarray
         Number of these samples.
     """
-    end, step = neighbors.shape[1] - 1, side * look.step
+    end = neighbors.shape[1] - 1
     weight_slope = WEIGHT_SLOPES[kernel_of(look)][0 if side > 0 else 1]
     neighbors = neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
@@ -308,10 +308,10 @@ def integrate_noise(
     for step_index in range(1, look.length + 1):
         direction = direction_at(entry, offset)
         if previous_direction is None:
-            offset += np.float32(step) * direction
+            offset += np.float32(side) * direction
         else:
             offset += (
-                np.float32(1.5 * step) * direction - np.float32(0.5 * step) * previous_direction
+                np.float32(1.5 * side) * direction - np.float32(0.5 * side) * previous_direction
             )
         previous_direction = direction
         # At most to a neighbor, even where the direction turns sharply.

@@ -52,7 +52,7 @@ STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 #: The settings of a look that the statistics depend on.
 STATISTICS_SETTINGS = (
-    *("length", "step", "grain", "density", "high_pass", "fade", "anchor"),
+    *("length", "grain", "density", "high_pass", "fade", "anchor"),
     *("crispness", "breaks", "wobble", "paper_grain", "supersampling"),
 )
 
@@ -110,8 +110,7 @@ def _measured(look: Look) -> StreakStatistics:
     grain, kernel = scale * look.grain, kernel_of(look)
     side = max(int(SAMPLE_GRAINS * grain), MIN_SAMPLE_PIXELS)
     length_pixels, break_pixels = (
-        max(round(scale * ((2 * steps + 1) * look.step)), 1)
-        for steps in (look.length, break_steps(look))
+        max(round(scale * (2 * steps + 1)), 1) for steps in (look.length, break_steps(look))
     )
     width = side + length_pixels
     anchored = look.anchor == "surface"
@@ -187,7 +186,7 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
 
 def break_steps(look: Look) -> int:
     """Steps in each direction of the short streaks that break lines into pieces."""
-    steps = min(BREAK_LENGTH_GRAINS * look.grain / look.step, MAX_BREAK_FRACTION * look.length)
+    steps = min(BREAK_LENGTH_GRAINS * look.grain, MAX_BREAK_FRACTION * look.length)
     return max(round(steps), 1)
 
 

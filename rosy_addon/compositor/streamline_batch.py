@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -31,8 +30,8 @@ MAX_LATERAL_OFFSET = 0.25
 #: Steps after which streamlines that return to a state end. Shorter ones may return.
 MIN_LOOP_STEPS = 256
 
-#: Pixels within which a state may still be that of the same passage, not a return.
-MIN_LOOP_PIXELS = 4.0
+#: Steps within which a streamline that is at a state again may not have left it.
+MIN_RETURN_STEPS = 4
 
 #: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
 PLASTIC_NUMBER = 1.3247179572447460
@@ -95,14 +94,13 @@ class StreamlineBatch:
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
         lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
-        self._lateral_gain = np.float32(lateral_gain / look.step * step_scale)
+        self._lateral_gain = np.float32(lateral_gain * step_scale)
         # The same, in the unit of the noise of states.
         self._noise_gain = self._lateral_gain / self._noise_scale if interpolates else None
-        self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step_scale)
+        self._max_lateral = np.float32(MAX_LATERAL_OFFSET / step_scale)
         self._step_limits = [
             None if limit is None else np.tile(limit, covering.line_count) for limit in step_limits
         ]
-        self._min_loop_steps = math.ceil(MIN_LOOP_PIXELS / look.step)
         lanes, channels = 2 * max_streamlines, covering.noise_channels
         self._has_second_sums = self._kernel != "box" or bool(self._moving_kernels)
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
@@ -277,7 +275,7 @@ class StreamlineBatch:
         # Lanes that had not ended at the last compaction; None before the first one.
         active, step_counts = None, np.full(lanes, self._max_steps)
         active_counts = step_counts
-        loops = _LoopFinder(self._min_loop_steps)
+        loops = _LoopFinder()
         step_scale = self._step_scale / np.float32(1.5)
         for step in range(self._max_steps + 1):
             state = sheet_offset.take(sheet, mode="clip")
@@ -485,22 +483,16 @@ class _LoopFinder:
 
     Each state is compared with one state of the past, which is replaced at steps that are powers of
     two (Brent, An improved Monte Carlo factorization algorithm, 1980).
-
-    Parameters
-    ----------
-    min_steps : int
-        Steps of a loop, at least.
     """
 
-    def __init__(self, min_steps: int) -> None:
-        self._min_steps = min_steps
+    def __init__(self) -> None:
         self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
 
     def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
         """Indices of the streamlines that have returned to a state, and not ended otherwise."""
         if step in (MIN_LOOP_STEPS, 2 * self._past_step):
             self._past_step, self._past_state = step, state
-        elif step >= self._past_step + self._min_steps:
+        elif step >= self._past_step + MIN_RETURN_STEPS:
             return np.flatnonzero((state == self._past_state) & (next_cell != SINK_CELL))
         return np.empty(0, dtype=np.intp)
 

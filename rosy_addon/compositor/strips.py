@@ -56,7 +56,7 @@ class Strip(NamedTuple):
 
 def streamline_margin(look: Look) -> int:
     """Return how many rows streamlines may leave a strip."""
-    return int(streamline_reach(look) * look.step) + 2
+    return streamline_reach(look) + 2
 
 
 def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.ndarray:

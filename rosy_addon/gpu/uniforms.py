@@ -116,7 +116,6 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         **_flow_uniforms(kind, look),
         "half_length": 0 if has_even_lines(look) else look.length,
         "full_samples": full_sample_count(look),
-        "step_length": look.step,
         "crossing_correlation": crossing,
         # The streaks that drift have one channel, unlike their noise.
         "noise_channels": 1 if has_flow(look) else noise_args(look)["channels"],

@@ -74,7 +74,6 @@ TEXTURE_SETTINGS = (
         "flow",
         "flow_distance",
         "flow_phase",
-        "step",
         "grain",
         "density",
     ),

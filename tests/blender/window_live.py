@@ -1134,7 +1134,7 @@ def streaks_drift_while_they_are_played():
     yield from wait_for_final_pictures()
     # The frame range is a loop of whole cycles.
     drift = 1.5 * (scene.frame_end - scene.frame_start + 1)
-    cycles = math.ceil(drift / (scene.rosy.look.length * scene.rosy.look.step))
+    cycles = math.ceil(drift / scene.rosy.look.length)
     cycle = (4 + frames) * 1.5 / (drift / cycles)
     assert abs((shown_phases()[0] - 0.25 - cycle + 0.5) % 1 - 0.5) < 1e-4
     play_or_pause()

@@ -143,7 +143,7 @@ def _members(
         available, full = (start**2).sum(axis=1), (start**2).sum(axis=1)
         for side in (1, -1):
             direction_at = tracer(slice(0, count))
-            step_length = side * look.step
+            step_length = side
             for step, entry, offset in _traced(neighbors, direction_at, count, reach, step_length):
                 weight = weights_at(side * step)
                 energy = (weight**2).sum(axis=1)

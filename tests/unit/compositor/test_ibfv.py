@@ -340,7 +340,7 @@ def test_undefined_pixels_are_gray():
         {"magnitude": "both"},
         {"foreshorten": True, "fade": "tail"},
         {"ink": "hatch", "lines": "even", "breaks": 0.5, "flow": 1.0},
-        {"length": 1, "step": 0.3},
+        {"length": 1},
     ],
     ids=str,
 )

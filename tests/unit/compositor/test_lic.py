@@ -56,7 +56,7 @@ def kernel_window(length, kernel):
     return 1 - distance / (length + 1)
 
 
-def runge_kutta_lic(angle, noise, size, length, step, kernel):
+def runge_kutta_lic(angle, noise, size, length, kernel):
     """One-member LIC in double precision, by the classic Runge-Kutta method of order 4."""
     x, y = pixel_centers(size)
     start = x + 1j * y
@@ -76,7 +76,7 @@ def runge_kutta_lic(angle, noise, size, length, step, kernel):
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
         for weight in kernel_window(length, kernel)[::sign][length + 1 :]:
-            h = sign * step
+            h = sign
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
             k3 = direction(p + h / 2 * k2)
@@ -96,7 +96,7 @@ def crop_margin(image, margin=50):
 def test_one_direction_agrees_with_a_runge_kutta_integrator(kernel):
     x, y = pixel_centers(SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, kernel)
+    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, kernel)
     look = plain(method="members", **KERNELS[kernel])
     actual = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
@@ -340,7 +340,6 @@ def test_the_spectrum_peaks_at_the_members(degree):
     "settings",
     [
         {"length": 0},
-        {"step": 2.0},
         {"method": "magic"},
         {"gain": "much"},
         {"view_plane": 1},

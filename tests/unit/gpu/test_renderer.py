@@ -560,7 +560,6 @@ LOOKS = {
     "flat": {"display": "flat"},
     "flat, across creases": {"display": "flat", "crease_angle": 3.1416},
     "shaded": {"shading": 0.7},
-    "short steps": {"step": 0.4, "length": 60},
     "white noise": {"density": 0.5, "high_pass": 0.0, "gain": 1.0},
     "coarse noise": {"grain": 5.0, "seed": 7},
     "long": {"length": 200},
@@ -755,8 +754,7 @@ DRIFTING_LOOKS = {
     "drifting, three directions": DRIFTING | {"fade": "ends", "degree": 3, "flow_distance": 13.0},
     "drifting on the surface": DRIFTING | {"anchor": "surface"},
     "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
-    "drifting, short streaks": DRIFTING
-    | {"length": 9, "flow_distance": 40.0, "step": 0.6, "supersampling": 2},
+    "drifting, short streaks": DRIFTING | {"length": 9, "flow_distance": 40.0, "supersampling": 2},
     "drifting, hatched, with breaks": DRIFTING
     | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
     "drifting, hatched, breaks and length by magnitude": DRIFTING

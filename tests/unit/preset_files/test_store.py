@@ -449,7 +449,7 @@ def test_shipped_previews_show_their_looks(name):
     "look",
     [
         Look(method="brute", length=8000),
-        Look(method="members", length=8000, step=0.05, noise="color"),
+        Look(method="members", length=8000, noise="color"),
         *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
         Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
         Look(light="scene", hue="families", display="flat", magnitude="both"),

@@ -23,7 +23,7 @@ from rosy_addon.projection.project import project
 SIZE = 512
 
 #: The settings of the original program: 40 steps in each direction, noise cells of 1.5 pixels.
-LOOK = Look(length=40, grain=1.5)
+LOOK = Look(length=40, line_width=1.5)
 
 
 @lru_cache(maxsize=8)

@@ -97,7 +97,7 @@ class Case(NamedTuple):
 PRESETS = tuple(sorted(path.stem for path in (ROOT / "presets").glob("*.json")))
 
 #: Options of a hatched picture, to which those of a case are added.
-HATCH = "ink=hatch light=lamp shading=0.9 grain=2.5 length=30"
+HATCH = "ink=hatch light=lamp shading=0.9 line_width=2.5 length=30"
 
 #: Arguments of `render`, to which an output and `SIZE` are added.
 RENDERS = {
@@ -131,17 +131,17 @@ RENDERS = {
     "world-unit": "@bumpy.ply unit_size=0.012",
     "world-unit-hatch": f"@torus.obj {HATCH} unit_size=0.01 anchor=surface outline=1",
     "noise-color": "@wave.obj noise=color supersampling=1",
-    "noise-color-surface": "@wave.obj noise=color anchor=surface grain=3",
+    "noise-color-surface": "@wave.obj noise=color anchor=surface line_width=3",
     "surface-anchor": "@suzanne.obj anchor=surface",
-    "noise-settings": "@bumpy.ply grain=3 density=0.4 high_pass=5 seed=7 gain=4 fade=ends",
+    "noise-settings": "@bumpy.ply line_width=3 density=0.4 high_pass=5 seed=7 gain=4 fade=ends",
     "long-streamlines": "@bumpy.ply length=300 supersampling=1",
     "foreshorten": "@torus.obj foreshorten=on --view 10,15",
     "detail": "@suzanne.obj detail=0.7",
     "arrows": "@torus.obj --degree 1 --generate smoothest arrows=36",
     "singularities": "@suzanne.obj singularity_dots=visible singularity_labels=on",
     "singularities-all": "@torus.obj --degree 3 singularity_dots=all singularity_size=12",
-    "even-lines": f"@suzanne.obj {HATCH} lines=even",
-    "even-lines-3": f"@torus.obj --degree 3 {HATCH} lines=even anchor=surface outline=1",
+    "even-lines": f"@suzanne.obj {HATCH} lines=even line_distance=5",
+    "even-lines-3": f"@torus.obj --degree 3 {HATCH} lines=even line_distance=5 anchor=surface outline=1",
     "creases": "@cube.off --generate features",
     "cross-creases": "@cube.off --generate smoothest crease_angle=3.1416",
     "crease-angle": "@cube.off --generate smoothest crease_angle=2.5 noise=color",

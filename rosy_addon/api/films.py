@@ -335,7 +335,7 @@ def _steady_between(turn: float, look: Look) -> int:
     """Return how many pictures between two fields keep streaks steady."""
     if look.unit_size:
         return 0
-    steady = STEADY_TURN * look.grain / look.length
+    steady = STEADY_TURN * look.line_width / look.length
     return min(max(int(np.ceil(turn / steady - 1e-9)) - 1, 0), MAX_BETWEEN)
 
 

@@ -141,7 +141,7 @@ def texture(
     color_values : str or (F,), (V,) or (C,) array_like, optional
         Numbers that the hue of the streaks shows, as for `render`. Hatching shows none.
     **settings
-        Settings of the look, after the preset: ``grain=3, seed=3``. A pixel is that of a square with the
+        Settings of the look, after the preset: ``line_width=3, seed=3``. A pixel is that of a square with the
         area of the surface and 1024 pixels on each side, whatever the size of the texture. With
         ``unit_size=0.002`` it is that many units of length.
 

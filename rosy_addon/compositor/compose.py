@@ -16,7 +16,7 @@ from ..projection.pixel_blocks import BLOCK_PIXELS
 from .color_values import map_positions, value_ends, value_ranges
 from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
-from .even_lines import EvenLines, has_even_lines
+from .even_lines import EvenLines
 from .family_hues import family_hues
 from .filter_kernel import look_for_symmetry
 from .flow import with_cycle_distance
@@ -33,7 +33,7 @@ from .image_noise import NOISE_MEAN
 from .ink_thresholds import picture_thresholds, sharp_look
 from .lic import lic_lengths
 from .lic_images import LicImages, lic_images, relative_magnitude, with_magnitude_range
-from .look import Look, colors_magnitude, colors_values, is_hatched
+from .look import Look, colors_magnitude, colors_values, has_even_lines, is_hatched
 from .look_units import look_in_pixels, supersampled_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
@@ -378,9 +378,9 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.nda
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     if look.anchor == "picture":
         subpixels = look.supersampling
-        grain = look.grain / subpixels
+        line_width = look.line_width / subpixels
         return picture_paper_grain(
-            field.pixel, field.width, grain, look.seed, subpixels, field.line_count
+            field.pixel, field.width, line_width, look.seed, subpixels, field.line_count
         )
     noise = stages.surface_paper_grain(field, look)
     report(1.0, "drawing the paper grain")

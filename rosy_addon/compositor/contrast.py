@@ -23,14 +23,14 @@ def normalize_variance(mean: np.ndarray, effective_samples: np.ndarray, look: Lo
     effective_samples : (P,) float32 ndarray
         n, at least 1.
     look : Look
-        In pixels of the frame. Its `length`, `grain` and kernel are used.
+        In pixels of the frame. Its `length`, `line_width` and kernel are used.
 
     Returns
     -------
     (P, K) float32 ndarray
     """
     full_samples = np.float32(full_sample_count(look))
-    cells = effective_samples * np.float32(1 / look.grain)
+    cells = effective_samples * np.float32(1 / look.line_width)
     factor = np.sqrt(effective_samples / full_samples) * np.minimum(cells / 2, 1)
     return NOISE_MEAN + (mean - NOISE_MEAN) * factor[:, None]
 
@@ -52,7 +52,7 @@ def blend_gain(image_count: int, effective_samples: np.ndarray, look: Look) -> n
     effective_samples : (P,) float32 ndarray
         Effective samples of a streamline, mean over the M lines of a pixel.
     look : Look
-        In pixels of the frame. Its `length`, `grain`, `high_pass` and kernel are used.
+        In pixels of the frame. Its `length`, `line_width`, `high_pass` and kernel are used.
 
     Returns
     -------
@@ -91,8 +91,8 @@ def expected_std(look: Look) -> float:
 
 
 def streak_args(look: Look) -> tuple[float, float, float]:
-    """Length of the streamlines, and grain and high-pass width of the noise, in pixels."""
-    return 2 * look.length + 1, look.grain, look.high_pass
+    """Length of the streamlines, size of cells and high-pass width of the noise, in pixels."""
+    return 2 * look.length + 1, look.line_width, look.high_pass
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:

@@ -26,16 +26,13 @@ from ..field.frames import transform_components
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.project import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
-from .look import Look, is_hatched
+from .look import Look
 from .look_units import instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .reported_blocks import reported_blocks
 from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
 from .wobble import WOBBLE_STD
-
-#: Distance between lines, in widths of a line (`Look.grain`). At half coverage, lines are that wide.
-SPACING_GRAINS = 2.0
 
 #: Distances between lines on screen, in pixels of the picture, over which lines fade in.
 FADE_PIXELS = (1.3, 2.6)
@@ -62,11 +59,6 @@ MAX_BREAK_AMOUNT = 0.85
 
 #: Label of all steps.
 STEP_LABEL = "spacing lines"
-
-
-def has_even_lines(look: Look) -> bool:
-    """Whether lines are evenly spaced instead of streaks of noise."""
-    return is_hatched(look) and look.lines == "even"
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +146,7 @@ class EvenLines:
         ----------
         line : int
         look : Look
-            In pixels of the frame. Its `grain` is used.
+            In pixels of the frame. Its `line_distance` is used.
 
         Returns
         -------
@@ -182,7 +174,7 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
 def crowded_pixels(look: Look) -> tuple[float, float]:
     """`CROWDED_SHARES` as distances in pixels of the frame."""
     low, high = CROWDED_SHARES
-    return low * SPACING_GRAINS * look.grain, high * SPACING_GRAINS * look.grain
+    return low * look.line_distance, high * look.line_distance
 
 
 def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:
@@ -335,7 +327,7 @@ class _InstanceLines:
         self._gbuffer, self._field, self._look = gbuffer, field, look
         self._instance, self._wobble_angle, self._cache = instance, wobble_angle, cache
         #: Distance between lines on the surface, in Blender units.
-        self._spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
+        self._spacing = instance_line_spacing(look, gbuffer.camera, instance)
         # The sides of triangles from corner 0 to corners 1 and 2, in camera space.
         matrix = gbuffer.camera.view @ np.asarray(instance.matrix, dtype=np.float64)
         surface = instance.surface
@@ -409,9 +401,9 @@ class _InstanceLines:
         relative = members[0] * heading.conj()
         turn = vector_angle(relative.real, relative.imag) * np.float32(field.degree / (2 * np.pi))
         first_direction = step * np.rint(turn).astype(np.int32)
-        asked_pixels = np.float32(SPACING_GRAINS * look.grain)
+        asked_pixels = np.float32(look.line_distance)
         # Distance between lines on screen, relative to the one asked for.
-        unit = self._spacing / (SPACING_GRAINS * look.grain)
+        unit = self._spacing / look.line_distance
         scale = np.full(len(entries), unit * gbuffer.camera.pixels_per_unit, dtype=np.float32)
         if gbuffer.camera.is_perspective:
             scale /= -gbuffer.position[entries, 2]

@@ -62,7 +62,7 @@ def look_noise(field: PixelField, look: Look) -> np.ndarray:
 def noise_args(look: Look) -> dict[str, Any]:
     """Return the noise settings of a look as parameters of `image_noise` and `surface_noise`."""
     return {
-        "grain": look.grain,
+        "cell": look.line_width,
         "seed": look.seed,
         "channels": noise_channel_count(look),
         "density": look.density,

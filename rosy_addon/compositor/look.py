@@ -46,9 +46,14 @@ def is_hatched(look: Any) -> bool:
     return look.ink == "hatch"
 
 
+def has_even_lines(look: Any) -> bool:
+    """Return whether evenly spaced lines are drawn, instead of streaks."""
+    return is_hatched(look) and look.lines == "even"
+
+
 def _has_streaks(look: Any) -> bool:
     """Return whether streaks of noise are drawn, or break even lines."""
-    return not (is_hatched(look) and look.lines == "even" and not (look.breaks or look.wobble))
+    return not has_even_lines(look) or bool(look.breaks or look.wobble)
 
 
 def has_flow(look: Any) -> bool:
@@ -215,16 +220,24 @@ class Look:
         panel="streaks",
         applies=has_flow,
     )
-    grain: float = number(
+    line_width: float = number(
         1.5,
         0.5,
         256.0,
-        "Width of the lines in pixels: the size of a cell of the noise, or half the distance "
-        "between even lines",
-        label="Line Width",
+        "Width of the streaks in pixels, which is the size of a cell of the noise",
         is_pixel_length=True,
         preview_low=0.75,
         panel="streaks",
+    )
+    line_distance: float = number(
+        3.0,
+        1.0,
+        512.0,
+        "Distance between even lines in pixels. At half coverage, lines are half as wide",
+        is_pixel_length=True,
+        preview_low=1.5,
+        panel="streaks",
+        applies=has_even_lines,
     )
     density: float = number(
         0.1,
@@ -449,7 +462,7 @@ class Look:
         {
             "streaks": "Streaks of noise: as broken and uneven as by hand",
             "even": "Long lines at even distances on the surface, which swell and thin with the "
-            "tone, as in engravings. The distance is twice the line width",
+            "tone, as in engravings",
         },
         option_labels={"even": "Evenly Spaced"},
         panel="ink",

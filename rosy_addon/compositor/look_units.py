@@ -149,25 +149,21 @@ def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     return max(float(depth), min_depth) / camera.pixels_per_unit
 
 
-def instance_line_spacing(
-    look: Look, grains: float, camera: Camera, instance: MeshInstance
-) -> float:
+def instance_line_spacing(look: Look, camera: Camera, instance: MeshInstance) -> float:
     """Return the distance between even lines on a mesh instance, in Blender units.
 
     Parameters
     ----------
     look : Look
         In pixels of the frame; see `look_in_pixels` and `supersampled_look`.
-    grains : float
-        The distance in widths of a line.
     camera : Camera
         Of the frame.
     instance : MeshInstance
         If the lengths of the look are in pixels, the distance is that of pixels at its center.
     """
     if look.unit_size:
-        return grains * look.grain * look.unit_size
-    exact = grains * look.grain * pixel_world_size(instance.world_bounds(), camera)
+        return look.line_distance * look.unit_size
+    exact = look.line_distance * pixel_world_size(instance.world_bounds(), camera)
     step = np.rint(np.log2(exact) * SPACING_STEPS_PER_OCTAVE)
     return float(2 ** (step / SPACING_STEPS_PER_OCTAVE))
 
@@ -194,5 +190,5 @@ def _scale_limits(look: Look) -> tuple[float, float]:
     max_scale = min(
         setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
     )
-    min_scale = max(1.0, settings_of(Look)["grain"].low) / look.grain
+    min_scale = max(1.0, settings_of(Look)["line_width"].low) / look.line_width
     return min(min_scale, 1.0), max(max_scale, 1.0)

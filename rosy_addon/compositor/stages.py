@@ -106,7 +106,7 @@ class ComposeStages:
         if field.representation.all():
             return None
         noise = unconvolved_noise(self.noise(field, look), look)
-        return undirected_texture(field, noise, look.grain)
+        return undirected_texture(field, noise, look.line_width)
 
     def even_lines(self, field: PixelField, look: Look) -> EvenLines:
         """Compute the evenly spaced lines of a field, or find them in the cache."""
@@ -149,5 +149,5 @@ class ComposeStages:
 
     def _wobble_angle(self, look: Look) -> np.ndarray:
         """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
-        key = "wobble", self._gbuffer, look.anchor, look.grain, *cell_size_args(look).values()
+        key = "wobble", self._gbuffer, look.anchor, look.line_width, *cell_size_args(look).values()
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

@@ -11,7 +11,6 @@ import numpy as np
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .even_lines import has_even_lines
 from .hatching import (
     has_breaks,
     has_outline,
@@ -20,7 +19,7 @@ from .hatching import (
     overshoot_steps,
 )
 from .image_noise import MAX_MARGIN, high_pass_margin
-from .look import Look, colors_magnitude
+from .look import Look, colors_magnitude, has_even_lines
 from .look_units import look_in_pixels
 from .outline import FULL_MARK_LENGTH
 from .paper_grain import surface_paper_grain_args
@@ -119,8 +118,8 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
     noise = 0
     if look.anchor == "surface":
         # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
-        noise = high_pass_margin(look.high_pass) + int(np.ceil(look.grain))
-    disc = int(np.abs(disc_offsets(look.grain)).max())
+        noise = high_pass_margin(look.high_pass) + int(np.ceil(look.line_width))
+    disc = int(np.abs(disc_offsets(look.line_width)).max())
     rows = max(_longest_margin(look), disc) + noise
     if has_paper_grain(look) and look.anchor == "surface":
         rows = max(rows, high_pass_margin(surface_paper_grain_args(look)["high_pass"]))

@@ -25,8 +25,8 @@ from .surface_noise import cell_scale, instance_units
 #: Number of plane waves in the sum.
 WAVE_COUNT = 7
 
-#: Mean wavelength, in grains.
-MEAN_WAVELENGTH_GRAINS = 40.0
+#: Mean wavelength, in line widths.
+MEAN_WAVELENGTH_WIDTHS = 40.0
 
 #: Standard deviation of the angle between lines and field at `Look.wobble` 1, radians.
 WOBBLE_STD = 0.09
@@ -67,7 +67,7 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
     gbuffer : GBuffer
         With its mesh instances, if the look is anchored to the surface.
     look : Look
-        In pixels of the frame. Its `anchor`, `grain` and unit of lengths are used.
+        In pixels of the frame. Its `anchor`, `line_width` and unit of lengths are used.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
         Radians, with a mean of about 0 and a standard deviation of about `WOBBLE_STD`.
     """
     count = len(gbuffer.pixel)
-    grain = np.float32(look.grain)
+    line_width = np.float32(look.line_width)
     cell_size, rest = cell_size_args(look), None
     if look.anchor == "surface":
         units = instance_units(gbuffer, cell_size["pixel"])
@@ -88,22 +88,22 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
             position = np.stack([column, row, 0 * row]).astype(np.float32)
             size = np.ones(len(row), dtype=np.float32)
         else:
-            block_rest, min_scale = rest.block(block), cell_size["smallest"] / look.grain
+            block_rest, min_scale = rest.block(block), cell_size["smallest"] / look.line_width
             instance_id = gbuffer.instance_id[block]
             scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
             position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale
-        angle[block] = solid_wobble_angle(position, np.maximum(size, 1e-30) * grain)
+        angle[block] = solid_wobble_angle(position, np.maximum(size, 1e-30) * line_width)
     return angle
 
 
-def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
+def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarray:
     """Compute the angle between lines and field at `Look.wobble` 1, at positions in rest space.
 
     Parameters
     ----------
     position : (3, n) float32 ndarray
-    grain : (n,) or () float32 ndarray
-        Size of the cells of the noise there.
+    line_width : (n,) or () float32 ndarray
+        Width of the lines there.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
         Radians.
     """
     # The base-2 logarithm of the mean wavelength.
-    level = np.log2(grain * np.float32(MEAN_WAVELENGTH_GRAINS))
+    level = np.log2(line_width * np.float32(MEAN_WAVELENGTH_WIDTHS))
     level = np.broadcast_to(level, position.shape[1:])
     octave = np.floor(level)
     blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)

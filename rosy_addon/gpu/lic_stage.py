@@ -10,11 +10,11 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any
 
-from ..compositor.even_lines import COARSE_RATIO, SPACING_GRAINS, has_even_lines
+from ..compositor.even_lines import COARSE_RATIO
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import streamline_reach
 from ..compositor.lic import noise_args
-from ..compositor.look import is_hatched
+from ..compositor.look import has_even_lines, is_hatched
 from ..compositor.look_units import instance_line_spacing
 from . import lookup_tables
 from .defines import MAGNITUDE_MODES, REDUCE_BLOCK
@@ -40,7 +40,7 @@ def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
         return {}
     lookups: dict[Hashable, Callable[[], Any]] = {}
     for instance_id, item, _ in frame.fields_in_view():
-        spacing = instance_line_spacing(look, SPACING_GRAINS, frame.camera, item.instance)
+        spacing = instance_line_spacing(look, frame.camera, item.instance)
         for ratio in (1.0, COARSE_RATIO):
             lookups["lines", instance_id, ratio] = partial(
                 frame.resources.line_records, item, look.display, ratio * spacing

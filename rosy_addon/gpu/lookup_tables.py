@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.even_lines import has_even_lines, look_width_table
+from ..compositor.even_lines import look_width_table
 from ..compositor.family_hues import PALETTE
 from ..compositor.hatching import has_paper_grain
 from ..compositor.image_noise import image_noise
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, is_hatched
+from ..compositor.look import Look, has_even_lines, is_hatched
 from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
@@ -57,7 +57,7 @@ def undirected_offsets(resources: GpuResources, look: Look) -> Any:
     if not is_hatched(look):
         return palette(resources)
     return resources.lookup_texture(
-        "disc_offsets", look.grain, lambda: disc_offsets(look.grain)[None]
+        "disc_offsets", look.line_width, lambda: disc_offsets(look.line_width)[None]
     )
 
 
@@ -82,12 +82,12 @@ def picture_grain(
     """
     if not has_paper_grain(look):
         return palette(resources)
-    width += (line_count - 1) * line_offset(look.grain)
+    width += (line_count - 1) * line_offset(look.line_width)
 
     def values_at(pixel: np.ndarray, width: int) -> np.ndarray:
-        return picture_paper_grain(pixel, width, look.grain, look.seed)
+        return picture_paper_grain(pixel, width, look.line_width, look.seed)
 
-    key = look.grain, look.seed
+    key = look.line_width, look.seed
     return _pixel_texture(resources, "paper_grain", key, width, height, values_at)
 
 

@@ -12,10 +12,8 @@ from ..compositor.contrast import expected_std, streak_args
 from ..compositor.even_lines import (
     FADE_PIXELS,
     MAX_EDGE_WIDTH,
-    SPACING_GRAINS,
     WOBBLE_SHIFT,
     crowded_pixels,
-    has_even_lines,
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
 from ..compositor.filter_kernel import full_sample_count, kernel_of, look_for_symmetry
@@ -31,7 +29,14 @@ from ..compositor.hatching import (
 from ..compositor.image_noise import NOISE_STD, streak_moments
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, colors_values, crease_angle_of, has_flow, is_hatched
+from ..compositor.look import (
+    Look,
+    colors_values,
+    crease_angle_of,
+    has_even_lines,
+    has_flow,
+    is_hatched,
+)
 from ..compositor.look_units import cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
@@ -42,13 +47,13 @@ from ..compositor.streak_statistics import (
     softness,
 )
 from ..compositor.surface_noise import (
-    FEATURE_GRAINS,
+    FEATURE_CELLS,
     LATTICE_SCALE,
     SUBPIXEL_OFFSETS,
     lattice_axes,
 )
 from ..compositor.target_tone import ReferenceRender, tone_curve
-from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, WOBBLE_STD, has_wobble
+from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
 from .defines import (
@@ -139,7 +144,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
         "paper_grain_depth": _paper_grain_depth(look, statistics),
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
-        "paper_grain_shift": line_offset(look.grain),
+        "paper_grain_shift": line_offset(look.line_width),
         # Not defines: compilers reorder sums with constants, and the result would change.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
@@ -273,8 +278,8 @@ def even_line_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, 
 
     `look` is in pixels of the frame, whose camera is `camera`.
     """
-    spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
-    asked_pixels = SPACING_GRAINS * look.grain if not look.unit_size else 0.0
+    spacing = instance_line_spacing(look, camera, item.instance)
+    asked_pixels = 0.0 if look.unit_size else look.line_distance
     return {
         **covering_uniforms(item.kind),
         **screen_direction_uniforms(item.kind, look, camera),
@@ -301,8 +306,8 @@ def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
         "density_threshold": round(density * 2**24),
         "noise_channels": settings["channels"],
         "seed": settings["seed"],
-        "min_cell_scale": settings["smallest"] / settings["grain"],
-        "feature_grains": FEATURE_GRAINS / LATTICE_SCALE,
+        "min_cell_scale": settings["smallest"] / settings["cell"],
+        "feature_cells": FEATURE_CELLS / LATTICE_SCALE,
         "max_bend": 1 / (1 - settings.get("detail", 0.0)),
     }
 
@@ -311,7 +316,7 @@ def surface_cell_uniforms(
     settings: dict[str, Any], item: DrawItem, camera: Camera
 ) -> dict[str, Any]:
     """Return the size of the noise cells of one surface, in its own units."""
-    cell = settings["grain"] * LATTICE_SCALE
+    cell = settings["cell"] * LATTICE_SCALE
     return {
         "pixel_size": cell / (camera.pixels_per_unit * item.object_scale),
         "cell_size": cell * settings["pixel"] / item.object_scale,
@@ -320,7 +325,7 @@ def surface_cell_uniforms(
 
 def wobble_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the wavelength of the wobble, in pixels or in the units of a surface."""
-    wavelength = look.grain * MEAN_WAVELENGTH_GRAINS
+    wavelength = look.line_width * MEAN_WAVELENGTH_WIDTHS
     cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"
     pixels_per_object_unit = camera.pixels_per_unit * item.object_scale if on_surface else 1.0
@@ -328,5 +333,5 @@ def wobble_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any
         "on_surface": int(on_surface),
         "pixel_size": wavelength / pixels_per_object_unit,
         "cell_size": wavelength * cell_size["pixel"] * on_surface / item.object_scale,
-        "min_cell_scale": cell_size["smallest"] / look.grain,
+        "min_cell_scale": cell_size["smallest"] / look.line_width,
     }

@@ -67,7 +67,8 @@ def _fast_look(look: Look) -> Look:
             "values_low": 0.0,
             "values_high": 0.0,
             "length": min(look.length, PREVIEW_SIZE // 2),
-            "grain": min(look.grain, PREVIEW_SIZE / 2),
+            "line_width": min(look.line_width, PREVIEW_SIZE / 2),
+            "line_distance": min(look.line_distance, PREVIEW_SIZE),
             "high_pass": min(look.high_pass, PREVIEW_SIZE / 4),
         }
     )

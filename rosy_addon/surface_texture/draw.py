@@ -17,7 +17,7 @@ from ..compositor.color_values import (
 from ..compositor.compose import colorize, streak_tone
 from ..compositor.filter_kernel import look_for_symmetry
 from ..compositor.flow import noise_channel_count, with_cycle_distance
-from ..compositor.lic import lic_lengths
+from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import (
     Look,
@@ -74,7 +74,8 @@ TEXTURE_SETTINGS = (
         "flow",
         "flow_distance",
         "flow_phase",
-        "grain",
+        "line_width",
+        "line_distance",
         "density",
     ),
     *("high_pass", "noise", "hue", "seed", "gain", "crease_angle"),
@@ -294,7 +295,7 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
 def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     """(P, 4) linear colors of the field at texels, and 1."""
     with progress(0.0, 0.3):
-        noise = texel_noise(on, look)
+        noise = texel_noise(on, **noise_args(look))
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
     with progress(0.95, 0.97):

@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..compositor.even_lines import (
-    SPACING_GRAINS,
     WOBBLE_SHIFT,
     EvenLines,
-    has_even_lines,
     resolved_share,
 )
 from ..compositor.flow import unconvolved_noise
@@ -25,9 +23,9 @@ from ..compositor.ink_thresholds import (
     sharp_look,
     threshold_pixels,
 )
-from ..compositor.lic import lic_lengths
+from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import LicImages
-from ..compositor.look import Look
+from ..compositor.look import Look, has_even_lines
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
 from ..compositor.shading import Light
@@ -50,7 +48,7 @@ from .texel_noise import texel_noise
 from .texels import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
-SWAP_GRAINS = 8.0
+SWAP_WIDTHS = 8.0
 
 #: Largest number of triangles on which lines are spaced, for each texel. It is reached only where texels
 #: are much smaller on parts of the surface than in the map as a whole, as where charts lie on each other.
@@ -87,7 +85,7 @@ def thresholds(
     """
     look = sharp_look(look)
     with progress(0.0, 0.1):
-        order = line_order(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
+        order = line_order(on.mesh, guiding_angle, SWAP_WIDTHS * look.line_width * on.step)
     wobble_angle = None
     if has_wobble(look):
         with progress(0.1, 0.13):
@@ -171,7 +169,7 @@ def _lines(
     images = even_lines = break_images = noise = undirected = paper_grain = None
     if not is_even or is_broken or undefined:
         with progress(0.0, 0.3):
-            noise = texel_noise(on, look)
+            noise = texel_noise(on, **noise_args(look))
     break_look = replace(look, length=break_steps(look))
     if is_even:
         with progress(0.3, 0.6):
@@ -191,10 +189,10 @@ def _lines(
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
         # Spots of one size in texels, as wide as lines where the map is as usual.
-        grain = look.grain * on.step * float(np.median(texels_per_unit)) * size
-        grain = min(grain, size / MIN_SPOTS)
+        spot = look.line_width * on.step * float(np.median(texels_per_unit)) * size
+        spot = min(spot, size / MIN_SPOTS)
         seen_noise = unconvolved_noise(noise, look)
-        undirected = undirected_texture(field, seen_noise, grain)
+        undirected = undirected_texture(field, seen_noise, spot)
     if has_paper_grain(look):
         with progress(0.9, 1.0):
             paper_grain = _paper_grain(on, field, look)
@@ -208,9 +206,7 @@ def _lines(
 
 def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
-    args = surface_paper_grain_args(look)
-    args.pop("channels")
-    noise = texel_noise(on, replace(look, noise="color", **args))
+    noise = texel_noise(on, **surface_paper_grain_args(look))
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
@@ -219,12 +215,12 @@ def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
 def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
     """(P,) float32 angles between lines and field at `Look.wobble` 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
-    grain = look.grain * on.step / matrix_scale(on.instance.matrix)
+    line_width = look.line_width * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)
     for block in pixel_blocks(len(angle)):
         report(block.start / len(angle), "bending lines")
         position = on.interpolated(rest, block)
-        angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(grain))
+        angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(line_width))
     return angle
 
 
@@ -237,7 +233,7 @@ def _even_lines(
 ) -> EvenLines:
     """Evaluate evenly spaced lines at the texels."""
     instance, texels = on.instance, on.texels
-    spacing = SPACING_GRAINS * look.grain * on.step
+    spacing = look.line_distance * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
     with progress(0.0, 0.8):
         lines: SurfaceLines = cached_surface_lines(
@@ -268,7 +264,7 @@ def _even_lines(
         for line, out in enumerate(streaks):
             along = part.to_screen(part.member_direction(members[line][block]), foreshorten=True)
             across = area[block] / np.maximum(np.abs(along), np.float32(1e-6))
-            period[line, block] = SPACING_GRAINS * look.grain * across
+            period[line, block] = look.line_distance * across
             family = (direction + line) % field.degree % field.line_count
             phase = lines.pattern.evaluate(leaf, in_leaf, family)
             if wobble_angle is not None:

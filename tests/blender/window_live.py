@@ -417,7 +417,7 @@ def tones_are_those_of_a_bake():
     yield from fresh_scene()
     scene, monkey = bpy.context.scene, bpy.data.objects["Suzanne"]
     look, mesh = scene.rosy.look, monkey.data
-    look.ink, look.grain, look.light, look.shading = "hatch", 3.0, "scene", 0.9
+    look.ink, look.line_width, look.light, look.shading = "hatch", 3.0, "scene", 0.9
     max_difference = 0.03  # lines are sharp, and the mean of display values is not that of light
     switch("ON")
     yield from wait_for_final_pictures()

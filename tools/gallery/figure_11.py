@@ -29,7 +29,7 @@ from .solid import (
 )
 
 WIDTH = 402
-PLAID = SOLID.with_settings({"noise": "color", "grain": 3.0, "gain": 3.0, "length": 60})
+PLAID = SOLID.with_settings({"noise": "color", "line_width": 3.0, "gain": 3.0, "length": 60})
 MAGNITUDE = SOLID.with_settings({"magnitude": "color", "gain": 2.0})
 
 

@@ -33,7 +33,10 @@ SHOWN = {
         "Long streaks show where the directions lead, and need more gain. Short streaks show how "
         "the field turns.",
     ),
-    "grain": ((1.0, 1.5, 4.0), "Broad streaks are legible from a distance and hide small details."),
+    "line_width": (
+        (1.0, 1.5, 4.0),
+        "Broad streaks are legible from a distance and hide small details.",
+    ),
     "density": (
         (0.02, 0.1, 0.5),
         "With few bright cells, the streaks are separate. With half of the cells bright, they form "

@@ -3,7 +3,7 @@
 
 uniform sampler2D cells, tones;
 uniform sampler2DArray angle_gradients, noise_gradients;
-uniform float grain;
+uniform float line_width;
 uniform int line_count, sheet_count, flow_mode, kernel, noise_channels, is_antialiased;
 uniform int break_steps;
 uniform vec4 flow_weights;
@@ -236,7 +236,7 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
 vec3 normalized_mean(Sums sums, float full_count, Drift drift)
 {
   float sample_count = effective_samples(sums, drift);
-  float cell_count = sample_count / grain;
+  float cell_count = sample_count / line_width;
   vec3 mean;
   if (flow_mode != FLOW_NONE) {
     float factor = sqrt(samples_at_rest(drift.half_steps) / sums.full_square_sum);

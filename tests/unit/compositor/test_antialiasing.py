@@ -28,7 +28,7 @@ CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fo
 LOOKS = {
     "default": Look(),
     "color noise": Look(noise="color"),
-    "tapered, on the surface": Look(fade="ends", anchor="surface", grain=2.5),
+    "tapered, on the surface": Look(fade="ends", anchor="surface", line_width=2.5),
     "short": Look(length=12),
 }
 

@@ -32,7 +32,7 @@ def make_noise(field, look=LOOK, channels=1):
     return image_noise(
         field.pixel,
         field.width,
-        look.grain,
+        look.line_width,
         look.seed,
         channels,
         density=look.density,

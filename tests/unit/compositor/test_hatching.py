@@ -60,7 +60,7 @@ INK = Look(
     anchor="surface",
     light="lamp",
     shading=1.0,
-    grain=2.5,
+    line_width=2.5,
     supersampling=2,
 )
 
@@ -180,7 +180,7 @@ def test_presets_reproduce_a_ramp(name):
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Higher coverages have lower thresholds, and half coverage is near the mean."""
-    look = Look(length=40, grain=2.0, density=0.5, high_pass=16.0, crispness=crispness)
+    look = Look(length=40, line_width=2.0, density=0.5, high_pass=16.0, crispness=crispness)
     threshold, deviation, *_ = look_streak_statistics(look)
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
@@ -212,7 +212,7 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
 def test_crowded_even_lines_are_drawn_last():
     """Where a surface turns away across the first lines, the ink of light tones is in the others."""
     field = planar_pixel_field(np.zeros((1, 3)), 4)
-    look = Look(ink="hatch", lines="even", grain=2.5, layers=2, layering=0.5)
+    look = Look(ink="hatch", lines="even", line_distance=5.0, layers=2, layering=0.5)
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
     first, second = line_shares(field, look, np.full((1, 3), 0.9, dtype=np.float32), lines)
@@ -287,7 +287,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
         (break_images,) = fast_lic(field, [break_look], noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
-            field.pixel, field.width, look.grain, look.seed, 1, field.line_count
+            field.pixel, field.width, look.line_width, look.seed, 1, field.line_count
         )
     (images,) = fast_lic(field, [look], noise)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
@@ -307,7 +307,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
 )
 def test_uneven_lines_have_the_same_coverage(kind, crispness):
     """The mean coverage is that of even lines, from dark to light tones."""
-    look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
+    look = Look(ink="hatch", line_width=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
     for tone in (0.1, 0.3, 0.5, 0.7, 0.9):
         assert plane_coverage(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
 
@@ -325,7 +325,7 @@ def mean_run_length(ink):
 
 
 def test_lines_break_in_light_tones_first():
-    look = Look(ink="hatch", grain=2.0, length=60, crispness=1.0)
+    look = Look(ink="hatch", line_width=2.0, length=60, crispness=1.0)
     broken = replace(look, breaks=1.0)
     shorter = [
         mean_run_length(plane_coverage(broken, tone, angle=0.0))
@@ -337,23 +337,23 @@ def test_lines_break_in_light_tones_first():
 
 
 def test_paper_grain_breaks_lines():
-    look = Look(ink="hatch", grain=2.0, length=60, crispness=0.8)
+    look = Look(ink="hatch", line_width=2.0, length=60, crispness=0.8)
     plain, rough = (plane_coverage(replace(look, paper_grain=fraction), 0.6) for fraction in (0, 1))
     assert mean_run_length(rough) < 0.6 * mean_run_length(plain)
 
 
-@pytest.mark.parametrize("grain", [1.5, 3.0, 8.0])
-def test_statistics_of_paper_grain(grain):
+@pytest.mark.parametrize("line_width", [1.5, 3.0, 8.0])
+def test_statistics_of_paper_grain(line_width):
     """Mean 0, standard deviation 1, no low frequencies, independent of other lines and streaks."""
     side = 512
     pixel = np.arange(side * side, dtype=np.int32)
-    first_grain, second_grain = picture_paper_grain(pixel, side, grain, 0, line_count=2).reshape(
-        2, side, side
-    )
+    first_grain, second_grain = picture_paper_grain(
+        pixel, side, line_width, 0, line_count=2
+    ).reshape(2, side, side)
     assert abs(np.corrcoef(first_grain.ravel(), second_grain.ravel())[0, 1]) < 0.03
     assert abs(first_grain.mean()) < 0.02 and first_grain.std() == pytest.approx(1, abs=0.03)
     assert gaussian_filter(first_grain, 16).std() < 0.12
-    streaks = image_noise(pixel, side, grain, 0, 1)
+    streaks = image_noise(pixel, side, line_width, 0, 1)
     assert abs(np.corrcoef(first_grain.ravel(), streaks[:, 0])[0, 1]) < 0.02
 
 
@@ -379,7 +379,7 @@ def test_paper_grain_depends_only_on_the_pixel():
 def test_statistics_of_the_wobble(anchor, distance):
     """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
-    actual = wobble_angle(gbuffer, replace(INK, anchor=anchor, grain=1.5))
+    actual = wobble_angle(gbuffer, replace(INK, anchor=anchor, line_width=1.5))
     assert abs(actual.mean()) < 0.25 * WOBBLE_STD
     assert 0.75 < actual.std() / WOBBLE_STD < 1.25
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
@@ -441,7 +441,7 @@ def test_lone_pixels_of_undefined_faces_have_ink_or_not():
     gbuffer = project([instance], camera)
     assert len(gbuffer.pixel) == 1
     with np.errstate(all="raise"):
-        rgba = compose(gbuffer, Look(ink="hatch", grain=10.0, length=4)).rgba
+        rgba = compose(gbuffer, Look(ink="hatch", line_width=10.0, length=4)).rgba
     assert np.isfinite(rgba).all()
 
 
@@ -701,8 +701,8 @@ def test_presets_stay_on_the_surface(name, motion):
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
-@pytest.mark.parametrize("grain", [2.5, *long(4.0)])
-def test_lines_keep_their_width_through_a_zoom(grain):
+@pytest.mark.parametrize("width", [2.5, *long(4.0)])
+def test_lines_keep_their_width_through_a_zoom(width):
     """Lines on a wall, at zooms from 1 to 16."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
@@ -712,7 +712,7 @@ def test_lines_keep_their_width_through_a_zoom(grain):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
-        rgba = render(instance, camera, replace(INK, light="scene", shading=0.4, grain=grain))
+        rgba = render(instance, camera, replace(INK, light="scene", shading=0.4, line_width=width))
         widths.append(line_width(rgba[..., 0]))
     assert max(widths) / min(widths) < 1.15
 

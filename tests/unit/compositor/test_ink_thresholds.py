@@ -34,7 +34,7 @@ from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 SIZE = 400
-INK = Look(ink="hatch", length=30, grain=2.0, density=0.3, high_pass=8.0)
+INK = Look(ink="hatch", length=30, line_width=2.0, density=0.3, high_pass=8.0)
 
 
 def drawn_lines(look: Look, degree: int = 4, undefined: slice = slice(0)):
@@ -48,8 +48,8 @@ def drawn_lines(look: Look, degree: int = 4, undefined: slice = slice(0)):
     images, breaks = lic_lengths(field, looks, noise)
     grain = None
     if look.paper_grain:
-        grain = picture_paper_grain(field.pixel, SIZE, look.grain, 1, 1, field.line_count)
-    undirected = undirected_texture(field, noise, look.grain)
+        grain = picture_paper_grain(field.pixel, SIZE, look.line_width, 1, 1, field.line_count)
+    undirected = undirected_texture(field, noise, look.line_width)
     has_breaks = look.breaks > 0 or look.wobble > 0
     return (
         field,

@@ -41,8 +41,8 @@ def correlation(a, b):
     return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
 
 
-def make_noise(size, grain=1.5, seed=0):
-    return image_noise(np.arange(size * size, dtype=np.int32), size, grain, seed, 1)[:, 0]
+def make_noise(size, line_width=1.5, seed=0):
+    return image_noise(np.arange(size * size, dtype=np.int32), size, line_width, seed, 1)[:, 0]
 
 
 #: Settings that choose a kernel.
@@ -167,7 +167,7 @@ def test_the_blend_gain_of_seven_lines_includes_correlations():
 
 
 @pytest.mark.parametrize(
-    ("kernel", "grain", "length", "high_pass"),
+    ("kernel", "line_width", "length", "high_pass"),
     mainly(
         [  # each pair of values of two settings occurs
             ("box", 1.0, 20, 0.0),
@@ -183,9 +183,9 @@ def test_the_blend_gain_of_seven_lines_includes_correlations():
         product(["box", "taper", "ramp"], [1.0, 1.5, 3.0], [20, 80], [0.0, 8.0, 24.0]),
     ),
 )
-def test_the_standard_deviation_of_one_member_matches_theory(kernel, grain, length, high_pass):
+def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width, length, high_pass):
     size = 512
-    look = plain(grain=grain, length=length, high_pass=high_pass, **KERNELS[kernel])
+    look = plain(line_width=line_width, length=length, high_pass=high_pass, **KERNELS[kernel])
     stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)

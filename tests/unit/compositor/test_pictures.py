@@ -23,7 +23,7 @@ from rosy_addon.projection.project import project
 #: These tests draw many pictures and measure them.
 pytestmark = pytest.mark.slow
 
-PLAIN = Look(gain=1.0, grain=1.5, density=0.5, high_pass=0.0, shading=0.0)
+PLAIN = Look(gain=1.0, line_width=1.5, density=0.5, high_pass=0.0, shading=0.0)
 
 
 def plain(**settings):

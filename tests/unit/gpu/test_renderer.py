@@ -561,12 +561,12 @@ LOOKS = {
     "flat, across creases": {"display": "flat", "crease_angle": 3.1416},
     "shaded": {"shading": 0.7},
     "white noise": {"density": 0.5, "high_pass": 0.0, "gain": 1.0},
-    "coarse noise": {"grain": 5.0, "seed": 7},
+    "coarse noise": {"line_width": 5.0, "seed": 7},
     "long": {"length": 200},
     "on the surface": {"anchor": "surface"},
     "on the surface, color noise": {"anchor": "surface", "noise": "color", "high_pass": 0.0},
     "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
-    "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
+    "hatched": {"ink": "hatch", "shading": 1.0, "line_width": 3.0},
     "hatched, oriented": {
         "ink": "hatch",
         "shading": 1.0,
@@ -593,7 +593,7 @@ LOOKS = {
         "ink": "hatch",
         "breaks": 1.0,
         "shading": 1.0,
-        "grain": 2.5,
+        "line_width": 2.5,
         "length": 60,
     },
     "hatched, breaks and length by magnitude": {
@@ -603,13 +603,13 @@ LOOKS = {
         "magnitude": "both",
         "degree": 3,
     },
-    "hatched, wobbling": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5},
+    "hatched, wobbling": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "line_width": 2.5},
     "hatched, wobbling with the surface": {
         "ink": "hatch",
         "wobble": 1.0,
         "anchor": "surface",
         "shading": 0.9,
-        "grain": 2.5,
+        "line_width": 2.5,
         "supersampling": 2,
         "degree": 3,
     },
@@ -618,7 +618,7 @@ LOOKS = {
         "ink": "hatch",
         "paper_grain": 0.6,
         "supersampling": 2,
-        "grain": 4.0,
+        "line_width": 4.0,
         "crispness": 0.3,
         "seed": 5,
         "shading": 0.9,
@@ -707,15 +707,15 @@ LOOKS = {
         "guiding_angle": 0.5,
         "supersampling": 2,
     },
-    "fine on small features": {"anchor": "surface", "detail": 0.7, "grain": 2.5, "degree": 4},
+    "fine on small features": {"anchor": "surface", "detail": 0.7, "line_width": 2.5, "degree": 4},
     "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
-    "even lines": {"ink": "hatch", "lines": "even", "shading": 0.9, "grain": 3.0},
+    "even lines": {"ink": "hatch", "lines": "even", "shading": 0.9, "line_distance": 6.0},
     "even lines, supersampled": {
         "ink": "hatch",
         "lines": "even",
         "shading": 0.9,
         "light": "lamp",
-        "grain": 2.8,
+        "line_distance": 5.6,
         "supersampling": 2,
         "degree": 6,
         "layers": 2,
@@ -725,7 +725,7 @@ LOOKS = {
         "ink": "hatch",
         "lines": "even",
         "shading": 0.8,
-        "grain": 4.0,
+        "line_distance": 8.0,
         "degree": 3,
         "crispness": 0.3,
         "hue": "families",
@@ -756,12 +756,20 @@ DRIFTING_LOOKS = {
     "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
     "drifting, short streaks": DRIFTING | {"length": 9, "flow_distance": 40.0, "supersampling": 2},
     "drifting, hatched, with breaks": DRIFTING
-    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
+    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "line_width": 2.5, "length": 60},
     "drifting, hatched, breaks and length by magnitude": DRIFTING
     | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude": "length", "degree": 3}
     | {"overshoot": 15.0},
     "drifting breaks of even lines": DRIFTING
-    | {"ink": "hatch", "lines": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
+    | {
+        "ink": "hatch",
+        "lines": "even",
+        "breaks": 0.7,
+        "shading": 0.9,
+        "line_width": 3.0,
+        "line_distance": 6.0,
+        "degree": 2,
+    },
     "color noise, which does not drift": DRIFTING | {"noise": "color"},
 }
 ALL_LOOKS = LOOKS | DRIFTING_LOOKS
@@ -794,7 +802,7 @@ def test_looks(card, name):
 @pytest.mark.parametrize("side", [3, *long(2)])
 def test_subpixels(card, side):
     """Borders have the color of their covered part."""
-    look = replace(LOOK, supersampling=side, grain=3.0)
+    look = replace(LOOK, supersampling=side, line_width=3.0)
     pair = assert_parity(card, [ball(2)], view(supersampling=side), look)
     border = (pair.numpy[..., 3] > 0) & (pair.numpy[..., 3] < 1) & (pair.card[..., 3] > 0)
     assert border.sum() > 100
@@ -822,7 +830,9 @@ def test_samples_of_neighbors(card, ink):
     """Samples at edges have the colors of the surfaces that they show, and their outlines."""
     plate = MeshInstance(boxes(), placed(1.5 * np.eye(3)), axis_field(boxes(), 2, AXIS))
     small = MeshInstance(BALL, placed(0.5 * np.eye(3), (0.4, -0.8, 0.3)), field_of(BALL, 2))
-    look = replace(LOOK, ink=ink, shading=1.0, supersampling=2, grain=3.0, outline=1.0, breaks=0.5)
+    look = replace(
+        LOOK, ink=ink, shading=1.0, supersampling=2, line_width=3.0, outline=1.0, breaks=0.5
+    )
     pair = assert_parity(card, [plate, small], view(supersampling=2), look)
     assert pair.likeness > 0.999
     assert (pair.card[..., 3] != pair.numpy[..., 3]).sum() < 5
@@ -886,7 +896,7 @@ TONED = {
     "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
     "tone curve": {"tone_black": 0.2, "tone_white": 0.7, "tone_gamma": 1.8},
     "inverted": {"tone_black": 1.0, "tone_white": 0.0},
-    "hatched": {"ink": "hatch", "grain": 3.0},
+    "hatched": {"ink": "hatch", "line_width": 3.0},
 }
 
 
@@ -958,13 +968,13 @@ def test_tones_with_free_directions(card):
 
 COLORED = {
     "soft": {},
-    "hatched": {"ink": "hatch", "grain": 3.0, "outline": 2.0},
+    "hatched": {"ink": "hatch", "line_width": 3.0, "outline": 2.0},
     "light ink": {"ink": "hatch", "ink_color": "#f0f0e0", "paper_color": "#101018", "layers": 1},
     "inks that are nearly paper": {
         "ink": "hatch",
         "shading": 0.95,
         "light": "lamp",
-        "grain": 3.0,
+        "line_width": 3.0,
         "values_low": -1.0,
         "values_high": 1.0,
         "color_map": "gray",
@@ -1184,14 +1194,14 @@ def test_families_of_rosys(card, degree):
 def test_free_directions_with_uneven_lines(card, name):
     """Each family has its ink, and all lines wobble together, whatever the angles between them."""
     look = replace(
-        LOOK, ink="hatch", shading=0.9, grain=2.5, hue="families", wobble=1.0, breaks=0.5
+        LOOK, ink="hatch", shading=0.9, line_width=2.5, hue="families", wobble=1.0, breaks=0.5
     )
     assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
 
 
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_clear_paper(card, hue):
-    look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, grain=3.0)
+    look = replace(LOOK, ink="hatch", shading=1.0, clear_paper=True, hue=hue, line_width=3.0)
     pair = draw_pair(ROSY, card, [ball(4)], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
@@ -1273,8 +1283,8 @@ UNDEFINED_LOOKS = {
     "magnitude": {"magnitude": "both"},
     "hatched": {"ink": "hatch", "shading": 1.0},
     "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families", "noise": "color"},
-    "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "grain": 2.2},
-    "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
+    "hatched, even lines": {"ink": "hatch", "shading": 1.0, "lines": "even", "line_distance": 4.4},
+    "hatched, all effects": LOOKS["hatched, all effects"] | {"line_width": 2.2},
     "drifting": DRIFTING,
     "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "fade": "ends"},
 }
@@ -1342,7 +1352,9 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [MeshInstance(tube, placed(distortion), field)], camera)
 
 
-EVEN_LINES = replace(LOOK, ink="hatch", lines="even", shading=0.9, grain=3.0)
+EVEN_LINES = replace(
+    LOOK, ink="hatch", lines="even", shading=0.9, line_width=3.0, line_distance=6.0
+)
 
 
 def partly_undefined():
@@ -1386,7 +1398,7 @@ def test_even_lines_grow_in_perspective(card):
     surface = plane(2, 2, 40.0)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
     camera = perspective_camera(look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1)), *SIZE, fov=1.0)
-    assert_parity(card, [instance], camera, replace(EVEN_LINES, grain=2.0))
+    assert_parity(card, [instance], camera, replace(EVEN_LINES, line_distance=4.0))
 
 
 def test_even_lines_stay_on_the_card(device):

@@ -450,8 +450,8 @@ def test_shipped_previews_show_their_looks(name):
     [
         Look(method="brute", length=8000),
         Look(method="members", length=8000, noise="color"),
-        *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
-        Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, grain=0.5),
+        *long(Look(line_width=256.0, high_pass=1024.0, length=8000, supersampling=4)),
+        Look(anchor="surface", ink="hatch", clear_paper=True, layers=12, line_width=0.5),
         Look(light="scene", hue="families", display="flat", magnitude="both"),
     ],
     ids=["brute", "members", "large", "ink", "others"],

@@ -19,8 +19,8 @@ from rosy_addon.surface_texture import hatching
 from rosy_addon.surface_texture.draw import SURFACE_PIXELS, draw_texture
 
 #: Lines that are wide enough for a small texture to show them well.
-WIDE = Look(length=20, grain=10.0, high_pass=40.0)
-WIDER = Look(length=40, grain=20.0, high_pass=80.0)
+WIDE = Look(length=20, line_width=10.0, high_pass=40.0)
+WIDER = Look(length=40, line_width=20.0, high_pass=80.0)
 
 
 def instance_of(surface, degree: int, kind: str = "smoothest") -> MeshInstance:
@@ -212,7 +212,7 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
     grid = plane(1, 200)
     surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))
-    look = Look(grain=1.0).with_settings({"ink": "hatch", "lines": "even"})
+    look = Look(line_distance=2.0).with_settings({"ink": "hatch", "lines": "even"})
     draw_texture(instance_of(surface, 2), uv, look, 16)
     assert counts[0] < 2 * hatching.TRIANGLES_PER_TEXEL * 16**2
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from .look import Look
+from .look_units import PixelLook
 from .pixel_field import PixelField
 from .reported_blocks import reported_blocks
 
@@ -55,7 +55,7 @@ def lic_images(
     return LicImages(members, blend, effective_samples, slopes)
 
 
-def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
+def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | None:
     """(P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
     if look.magnitude not in ("length", "both"):
         return None
@@ -66,13 +66,13 @@ def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
     return limits
 
 
-def relative_magnitude(field: PixelField, look: Look) -> np.ndarray:
-    """(P,) float32: rho relative to `Look.magnitude_range`, at most 1."""
+def relative_magnitude(field: PixelField, look: PixelLook) -> np.ndarray:
+    """(P,) float32: rho relative to `PixelLook.magnitude_range`, at most 1."""
     limit = np.float32(with_magnitude_range(look, field).magnitude_range)
     return np.minimum(np.abs(field.representation), limit) / limit
 
 
-def with_magnitude_range(look: Look, field: PixelField) -> Look:
+def with_magnitude_range(look: PixelLook, field: PixelField) -> PixelLook:
     """Return a look with the range of magnitudes of a field, if it has none of its own.
 
     Parts of the field can then be drawn one by one.

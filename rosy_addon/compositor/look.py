@@ -21,7 +21,6 @@ from ..core.settings import (
     color,
     number,
     settings_of,
-    stage_key,
     switch,
 )
 
@@ -202,24 +201,6 @@ class Look:
         panel="streaks",
         applies=_can_flow,
     )
-    flow_distance: float = number(
-        0.0,
-        0.0,
-        8000.0,
-        "Pixels that a streak drifts while it appears and fades again. 0: half its length, or twice its length "
-        "with the method IBFV",
-        is_pixel_length=True,
-        panel="streaks",
-        applies=has_flow,
-    )
-    flow_phase: float = number(
-        0.0,
-        0.0,
-        1.0,
-        "Position in the cycle in which streaks drift and fade. Animations and live views set it",
-        panel="streaks",
-        applies=has_flow,
-    )
     line_width: float = number(
         1.5,
         0.5,
@@ -331,11 +312,6 @@ class Look:
         unit="angle",
         panel="ink",
         panel_before="layers",
-    )
-    foreshorten: bool = switch(
-        False,
-        "Shorten streaks where the surface is slanted, instead of keeping their length in the picture",
-        panel="streaks",
     )
     crease_angle: float = number(
         0.7,
@@ -579,11 +555,3 @@ class Look:
             if name not in known:
                 raise RosyError(f"a look has no setting '{name}': choose {', '.join(known)}")
         return replace(self, **settings)
-
-
-def lic_key(look: Look) -> tuple[Any, ...]:
-    """Return a key of the settings that LIC images depend on.
-
-    Two looks with equal keys have the same LIC images of the same G-buffer.
-    """
-    return stage_key(look, Stage.LIC)

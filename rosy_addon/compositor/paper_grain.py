@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
-from .look import Look
+from .look_units import PixelLook
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks
 
@@ -89,7 +89,7 @@ def picture_paper_grain(
     return heights
 
 
-def surface_paper_grain_args(look: Look) -> dict[str, Any]:
+def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
     """Return the parameters of `surface_noise` for paper grain that is anchored to surfaces.
 
     The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
@@ -97,8 +97,7 @@ def surface_paper_grain_args(look: Look) -> dict[str, Any]:
 
     Parameters
     ----------
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
     """
     cell = max(SURFACE_CELL_WIDTHS * look.line_width, MIN_SURFACE_CELL_PIXELS * look.supersampling)
     return {

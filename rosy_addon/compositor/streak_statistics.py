@@ -13,9 +13,9 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress, report
-from .filter_kernel import Kernel, kernel_of
+from .filter_kernel import Kernel
 from .image_noise import image_noise
-from .look import Look
+from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
 from .surface_noise import OCTAVES, octave_weights
 from .undirected import disc_means
@@ -52,7 +52,7 @@ STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 #: The settings of a look that the statistics depend on.
 STATISTICS_SETTINGS = (
-    *("length", "line_width", "density", "high_pass", "fade", "anchor"),
+    *("length", "line_width", "density", "high_pass", "kernel", "anchor"),
     *("crispness", "breaks", "wobble", "paper_grain", "supersampling"),
 )
 
@@ -87,13 +87,12 @@ class StreakStatistics(NamedTuple):
     paper_grain_std: float = 1.0
 
 
-def look_streak_statistics(look: Look) -> StreakStatistics:
+def look_streak_statistics(look: PixelLook) -> StreakStatistics:
     """Return the statistics of streaks, from the cache if they are there.
 
     Parameters
     ----------
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
     """
     key = tuple(getattr(look, name) for name in STATISTICS_SETTINGS)
     statistics = STATISTICS_CACHE.get(key)
@@ -103,11 +102,11 @@ def look_streak_statistics(look: Look) -> StreakStatistics:
     return statistics
 
 
-def _measured(look: Look) -> StreakStatistics:
+def _measured(look: PixelLook) -> StreakStatistics:
     """Measure the statistics of streaks in a sample of noise."""
     report(0.0, STEP_LABEL)
     scale = min(MAX_SAMPLE_WIDTH / look.line_width, 1.0)
-    line_width, kernel = scale * look.line_width, kernel_of(look)
+    line_width, kernel = scale * look.line_width, look.kernel
     side = max(int(SAMPLE_WIDTHS * line_width), MIN_SAMPLE_PIXELS)
     length_pixels, break_pixels = (
         max(round(scale * (2 * steps + 1)), 1) for steps in (look.length, break_steps(look))
@@ -184,7 +183,7 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
     return min_amount + (1 - min_amount) * breaks * (1 - target_coverage) ** 2
 
 
-def break_steps(look: Look) -> int:
+def break_steps(look: PixelLook) -> int:
     """Steps in each direction of the short streaks that break lines into pieces."""
     steps = min(BREAK_LENGTH_WIDTHS * look.line_width, MAX_BREAK_FRACTION * look.length)
     return max(round(steps), 1)

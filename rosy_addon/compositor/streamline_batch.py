@@ -8,9 +8,9 @@ import numpy as np
 
 from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
 from .drifting_averages import MAX_LEVELS, DriftingAverages, MovingKernel
-from .filter_kernel import kernel_of, kernel_weights
-from .flow import streamline_reach
-from .look import Look, has_flow
+from .filter_kernel import kernel_weights
+from .look import has_flow
+from .look_units import PixelLook
 
 #: Steps between compactions, which remove streamlines that have ended.
 COMPACT_INTERVAL = 8
@@ -55,7 +55,7 @@ class StreamlineBatch:
     Parameters
     ----------
     covering : Covering
-    looks : sequence of Look
+    looks : sequence of PixelLook
         In pixels of the frame. Their `length`, `step` and kernel are used. Averages are taken over
         each of the lengths; all else is the same.
     step_limits : sequence of (C,) intp ndarray or None
@@ -74,7 +74,7 @@ class StreamlineBatch:
     def __init__(
         self,
         covering: Covering,
-        looks: Sequence[Look],
+        looks: Sequence[PixelLook],
         step_limits: Sequence[np.ndarray | None],
         half_window: int,
         max_streamlines: int,
@@ -82,9 +82,9 @@ class StreamlineBatch:
     ) -> None:
         self._covering = covering
         look = looks[0]
-        self._lengths, self._kernel = [look.length for look in looks], kernel_of(look)
+        self._lengths, self._kernel = [look.length for look in looks], look.kernel
         self._half_window = half_window
-        self._max_steps = half_window + max(map(streamline_reach, looks))
+        self._max_steps = half_window + max(look.streamline_reach() for look in looks)
         self._moving_kernels = []
         if has_flow(look):
             self._moving_kernels = [

@@ -9,6 +9,7 @@ surface and keep their wavelength on screen.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from ..core.deterministic_trig import cos_sin, unit_phasor
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.rest_coordinates import rest_coordinates
-from .look import Look, is_hatched
-from .look_units import cell_size_args
+from .look import is_hatched
+from .look_units import PixelLook, cell_size_args
 from .pixel_field import PixelField, product
 from .reported_blocks import reported_blocks
 from .surface_noise import cell_scale, instance_units
@@ -37,7 +38,7 @@ WOBBLE_STD = 0.09
 UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
 
 
-def has_wobble(look: Look) -> bool:
+def has_wobble(look: Any) -> bool:
     """Whether lines wobble as if drawn by hand."""
     return is_hatched(look) and look.wobble > 0
 
@@ -59,15 +60,15 @@ def wave_table() -> np.ndarray:
     return table.astype(np.float32)
 
 
-def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
+def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
     """Compute the angle between lines and field at `Look.wobble` 1.
 
     Parameters
     ----------
     gbuffer : GBuffer
         With its mesh instances, if the look is anchored to the surface.
-    look : Look
-        In pixels of the frame. Its `anchor`, `line_width` and unit of lengths are used.
+    look : PixelLook
+        Its `anchor`, `line_width` and unit of lengths are used.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from ..annotation.key_contents import PictureKey, sorted_indices
 from ..annotation.singularity_marks import cached_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.look import Look
-from ..compositor.look_units import look_in_pixels
+from ..compositor.look_units import pixel_look
 from ..compositor.picture import Picture
 from ..compositor.picture_key import color_scale_of, fixed_color_range
 from ..core.cache import BAKE_CACHE, Cache
@@ -76,7 +76,7 @@ def view_arrows(
     view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
 ) -> ArrowMarks:
     """Find the arrowheads of a view whose look has them; see `arrow_marks`."""
-    look = look_in_pixels(view.look, view.sample_camera, view.instances)
+    look = pixel_look(view.look, view.camera, view.instances)
     return arrow_marks(
         view.instances,
         view.camera,

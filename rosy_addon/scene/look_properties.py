@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..compositor.flow import flow_at
+from ..compositor.flow import Drift, drift_at
 from ..compositor.look import Look
 from ..core.color import from_hex, to_hex
 from ..core.settings import Color, Number, Setting, settings_of
@@ -33,10 +33,9 @@ def apply_look(settings: Any, look: Look) -> None:
         setattr(group, name, from_hex(value) if isinstance(setting, Color) else value)
 
 
-def look_at_frame(scene: bpy.types.Scene, look: Look, frame: float) -> Look:
-    """Return the look of a frame, whose streaks may drift. The frame range of the scene is a loop."""
-    count = scene.frame_end - scene.frame_start + 1
-    return flow_at(look, frame - scene.frame_start, count)
+def drift_in_scene(scene: bpy.types.Scene, look: Look, frame: float) -> Drift:
+    """Return how far streaks have drifted at a frame. The frame range of the scene is a loop."""
+    return drift_at(look, frame - scene.frame_start, scene.frame_end - scene.frame_start + 1)
 
 
 def matches_look(settings: Any, look: Look) -> bool:

@@ -15,8 +15,8 @@ from ..compositor.color_values import (
     value_scale,
 )
 from ..compositor.compose import colorize, streak_tone
-from ..compositor.filter_kernel import look_for_symmetry
-from ..compositor.flow import noise_channel_count, with_cycle_distance
+from ..compositor.flow import NO_DRIFT, Drift, noise_channel_count
+from ..compositor.ink_thresholds import sharp_look
 from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import with_magnitude_range
 from ..compositor.look import (
@@ -26,7 +26,7 @@ from ..compositor.look import (
     crease_angle_of,
     is_hatched,
 )
-from ..compositor.look_units import look_on_surface
+from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE, Cache
@@ -72,8 +72,6 @@ TEXTURE_SETTINGS = (
         "length",
         "fade",
         "flow",
-        "flow_distance",
-        "flow_phase",
         "line_width",
         "line_distance",
         "density",
@@ -156,6 +154,7 @@ def draw_texture(
     is_udim: bool = False,
     lights: Sequence[Light] | None = None,
     content: str = "look",
+    drift: Drift = NO_DRIFT,
     cache: Cache | None = None,
 ) -> Texture:
     """Draw the field of a mesh as a texture.
@@ -182,6 +181,8 @@ def draw_texture(
         thresholds, and its ink is drawn by the material.
     content : str
         One of `CONTENTS`.
+    drift : Drift
+        How far streaks have drifted, if the look has flow.
     cache : Cache, optional
         Stores what does not depend on the look.
 
@@ -219,21 +220,25 @@ def draw_texture(
     on = TexelSurface(instance, mesh, charts, texels, step)
     with progress(0.15, 0.3):
         field = texel_field(on, crease_angle)
-    surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
     is_direction = content != "look"
     is_ink = is_hatched(look) and not is_direction
+    step_look = surface_pixel_look(
+        sharp_look(look) if is_ink else look,
+        step,
+        float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS,
+        drift,
+    ).for_symmetry(field.symmetry)
     with progress(0.3, 0.9):
         if is_direction:
             pixels = direction_map(on, content, look.guiding_angle)
         elif is_ink:
-            pixels = thresholds(on, field, surface_look, look.guiding_angle, cache)
+            pixels = thresholds(on, field, step_look, look.guiding_angle, cache)
         else:
-            pixels = _colors(on, field, surface_look)
+            pixels = _colors(on, field, step_look)
     is_lit = is_ink and lights is not None
     if is_lit:
         with progress(0.9, 0.95):
-            pixels = lit_ink(on, pixels, lights, surface_look)
+            pixels = lit_ink(on, pixels, lights, look)
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
         rgba = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
@@ -292,7 +297,7 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
 
 
-def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
+def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
     """(P, 4) linear colors of the field at texels, and 1."""
     with progress(0.0, 0.3):
         noise = texel_noise(on, **noise_args(look))
@@ -305,7 +310,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     if colors_values(look):
         texels = on.texels
         values = values_in_triangles(on.instance, texels.triangle, texels.barycentric)
-        low, scale = value_scale(look, [value_range(on.instance.color_values)])
+        low, scale = value_scale(look.look, [value_range(on.instance.color_values)])
         field = replace(field, map_position=scaled_positions(values, low, scale))
     color = np.ones((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(color)):
@@ -322,6 +327,7 @@ class TextureSettings(NamedTuple):
     margin: int = DEFAULT_MARGIN
     is_udim: bool = False
     content: str = "look"
+    drift: Drift = NO_DRIFT
 
 
 class TextureImages(NamedTuple):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from ..compositor.even_lines import (
     EvenLines,
     resolved_share,
 )
-from ..compositor.flow import unconvolved_noise
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_thresholds import (
@@ -20,12 +18,12 @@ from ..compositor.ink_thresholds import (
     ink_of_thresholds,
     line_thresholds,
     ordered_thresholds,
-    sharp_look,
     threshold_pixels,
 )
-from ..compositor.lic import lic_lengths, noise_args
+from ..compositor.lic import lic_lengths, noise_args, unconvolved_noise
 from ..compositor.lic_images import LicImages
 from ..compositor.look import Look, has_even_lines
+from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
 from ..compositor.shading import Light
@@ -62,7 +60,7 @@ LABEL = "drawing hatching"
 
 
 def thresholds(
-    on: TexelSurface, field: PixelField, look: Look, guiding_angle: float, cache: Cache | None
+    on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float, cache: Cache | None
 ) -> np.ndarray:
     """Compute the thresholds of hatching at texels.
 
@@ -71,8 +69,8 @@ def thresholds(
     on : TexelSurface
     field : PixelField
         At the texels.
-    look : Look
-        With ink, in steps of streamlines.
+    look : PixelLook
+        Of a `sharp_look` with ink, in steps of streamlines.
     guiding_angle : float
         Direction of the lines that come first; see `line_order`.
     cache : Cache or None
@@ -83,7 +81,6 @@ def thresholds(
     (P, 4) float32 ndarray
         As of `threshold_pixels`.
     """
-    look = sharp_look(look)
     with progress(0.0, 0.1):
         order = line_order(on.mesh, guiding_angle, SWAP_WIDTHS * look.line_width * on.step)
     wobble_angle = None
@@ -159,7 +156,7 @@ def lit_ink(
 def _lines(
     on: TexelSurface,
     field: PixelField,
-    look: Look,
+    look: PixelLook,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
 ) -> tuple[LicImages | None, LineModulation]:
@@ -170,7 +167,7 @@ def _lines(
     if not is_even or is_broken or undefined:
         with progress(0.0, 0.3):
             noise = texel_noise(on, **noise_args(look))
-    break_look = replace(look, length=break_steps(look))
+    break_look = look.with_length(break_steps(look))
     if is_even:
         with progress(0.3, 0.6):
             even_lines = _even_lines(on, field, look, wobble_angle, cache)
@@ -204,7 +201,7 @@ def _lines(
     )
 
 
-def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
+def _paper_grain(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     noise = texel_noise(on, **surface_paper_grain_args(look))
     noise -= np.float32(NOISE_MEAN)
@@ -212,7 +209,7 @@ def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
 
 
-def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
+def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
     """(P,) float32 angles between lines and field at `Look.wobble` 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
     line_width = look.line_width * on.step / matrix_scale(on.instance.matrix)
@@ -227,7 +224,7 @@ def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
 def _even_lines(
     on: TexelSurface,
     field: PixelField,
-    look: Look,
+    look: PixelLook,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
 ) -> EvenLines:

@@ -21,7 +21,7 @@ from rosy_addon.compositor.even_lines import (
 )
 from rosy_addon.compositor.hatching import LineModulation
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import instance_line_spacing, supersampled_look
+from rosy_addon.compositor.look_units import instance_line_spacing, pixel_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
 from rosy_addon.core.cache import Cache
 from rosy_addon.core.color import from_hex, to_linear
@@ -69,7 +69,7 @@ def picture(instance, camera, look=LOOK):
 def lines_at_pixels(instance, camera, look=LOOK, cache=None):
     gbuffer = project([instance], camera)
     field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle)
-    return even_lines(gbuffer, field, look, cache=cache), gbuffer
+    return even_lines(gbuffer, field, pixel_look(look, camera, [instance]), cache=cache), gbuffer
 
 
 # --- lines in pictures -------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ def test_distances_in_blender_units_are_exact():
 
 
 def test_spacings_in_pixels_come_in_steps():
-    instance, look = wall_instance(), supersampled_look(LOOK)
+    instance, look = wall_instance(), pixel_look(LOOK)
     spacings = {
         instance_line_spacing(look, camera_above(scale), instance)
         for scale in np.linspace(8, 16, 200)
@@ -134,7 +134,7 @@ def test_members_get_the_lines_along_them(degree, side):
     gbuffer = project([instance], camera)
     field = surface_pixel_field(gbuffer, degree, 0.7)
     look = replace(LOOK, line_distance=16.0, guiding_angle=0.3)
-    lines = even_lines(gbuffer, field, look)
+    lines = even_lines(gbuffer, field, pixel_look(look))
     members = all_members(field, look.guiding_angle)
     for member, streak in zip(members, lines.streaks, strict=False):
         image = streak.reshape(SIZE, SIZE)

@@ -27,6 +27,7 @@ from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.inks import LUMINANCE_WEIGHTS, inks_of
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.compositor.paper_grain import picture_paper_grain
 from rosy_addon.compositor.shading import diffuse
@@ -181,7 +182,7 @@ def test_presets_reproduce_a_ramp(name):
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Higher coverages have lower thresholds, and half coverage is near the mean."""
     look = Look(length=40, line_width=2.0, density=0.5, high_pass=16.0, crispness=crispness)
-    threshold, deviation, *_ = look_streak_statistics(look)
+    threshold, deviation, *_ = look_streak_statistics(pixel_look(look))
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
     assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric
@@ -196,7 +197,7 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
     look = Look(ink="hatch", layers=layers, guiding_angle=0.3)
     for tone in (0.02, 0.3, 0.7, 0.98):
         transmittance = np.full((1, angles.size), tone, dtype=np.float32)
-        shares = np.array(line_shares(field, look, transmittance))
+        shares = np.array(line_shares(field, pixel_look(look), transmittance))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
         # Members jump where two are equally near the guiding angle, but the sorted shares do not.
         ordered = np.sort(shares, axis=0)
@@ -215,7 +216,9 @@ def test_crowded_even_lines_are_drawn_last():
     look = Look(ink="hatch", lines="even", line_distance=5.0, layers=2, layering=0.5)
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
-    first, second = line_shares(field, look, np.full((1, 3), 0.9, dtype=np.float32), lines)
+    first, second = line_shares(
+        field, pixel_look(look), np.full((1, 3), 0.9, dtype=np.float32), lines
+    )
     np.testing.assert_allclose(first + second, 1, atol=1e-6)
     assert first[0] > 0.95 and second[1] > 0.95
     assert abs(first[2] - first[0]) < 1e-6
@@ -278,12 +281,12 @@ UNEVEN_LINES = {
 
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
-    look = replace(look, anchor="picture", clear_paper=True)
+    look = pixel_look(replace(look, anchor="picture", clear_paper=True))
     field = planar_pixel_field(np.full((side, side), angle), degree)
     noise = look_noise(field, look)
     break_images = paper_grain = None
     if look.breaks or look.wobble:
-        break_look = replace(look, length=break_steps(look))
+        break_look = look.with_length(break_steps(look))
         (break_images,) = fast_lic(field, [break_look], noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
@@ -379,7 +382,7 @@ def test_paper_grain_depends_only_on_the_pixel():
 def test_statistics_of_the_wobble(anchor, distance):
     """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
-    actual = wobble_angle(gbuffer, replace(INK, anchor=anchor, line_width=1.5))
+    actual = wobble_angle(gbuffer, pixel_look(replace(INK, anchor=anchor, line_width=1.5)))
     assert abs(actual.mean()) < 0.25 * WOBBLE_STD
     assert 0.75 < actual.std() / WOBBLE_STD < 1.25
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
@@ -521,13 +524,13 @@ def test_inks_swap_ranks_without_a_seam(degree):
     """As the field rotates relative to the guiding angle, ink indices change without a jump."""
     field = planar_pixel_field(np.linspace(-1, 1, 40001)[None], degree)
     look = replace(INK, hue="families", guiding_angle=0.3)
-    ink_indices = np.sort(np.array(line_ink_indices(field, look)), axis=0)
+    ink_indices = np.sort(np.array(line_ink_indices(field, pixel_look(look))), axis=0)
     assert np.abs(np.diff(ink_indices, axis=1)).max() < 0.03
     assert (
         np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
     ).all()
-    assert line_ink_indices(field, replace(look, hue="one")) is None
-    assert line_ink_indices(field, replace(look, magnitude="color")) is None
+    assert line_ink_indices(field, pixel_look(replace(look, hue="one"))) is None
+    assert line_ink_indices(field, pixel_look(replace(look, magnitude="color"))) is None
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
@@ -536,7 +539,10 @@ def test_families_keep_their_inks_at_any_guiding_angle():
     field = replace(field, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
     for guide in (0.0, 0.6, -1.2):
         look = replace(INK, hue="families", guiding_angle=guide)
-        actual, families = line_ink_indices(field, look), line_families(field, look)
+        actual, families = (
+            line_ink_indices(field, pixel_look(look)),
+            line_families(field, pixel_look(look)),
+        )
         np.testing.assert_array_equal(actual, families)
         assert {0, 1} == set(np.unique(actual))
 
@@ -845,7 +851,7 @@ def test_the_width_of_outlines(width):
     """The outline of a ball has the area of a ring of that width along the border."""
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
     gbuffer = project([make_instance(ball())], camera)
-    covered = outline_coverage(gbuffer, Look(outline=width))
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=width)))
     radius = SIZE / 2.4
     ring = np.pi * (radius**2 - (radius - width) ** 2)
     assert covered.sum() == pytest.approx(ring, rel=0.06 if width > 1 else 0.15)
@@ -865,7 +871,7 @@ def test_outlines_are_drawn_on_the_nearer_surface():
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 4, (1.0, 0, 0.2))))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=4.0)
     gbuffer = project(walls, camera)
-    covered = outline_coverage(gbuffer, Look(outline=3.0))
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=3.0)))
     first, second = gbuffer.instance_id == 0, gbuffer.instance_id == 1
     x, y = gbuffer.position[:, 0] * 60, gbuffer.position[:, 1] * 60
     to_border = 60 - np.maximum(np.abs(x), np.abs(y))
@@ -882,10 +888,12 @@ def test_lines_of_creases_are_half_on_each_side():
     gbuffer = project([MeshInstance(box, np.eye(4), axis_field(box, 4, (0, 0, 1.0)))], camera)
     x = (gbuffer.position @ np.eye(3)[0]) * 120
     middle = np.abs(x) < 20
-    covered = outline_coverage(gbuffer, Look(outline=4.0))
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=4.0)))
     inner = middle & (np.abs(gbuffer.position[:, 1] * 120) < 40)
     assert (covered[inner] == (np.abs(x[inner]) < 2)).all()
-    assert not outline_coverage(gbuffer, Look(outline=4.0, crease_angle=np.pi))[inner].any()
+    assert not outline_coverage(gbuffer, pixel_look(Look(outline=4.0, crease_angle=np.pi)))[
+        inner
+    ].any()
 
 
 def test_outlines_are_drawn_in_ink():

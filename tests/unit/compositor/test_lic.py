@@ -14,6 +14,7 @@ from scipy import ndimage
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.errors import RosyError
 
 #: These tests draw many pictures and measure them.
@@ -162,7 +163,7 @@ def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
 
 def test_the_blend_gain_of_seven_lines_includes_correlations():
     # Equation 6 assumes independent images; the correction for correlations is about a tenth.
-    gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
+    gain = blend_gain(7, np.array([81.0]), pixel_look(PLAIN))[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
 
@@ -190,7 +191,7 @@ def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width,
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)
         stds.append(crop_margin(image, length + 5).std())
-    assert np.mean(stds) == pytest.approx(expected_std(look), rel=0.05)
+    assert np.mean(stds) == pytest.approx(expected_std(pixel_look(look)), rel=0.05)
 
 
 def along_field_autocorrelation(image, angles, chosen, lag):

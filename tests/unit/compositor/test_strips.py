@@ -52,7 +52,7 @@ LOOKS = {
         length=6, line_width=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
     ),
     "magnitude": Look(length=14, magnitude="both", magnitude_range=1.0),
-    "flow": Look(length=10, flow=1.0, flow_phase=0.2),
+    "flow": Look(length=10, flow=1.0),
 }
 #: Those that need each kind of rows around a strip.
 COMMON = "color noise, by families", "cross-hatch", "wide paper grain", "flow"

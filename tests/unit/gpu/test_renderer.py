@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
+from rosy_addon.compositor.flow import NO_DRIFT, Drift
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import Light
@@ -498,10 +499,18 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
 
 
 def assert_parity(
-    card, instances, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, reference=None
+    card,
+    instances,
+    camera,
+    look=LOOK,
+    lights=(),
+    agreement=0.998,
+    likeness=0.98,
+    reference=None,
+    drift=NO_DRIFT,
 ):
     """Compare the picture of the card with numpy's, and return both."""
-    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference)
+    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference, drift)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500
@@ -551,8 +560,6 @@ LOOKS = {
     "families, of a field without families": {"hue": "families"},
     "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.03},
     "oriented, of lines without a direction": {"fade": "tail"},
-    "foreshortened": {"foreshorten": True},
-    "foreshortened, three directions": {"foreshorten": True, "degree": 3},
     "supersampled": {"supersampling": 2},
     "supersampled color noise": {"supersampling": 2, "noise": "color", "degree": 3},
     "guided": {"guiding_angle": 0.7},
@@ -746,15 +753,17 @@ LOOKS = {
 }
 
 #: Streaks that drift, at a phase at which no kernel is where it is at rest.
-DRIFTING = {"flow": 2.0, "flow_phase": 0.2}
+DRIFTING = {"flow": 2.0, "drift": Drift(0.2)}
 DRIFTING_LOOKS = {
     "drifting": DRIFTING,
     "drifting, oriented": DRIFTING | {"fade": "tail", "degree": 1, "density": 0.03},
     "drifting, two directions, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
-    "drifting, three directions": DRIFTING | {"fade": "ends", "degree": 3, "flow_distance": 13.0},
+    "drifting, three directions": DRIFTING
+    | {"fade": "ends", "degree": 3, "drift": Drift(0.2, 0.4)},
     "drifting on the surface": DRIFTING | {"anchor": "surface"},
     "drifting, magnitude as both": DRIFTING | {"magnitude": "both"},
-    "drifting, short streaks": DRIFTING | {"length": 9, "flow_distance": 40.0, "supersampling": 2},
+    "drifting, short streaks": DRIFTING
+    | {"length": 9, "drift": Drift(0.2, 4.4), "supersampling": 2},
     "drifting, hatched, with breaks": DRIFTING
     | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "line_width": 2.5, "length": 60},
     "drifting, hatched, breaks and length by magnitude": DRIFTING
@@ -794,9 +803,10 @@ RARE_LOOKS = {
 )
 def test_looks(card, name):
     look_settings = {"degree": 4, **ALL_LOOKS[name]}
-    degree = look_settings.pop("degree")
+    degree, drift = look_settings.pop("degree"), look_settings.pop("drift", NO_DRIFT)
     look = LOOK.with_settings(look_settings)
-    assert_parity(card, [ball(degree)], view(supersampling=look.supersampling), look)
+    camera = view(supersampling=look.supersampling)
+    assert_parity(card, [ball(degree)], camera, look, drift=drift)
 
 
 @pytest.mark.parametrize("side", [3, *long(2)])

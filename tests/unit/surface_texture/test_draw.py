@@ -19,8 +19,8 @@ from rosy_addon.surface_texture import hatching
 from rosy_addon.surface_texture.draw import SURFACE_PIXELS, draw_texture
 
 #: Lines that are wide enough for a small texture to show them well.
-WIDE = Look(length=20, line_width=10.0, high_pass=40.0)
-WIDER = Look(length=40, line_width=20.0, high_pass=80.0)
+WIDE = Look(length=20, line_width=10.0, line_distance=20.0, high_pass=40.0)
+WIDER = Look(length=40, line_width=20.0, line_distance=40.0, high_pass=80.0)
 
 
 def instance_of(surface, degree: int, kind: str = "smoothest") -> MeshInstance:

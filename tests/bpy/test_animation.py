@@ -14,10 +14,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon.jobs import animation
 from rosy.rosy_addon.compositor import stages
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.gpu.select import select_device
+from rosy.rosy_addon.jobs import animation
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection import project as projection

@@ -1184,8 +1184,9 @@ def test_free_directions(card, name, hue):
 @pytest.mark.parametrize("name", ["two", "three", "two lines"])
 def test_streaks_of_free_directions_drift(card, name):
     """Along the directions; those of lines toward the guiding angle."""
-    look = replace(LOOK, hue="families", guiding_angle=0.6, **DRIFTING)
-    assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
+    look = replace(LOOK, hue="families", guiding_angle=0.6, flow=DRIFTING["flow"])
+    instance = MeshInstance(BALL, np.eye(4), FREE[name](BALL))
+    assert_parity(card, [instance], view(), look, drift=DRIFTING["drift"])
 
 
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
@@ -1306,15 +1307,16 @@ UNDEFINED_LOOKS = {
 )
 @pytest.mark.parametrize("degree", [3, *long(4)])
 def test_where_the_field_is_undefined(card, degree, name):
-    look = replace(
-        LOOK, **{key: value for key, value in UNDEFINED_LOOKS[name].items() if key != "degree"}
-    )
+    settings = dict(UNDEFINED_LOOKS[name])
+    drift = settings.pop("drift", NO_DRIFT)
+    settings.pop("degree", None)
+    look = replace(LOOK, **settings)
     field = smooth_field(BALL, degree)
     center = BALL.vertices[BALL.corner_vertex.reshape(-1, 3)].mean(axis=1)
     vectors = np.where((center[:, :1] > 0.2) | (center[:, 2:] > 0.6), 0.0, field.vectors)
     field = RosyField(degree, vectors, family_count=2 if degree == 4 else 3)
     camera = view(supersampling=look.supersampling)
-    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], camera, look)
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], camera, look, drift=drift)
 
 
 def test_a_field_that_is_undefined_everywhere(card):

@@ -121,28 +121,41 @@ def compose(
         layers = []
         for number, degree in enumerate(canvas.degrees):
             with progress(0.2 + 0.8 * number / len(canvas.degrees), 1.0):
-                layers.append(_prepared(stages, canvas, degree, frame_look))
-    pictures = []
+                layers.append(_prepare_layer(stages, canvas, degree, frame_look))
     with progress(SHARED_SHARE, 1.0):
-        for number, strip in enumerate(strips):
-            for index, layer in enumerate(layers):
-                start = (number + index / len(layers)) / len(strips)
-                with progress(start, start + 0.95 / (len(layers) * len(strips))):
-                    _draw_layer(stages, canvas, layer, strip)
-            with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
-                pictures.append(canvas.picture(strip))
-    rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
-    color_range = common_color_range({layer.look.magnitude_range for layer in layers})
-    if not colors_magnitude(look):
-        color_range = None
-    if canvas.map_position is not None:
-        color_range = value_ends(look, value_ranges(instances))
+        rgba, spread = _draw_strips(stages, canvas, layers, strips)
     return Picture(
         rgba,
         spread[..., 0] if draws_thresholds else None,
-        color_range,
+        _color_range(gbuffer, look, layers, canvas),
         line_count=max((layer.field.line_count for layer in layers), default=0),
     )
+
+
+def _draw_strips(
+    stages: ComposeStages, canvas: _Canvas, layers: Sequence[_Layer], strips: Sequence[Strip]
+) -> list[np.ndarray]:
+    """Draw all layers, strip by strip. Return the picture, and the spread of its thresholds."""
+    pictures = []
+    for number, strip in enumerate(strips):
+        for index, layer in enumerate(layers):
+            start = (number + index / len(layers)) / len(strips)
+            with progress(start, start + 0.95 / (len(layers) * len(strips))):
+                _draw_layer(stages, canvas, layer, strip)
+        with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
+            pictures.append(canvas.picture(strip))
+    return [join_strips(images, strips) for images in zip(*pictures, strict=True)]
+
+
+def _color_range(
+    gbuffer: GBuffer, look: Look, layers: Sequence[_Layer], canvas: _Canvas
+) -> tuple[float, float] | None:
+    """Return the values at the ends of the color map; None if it shows none, or none that are common."""
+    if canvas.map_position is not None:
+        return value_ends(look, value_ranges(gbuffer.instances))
+    if colors_magnitude(look):
+        return common_color_range({layer.look.magnitude_range for layer in layers})
+    return None
 
 
 class _Canvas:
@@ -268,7 +281,7 @@ class _Layer(NamedTuple):
     tone: np.ndarray | None = None
 
 
-def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
+def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
     """Compute what the strips of the fields of one degree share."""
     report(0.0, "finding directions")
     with progress(0.0, 0.3):
@@ -336,15 +349,17 @@ def _line_images(
     stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
 ) -> tuple[LicImages, LicImages | None]:
     """Return the images of the lines at the pixels of a strip, and those of their breaks if they have any."""
-    looks = [layer.look] if even_lines is None else []
-    if has_breaks(layer.look):
-        looks.append(layer.look.with_length(break_steps(layer.look)))
+    look, is_broken = layer.look, has_breaks(layer.look)
+    looks = [look] if even_lines is None else []
+    if is_broken:
+        looks.append(look.with_length(break_steps(look)))
     images = stages.lic(layer.field, looks, strip) if looks else []
-    if even_lines is not None:
-        # Even lines stand for streaks.
-        members = even_lines.streaks[..., None]
-        images = [lic_images(members, np.ones(members.shape[1], dtype=np.float32)), *images]
-    return images[0], images[1] if has_breaks(layer.look) else None
+    break_images = images[-1] if is_broken else None
+    if even_lines is None:
+        return images[0], break_images
+    # Even lines stand for streaks.
+    members = even_lines.streaks[..., None]
+    return lic_images(members, np.ones(members.shape[1], dtype=np.float32)), break_images
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:

@@ -81,24 +81,29 @@ class ComposeStages:
         The looks differ in the length of streamlines. The first is the longest. Methods other than "sheets"
         have no strips.
         """
-
-        def convolved(convolve: Callable[..., Any]) -> Any:
-            with progress(0.0, NOISE_SHARE):
-                noise = self.noise(field, looks[0])
-            with progress(NOISE_SHARE, 1.0):
-                return convolve(field, looks, noise)
-
-        def compute() -> list[LicImages]:
-            if looks[0].method != "ibfv" or not has_flow(looks[0]):
-                return convolved(partial(lic_lengths, strip=strip))
-            # The waves of drifting streaks are the same at all times and speeds; see `ibfv`.
-            still = [replace(look, flow=1.0, flow_phase=0.0).lic_key() for look in looks]
-            key = "streak waves", self._gbuffer, field.degree, *still
-            waves = self._cache.get_or_create(key, partial(convolved, streak_waves))
-            return wave_images(waves, looks)
-
         key = "LIC images", self._gbuffer, field.degree, strip, *(look.lic_key() for look in looks)
-        return self._cache.get_or_create(key, compute)
+        return self._cache.get_or_create(key, partial(self._new_lic, field, looks, strip))
+
+    def _new_lic(
+        self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None
+    ) -> list[LicImages]:
+        """Compute LIC images, those of the method "ibfv" with flow from waves that are in the cache."""
+        if looks[0].method != "ibfv" or not has_flow(looks[0]):
+            return self._convolved(partial(lic_lengths, strip=strip), field, looks)
+        # The waves are the same at all times and speeds; see `ibfv`.
+        still = [replace(look, flow=1.0, flow_phase=0.0).lic_key() for look in looks]
+        key = "streak waves", self._gbuffer, field.degree, *still
+        compute = partial(self._convolved, streak_waves, field, looks)
+        return wave_images(self._cache.get_or_create(key, compute), looks)
+
+    def _convolved(
+        self, convolve: Callable[..., Any], field: PixelField, looks: Sequence[PixelLook]
+    ) -> Any:
+        """Make the noise of a field, and return what a method of LIC makes of it."""
+        with progress(0.0, NOISE_SHARE):
+            noise = self.noise(field, looks[0])
+        with progress(NOISE_SHARE, 1.0):
+            return convolve(field, looks, noise)
 
     def undirected_texture(self, field: PixelField, look: PixelLook) -> np.ndarray | None:
         """Compute the texture where the field is undefined; see `undirected_texture`."""

@@ -98,8 +98,8 @@ class Look:
     `unit_size` Blender units.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
-    this package, and declare and use the uniform of that name in the shader. All else is derived
-    from the field; see `rosy_addon.core.settings`.
+    this package, and declare and use the uniform of that name in the shader. A length is also a field
+    of `look_units.PixelLook`. All else is derived from the field; see `rosy_addon.core.settings`.
 
     Raises
     ------

@@ -42,7 +42,7 @@ VIEW = (-14.0, 4.0)
 SLANT = 0.22
 
 #: Settings in pixels, which are enlarged so that lines are visible in a small picture.
-LENGTHS = ("length", "line_width", "high_pass", "outline", "overshoot")
+LENGTHS = ("length", "line_width", "line_distance", "high_pass", "outline", "overshoot")
 ENLARGED = 1.6
 
 #: Looks of the picture of fields: gray streaks, and a plaid.

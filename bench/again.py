@@ -21,7 +21,7 @@ CHANGES: dict[str, tuple[object, ...]] = {
     "shading": (0.5, 0.6),
     "color_map": ("magma", "gray"),
     "seed": (1, 2),
-    "grain": (2.0, 2.5),
+    "line_width": (2.0, 2.5),
     "density": (0.2, 0.3),
     "hue": ("noise", "one"),
     "length": (30, 50),

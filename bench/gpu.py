@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.flow import NO_DRIFT, Drift, drift_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
@@ -88,9 +88,15 @@ def open_device() -> Any:
         return None
 
 
-def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
+def draw_texture(
+    renderer: GpuRenderer,
+    items: Sequence[DrawItem],
+    camera: Any,
+    look: Any,
+    drift: Drift = NO_DRIFT,
+) -> Any:
     """Draw a picture and leave it on the card."""
-    return run(renderer.texture_steps(items, ViewInput((), camera, look)))
+    return run(renderer.texture_steps(items, ViewInput((), camera, look, drift=drift)))
 
 
 class QueriedDevice:
@@ -145,12 +151,12 @@ class Frames:
     def draw(self) -> tuple[float, float]:
         """Draw the next frame. Return its time, and the card's own, in seconds."""
         camera = cases.camera(*self.size, azimuth=self.frame_count * AZIMUTH_STEP)
-        look = flow_at(self.look, self.frame_count)
+        drift = drift_at(self.look, self.frame_count)
         self.frame_count += 1
         timer = self.device.context.query(time=True)
         start = time.perf_counter()
         with timer:
-            draw_texture(self.renderer, self.items, camera, look)
+            draw_texture(self.renderer, self.items, camera, self.look, drift)
         self.device.finish()
         return time.perf_counter() - start, timer.elapsed * 1e-9
 

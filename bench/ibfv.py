@@ -19,9 +19,10 @@ from harness.planar import lic
 from scipy import ndimage
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.flow import drift_at
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
 from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import generate
@@ -85,7 +86,7 @@ def _next_frame(gbuffer: GBuffer, method: str) -> Callable[[], object]:
     look, cache, numbers = replace(cases.LOOK, method=method, flow=FLOW), Cache(), itertools.count()
 
     def draw() -> None:
-        compose(gbuffer, flow_at(look, next(numbers)), cache=cache)
+        compose(gbuffer, look, cache=cache, drift=drift_at(look, next(numbers)))
         cache.evict_unused()
 
     return draw
@@ -98,13 +99,13 @@ def _seen_field(path: Path, degree: int) -> PixelField:
     gbuffer = project(
         [instance], orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     )
-    return surface_pixel_field(gbuffer, degree, cases.LOOK.crease_angle, False)
+    return surface_pixel_field(gbuffer, degree, cases.LOOK.crease_angle)
 
 
 def _direction_errors(field: PixelField, method: str) -> np.ndarray:
     """(n,) angles in degrees between streaks and the members of a field, by the structure tensor."""
     look = Look(method=method)
-    images = lic(field, replace(look, method=method), look_noise(field, look))
+    images = lic(field, replace(look, method=method), look_noise(field, pixel_look(look)))
     is_open = _frame(field.neighbor_mask == 0b111_111_111, field)
     inside = ndimage.binary_erosion(is_open, iterations=BORDER)
     first, errors = nearest_member(field, 0.0), []

@@ -21,6 +21,7 @@ from scipy import ndimage
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.pixel_field import (
     PixelField,
     nearest_member,
@@ -112,7 +113,7 @@ def _measure_fields(fields: Sequence[PixelField], look: Look) -> Measurements:
     """Return means over several seeds, or over several fields with one seed each."""
     measurements = []
     for seed, field in zip(SEEDS, fields * len(SEEDS) if len(fields) == 1 else fields, strict=True):
-        noise = look_noise(field, replace(look, seed=seed))
+        noise = look_noise(field, pixel_look(replace(look, seed=seed)))
         measurements.append(_measure_images(field, lic(field, look, noise)))
     return Measurements(
         *(
@@ -214,7 +215,7 @@ def _pixel_fields_of(surface: Surface, field: RosyField) -> list[PixelField]:
     """Return the field as a camera sees it, in a list of one."""
     camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)]
+    return [surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle)]
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ def vtk_renderer(
     mapper.SetInputArrayToProcess(0, 0, 0, vtk.vtkDataObject.FIELD_ASSOCIATION_POINTS, "field")
     settings = mapper.GetLICInterface()
     settings.SetNumberOfSteps(LOOK.length)
-    settings.SetStepSize(LOOK.step)
+    settings.SetStepSize(1.0)
     settings.EnhancedLICOff()  # a second pass, which would double its samples
     actor = vtk.vtkActor()
     actor.SetMapper(mapper)

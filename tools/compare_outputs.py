@@ -97,7 +97,7 @@ class Case(NamedTuple):
 PRESETS = tuple(sorted(path.stem for path in (ROOT / "presets").glob("*.json")))
 
 #: Options of a hatched picture, to which those of a case are added.
-HATCH = "ink=hatch light=lamp shading=0.9 grain=2.5 length=30"
+HATCH = "ink=hatch light=lamp shading=0.9 line_width=2.5 length=30"
 
 #: Arguments of `render`, to which an output and `SIZE` are added.
 RENDERS = {
@@ -117,10 +117,10 @@ RENDERS = {
     "members-view-plane": "@torus.obj --degree 3 method=members view_plane=off --ortho",
     "members-5-color": "@torus.obj --degree 5 method=members hue=noise high_pass=0 density=.5",
     "members-magnitude": "@bumpy.ply method=members hue=magnitude magnitude_length=on",
-    "brute-4-taper": "@bumpy.ply method=brute taper=on length=25",
+    "brute-4-taper": "@bumpy.ply method=brute fade=ends length=25",
     "brute-6-color": "@torus.obj --degree 6 method=brute hue=noise",
-    "ibfv-1-oriented": "@torus.obj --degree 1 method=ibfv oriented=on",
-    "ibfv-4-flow": "@bumpy.ply method=ibfv flow=1 flow_phase=.3",
+    "ibfv-1-oriented": "@torus.obj --degree 1 method=ibfv fade=tail",
+    "ibfv-4-flow": "@bumpy.ply method=ibfv flow=1",
     "ibfv-6-color": "@torus.obj --degree 6 method=ibfv hue=noise magnitude_length=on",
     "supersampling-1": "@bumpy.ply supersampling=1",
     "supersampling-3": "@bumpy.ply supersampling=3",
@@ -128,22 +128,21 @@ RENDERS = {
     "flat-hatch": f"@bumpy.ply display=flat {HATCH}",
     "ortho-view": "@pair.stl --ortho --view 40,60 --generate axis --axis 1,0.5,0",
     "up-z": "@wave.obj --up z --view -30,-25 --generate features --sharp-angle 20",
-    "world-unit": "@bumpy.ply unit=world unit_size=0.012",
-    "world-unit-hatch": f"@torus.obj {HATCH} unit=world unit_size=0.01 anchor=surface outline=1",
+    "world-unit": "@bumpy.ply unit_size=0.012",
+    "world-unit-hatch": f"@torus.obj {HATCH} unit_size=0.01 anchor=surface outline=1",
     "noise-color": "@wave.obj hue=noise supersampling=1",
-    "noise-color-surface": "@wave.obj hue=noise anchor=surface grain=3",
+    "noise-color-surface": "@wave.obj hue=noise anchor=surface line_width=3",
     "surface-anchor": "@suzanne.obj anchor=surface",
-    "noise-settings": "@bumpy.ply step=0.5 grain=3 density=0.4 high_pass=5 seed=7 gain=4 taper=on",
+    "noise-settings": "@bumpy.ply line_width=3 density=0.4 high_pass=5 seed=7 gain=4 fade=ends",
     "long-streamlines": "@bumpy.ply length=300 supersampling=1",
-    "foreshorten": "@torus.obj foreshorten=on --view 10,15",
     "detail": "@suzanne.obj detail=0.7",
-    "arrows": "@torus.obj --degree 1 --generate smoothest arrows=20 arrow_size=9",
+    "arrows": "@torus.obj --degree 1 --generate smoothest arrows=36",
     "singularities": "@suzanne.obj singularity_dots=visible_indices",
     "singularities-all": "@torus.obj --degree 3 singularity_dots=all singularity_size=12",
-    "even-lines": f"@suzanne.obj {HATCH} ink=even",
-    "even-lines-3": f"@torus.obj --degree 3 {HATCH} ink=even anchor=surface outline=1",
+    "even-lines": f"@suzanne.obj {HATCH} ink=even line_distance=5",
+    "even-lines-3": f"@torus.obj --degree 3 {HATCH} ink=even line_distance=5 anchor=surface outline=1",
     "creases": "@cube.off --generate features",
-    "cross-creases": "@cube.off --generate smoothest cross_creases=on",
+    "cross-creases": "@cube.off --generate smoothest crease_angle=3.1416",
     "crease-angle": "@cube.off --generate smoothest crease_angle=2.5 hue=noise",
     "magnitude-color": "@bumpy.ply hue=magnitude shading=0",
     "magnitude-length-magma": "@bumpy.ply magnitude_length=on color_map=magma",
@@ -168,12 +167,12 @@ RENDERS = {
     "hatch-outline": f"@pair.stl {HATCH} outline=2.5",
     "hatch-ramp": f"@bumpy.ply {HATCH} hue=tone ink_color_light=#2255cc",
     "hatch-clear-paper": f"@bumpy.ply {HATCH} paper_color=#ffffff00",
-    "hatch-crisp": f"@bumpy.ply {HATCH} crispness=1 layers=6 layering=0.1 taper=on",
+    "hatch-crisp": f"@bumpy.ply {HATCH} crispness=1 layers=6 layering=0.1 fade=ends",
     "hatch-soft-one": f"@bumpy.ply {HATCH} crispness=0 layers=1",
     "hatch-members": f"@torus.obj --degree 3 {HATCH} method=members",
     "hatch-brute": f"@torus.obj --degree 6 {HATCH} method=brute",
     "hatch-all": f"@suzanne.obj {HATCH} anchor=surface breaks=.6 overshoot=8 wobble=.6 "
-    "paper_grain=.4 outline=1.5 hue=families taper=on supersampling=3",
+    "paper_grain=.4 outline=1.5 hue=families fade=ends supersampling=3",
     **{
         f"hatch-families-{n}": f"@torus.obj --degree {n} {HATCH} hue=families" for n in (1, 3, 4, 6)
     },
@@ -510,14 +509,14 @@ OPERATORS = {
 CARD = {
     **{f"degree-{n}": "--object Ring" for n in range(1, 7)},
     **{f"preset-{name}": f"--preset {name}" for name in ("cross-hatch", "charcoal", "plaid")},
-    "surface-anchor": "anchor=surface taper=on",
+    "surface-anchor": "anchor=surface fade=ends",
     "families": f"{HATCH} hue=families anchor=surface breaks=0.5",
     "tone": f"{HATCH} tone=attribute tone_levels=0,1,1.4",
     "scene-light": "light=scene shadows=on shading=1 --camera Ortho",
     "scene-light-hatch": f"{HATCH} light=scene shadows=on wobble=0.6 paper_grain=0.4",
     "outline-overshoot": f"{HATCH} outline=2 overshoot=10 supersampling=2",
     "magnitude-flat": "hue=magnitude magnitude_length=on color_map=magma display=flat supersampling=2",
-    "all-cameras": "--all-cameras hue=noise unit=world unit_size=0.012",
+    "all-cameras": "--all-cameras hue=noise unit_size=0.012",
 }
 
 

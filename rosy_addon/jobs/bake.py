@@ -16,7 +16,7 @@ from ..scene.backdrop import update_backdrops
 from ..scene.bake_records import DrawnFrom
 from ..scene.cameras import CameraSource, render_camera
 from ..scene.keys import update_keys
-from ..scene.look_properties import look_at_frame, read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import read_picture_states
 from ..scene.pictures import (
     BakeResult,
@@ -79,9 +79,8 @@ def bake(
         If there is nothing to draw or it cannot be drawn; see `read_views`, `select_device`,
         `picture_steps` and `check_targets`.
     """
-    look = look_at_frame(
-        scene, read_look(scene.rosy) if look is None else look, scene.frame_current_final
-    )
+    look = read_look(scene.rosy) if look is None else look
+    drift = drift_in_scene(scene, look, scene.frame_current_final)
     settings = read_output_settings(scene) if settings is None else settings
     draws_thresholds = settings.relight and is_hatched(look)
     if draws_thresholds:
@@ -97,7 +96,7 @@ def bake(
     device = select_device(settings.device, look)
     drawings = []
     for index, (source, view) in enumerate(zip(sources, scene_views.views, strict=True)):
-        view = replace(view, draws_thresholds=draws_thresholds)
+        view = replace(view, draws_thresholds=draws_thresholds, drift=drift)
         steps = image_steps(view, device, settings.as_float, workers=workers)
         start, stop = (0.97 * done / len(sources) for done in (index, index + 1))
         picture, image_data = yield from part(steps, start, stop)

@@ -14,7 +14,7 @@ from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..scene.color_inputs import color_attribute_of
 from ..scene.lights import read_lights
-from ..scene.look_properties import read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import bakes_light, read_texture_state
 from ..scene.pictures import OutputSettings, check_targets, read_output_settings
 from ..scene.read_view import scene_depsgraph
@@ -88,7 +88,11 @@ def bake_texture(
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     is_udim = scene.rosy.texture_udim
     texture_settings = TextureSettings(
-        scene.rosy.texture_size, scene.rosy.texture_margin, is_udim, content
+        scene.rosy.texture_size,
+        scene.rosy.texture_margin,
+        is_udim,
+        content,
+        drift_in_scene(scene, look, scene.frame_current_final),
     )
     colors = texture_colors_values(look, content)
     color_attribute = color_attribute_of(scene, look) if colors else None

@@ -19,6 +19,7 @@ from ..annotation.singularity_settings import (
     shows_indices,
     shows_singularities,
 )
+from ..compositor.flow import NO_DRIFT, Drift
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
@@ -27,7 +28,7 @@ from ..rendering.marks import view_arrows
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.lights import read_lights
-from ..scene.look_properties import look_at_frame, read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.read_request import read_request
 from ..scene.scene_reader import check_sources
 from ..worker.helper import Helper
@@ -321,14 +322,13 @@ class ViewportSession:
         view_input = self._read_view(context, depsgraph, look, overlay)
         if view_input is None:
             return
-        still_look = replace(view_input.look, flow_phase=0.0)
         with_field = [entry for entry in view_input.instances if entry.field is not None]
         shows_dots = shows_singularities(look)
         view = self.progressive.update(
             _pointers(context),
             _picture_key(view_input),
             view_input,
-            _picture_key(replace(view_input, look=still_look)),
+            _picture_key(replace(view_input, drift=NO_DRIFT)),
             [
                 partial(look_up_singularities, instance, self._marks_cache)
                 for instance in (with_field if shows_dots else ())
@@ -368,8 +368,7 @@ class ViewportSession:
         overlay: ViewOverlay,
     ) -> None:
         """Draw arrowheads over the lines of a view."""
-        look = replace(look, flow_phase=0.0)
-        view = replace(view_input, look=look, lights=(), reference=None)
+        view = replace(view_input, look=look, lights=(), reference=None, drift=NO_DRIFT)
         key = _picture_key(view)
         if overlay.arrowheads is None or overlay.arrowheads[0] != key:
             triangles = sum(len(instance.surface.triangles) for instance in view.instances)
@@ -420,18 +419,18 @@ class ViewportSession:
         return ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
-            look=self._drifted(look, context.scene),
+            look=look,
             lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
             reference=reference,
             clip_planes=clip_planes(context.region_data),
+            drift=self._drift(look, context.scene),
         )
 
-    def _drifted(self, look: Look, scene: bpy.types.Scene) -> Look:
-        """Return the look with its streaks where they are at the frame of a scene and of the clock."""
-        if not has_flow(look):
-            return look
-        self._has_shown_flow = True
-        return look_at_frame(scene, look, scene.frame_current_final + self.flow_clock.frames)
+    def _drift(self, look: Look, scene: bpy.types.Scene) -> Drift:
+        """Return how far streaks have drifted at the frame of a scene and of the clock."""
+        if has_flow(look):
+            self._has_shown_flow = True
+        return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
         """Show what is being done, and why a field is not drawn."""
@@ -492,6 +491,7 @@ def _picture_key(view_input: ViewInput) -> Hashable:
         camera.projection.tobytes(),
         (camera.width, camera.height),
         view_input.look,
+        view_input.drift,
         None if planes is None else planes.tobytes(),
         tuple(
             (light.kind, tuple(light.vector), tuple(light.color), light.strength)

@@ -91,7 +91,7 @@ def test_parity_of_uneven_lines(rosy, card, surface_of, degree, anchor):
         hue="families",
         anchor=anchor,
         shading=0.9,
-        grain=2.5,
+        line_width=2.5,
         length=LENGTH,
         supersampling=2,
         breaks=0.6,

@@ -440,7 +440,7 @@ TABLE = {
     "paper": (put("rosy.look.paper_color", (1.0, 0.0, 0.0, 1.0)), hatched, "the look was changed"),
     "gain": (put("rosy.look.gain", 1.0), None, "the look was changed"),
     "gain with hatching": (put("rosy.look.gain", 1.0), hatched, ""),
-    "unit size in pixels": (put("rosy.look.unit_size", 0.5), None, ""),
+    "unit size": (put("rosy.look.unit_size", 0.5), None, "the look was changed"),
     "shadows of a headlight": (put("rosy.look.shadows", True), None, ""),
     "preset": (preset, None, "the look was changed"),
     "tone attribute": (lambda scene: add_tone(0.2), tone, "field of 'Plain' was changed"),

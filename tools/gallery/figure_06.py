@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from rosy_addon.compositor.contrast import blend_gain, expected_std, scale_contrast
 from rosy_addon.compositor.image_noise import NOISE_MEAN
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 
 from .looks import MEASURED
 from .page import Page
@@ -30,9 +31,9 @@ def write() -> None:
     """Draw and write the page."""
     page = Page("figure-06", "Contrast")
     layers = compose_field(constant(MEMBER, DEGREE), DEGREE, FIELD_SIZE, LOOK).layer
-    expected = expected_std(LOOK)
+    expected = expected_std(pixel_look(LOOK))
     # In the visible part, streamlines have their full length.
-    gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), LOOK)[0])
+    gain = float(blend_gain(DEGREE // 2, np.float32([2 * LOOK.length + 1]), pixel_look(LOOK))[0])
     blend = layers.images.blend
     shown = [
         ("one member, I₀", layers.images.members[0], expected),
@@ -119,11 +120,13 @@ def _corrected(degree: int, look: Look) -> list[float]:
         tone = compose_field(constant(MEMBER, degree), degree, FIELD_SIZE, seeded).layer.tone
         deviations.append(float(_cut(tone).std()))
     factor = float(
-        blend_gain(degree if degree % 2 else degree // 2, np.float32([2 * look.length + 1]), look)[
-            0
-        ]
+        blend_gain(
+            degree if degree % 2 else degree // 2,
+            np.float32([2 * look.length + 1]),
+            pixel_look(look),
+        )[0]
     )
-    return [factor, float(np.mean(deviations)) / expected_std(look)]
+    return [factor, float(np.mean(deviations)) / expected_std(pixel_look(look))]
 
 
 def _cut(image: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 
 from rosy_addon.compositor.contrast import expected_std
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.field.curvature import curvature_field
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.singularities import euler_characteristic, find_singularities
@@ -14,7 +15,6 @@ from rosy_addon.projection.camera import Camera
 
 from .looks import RED, SOLID
 from .page import Page, signed
-from .plane import enlarged
 from .shapes import knot, sphere, suzanne, torus, triple_torus
 from .sheet import Panel, display, dotted
 from .solid import (
@@ -29,7 +29,7 @@ from .solid import (
 )
 
 WIDTH = 402
-PLAID = SOLID.with_settings({"hue": "noise", "grain": 3.0, "gain": 3.0, "length": 60})
+PLAID = SOLID.with_settings({"hue": "noise", "line_width": 3.0, "gain": 3.0, "length": 60})
 MAGNITUDE = SOLID.with_settings({"hue": "magnitude", "gain": 2.0})
 
 
@@ -130,5 +130,5 @@ def _census(name: str, surface: Surface, field: RosyField) -> list[object]:
 
 
 def _spread(tone: np.ndarray, look: Look) -> list[object]:
-    theory = look.gain * expected_std(enlarged(look, look.supersampling))
+    theory = look.gain * expected_std(pixel_look(look).in_samples(look.supersampling))
     return [float(tone.mean()), float(tone.std()), theory]

@@ -55,8 +55,8 @@ def write_arrowheads() -> None:
     head = suzanne()
     wind = generate(head, GeneratorSettings("axis", axis=(1.0, 0.3, 0.4)), 1)
     three = generate(head, "smoothest", 3)
-    engraving = replace(load_preset("engraving").look, arrows=30.0, arrow_size=12.0)
-    streaks = Look(supersampling=2, density=0.05, grain=2.0, arrows=42.0, arrow_size=9.0)
+    engraving = replace(load_preset("engraving").look, arrows=40.0)
+    streaks = Look(supersampling=2, density=0.05, line_width=2.0, arrows=40.0)
     panels = [
         Panel(display(render_view(head, field, look, ANGLES, SIDE)), text)
         for field, look, text in (
@@ -103,7 +103,13 @@ def _oriented_panels() -> list[Panel]:
     """Draw a vector field and a field of three directions with oriented streaks."""
     ball = sphere()
     look = Look(
-        supersampling=2, oriented=True, density=0.04, grain=3.0, length=45, high_pass=0.0, gain=1.6
+        supersampling=2,
+        fade="tail",
+        density=0.04,
+        line_width=3.0,
+        length=45,
+        high_pass=0.0,
+        gain=1.6,
     )
     flow = generate(ball, GeneratorSettings("axis", axis=(0.3, 0.2, 1.0)), 1)
     three = generate(ball, "smoothest", 3)

@@ -137,15 +137,15 @@ def _outlines(
 def _units(monkey: Surface, field: RosyField) -> list[list[Panel]]:
     """Draw lines in pixels and in Blender units from several distances."""
     rows = []
-    for unit in ("pixels", "world"):
-        look = replace(load_preset("engraving").look, unit=unit, unit_size=0.008)
+    for unit_size in (0.0, 0.008):
+        look = replace(load_preset("engraving").look, unit_size=unit_size)
         row = []
         for distance in DISTANCES:
             side = THIRD * look.supersampling
             view_matrix = look_at((-0.35 * distance, -0.9 * distance, 0.25 * distance), (0, 0, 0))
             camera = perspective_camera(view_matrix, side, side, fov=np.radians(24))
             shown = compose(project([MeshInstance(monkey, np.eye(4), field)], camera), look)
-            row.append(Panel(display(shown.rgba), f"unit: {unit}"))
+            row.append(Panel(display(shown.rgba), f"unit_size: {unit_size:g}"))
         rows.append(row)
     return rows
 

@@ -42,12 +42,12 @@ VIEW = (-14.0, 4.0)
 SLANT = 0.22
 
 #: Settings in pixels, which are enlarged so that lines are visible in a small picture.
-LENGTHS = ("length", "grain", "high_pass", "outline", "overshoot")
+LENGTHS = ("length", "line_width", "line_distance", "high_pass", "outline", "overshoot")
 ENLARGED = 1.6
 
 #: Looks of the picture of fields: gray streaks, and a plaid.
-STREAKS = Look(length=80, grain=2.6, gain=2.8, shading=0.85, supersampling=2)
-WEAVE = STREAKS.with_settings({"hue": "noise", "grain": 4.0, "gain": 3.0})
+STREAKS = Look(length=80, line_width=2.6, gain=2.8, shading=0.85, supersampling=2)
+WEAVE = STREAKS.with_settings({"hue": "noise", "line_width": 4.0, "gain": 3.0})
 
 #: Size of the captions, and their color.
 CAPTION, INK = 34, (40, 40, 40)

@@ -16,7 +16,7 @@ DRAWN, LOGO, FAVICON = 512, 128, 48
 
 #: A singularity of index -1/4. Broad streaks stay legible at the size of a favicon.
 DEGREE, INDEX = 4, -1
-LOOK = Look(length=400, grain=26.0, density=0.15, high_pass=70.0, gain=3.0, seed=2)
+LOOK = Look(length=400, line_width=26.0, density=0.15, high_pass=70.0, gain=3.0, seed=2)
 
 #: Tones, from 0 to 1, at which the ground ends and the streaks have their full color.
 RANGE = (0.50, 0.80)

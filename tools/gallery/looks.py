@@ -3,12 +3,12 @@
 from rosy_addon.compositor.look import Look
 
 #: Look of planar pictures for display, which are drawn at twice the size and averaged.
-PLANE = Look(method="members", length=60, grain=2.0, gain=3.0)
+PLANE = Look(method="members", length=60, line_width=2.0, gain=3.0)
 
 #: Look of planar pictures for measurements: half of the noise cells are bright, as in the paper.
-MEASURED = Look(method="members", length=40, grain=2.0, gain=1.0, density=0.5)
+MEASURED = Look(method="members", length=40, line_width=2.0, gain=1.0, density=0.5)
 
 #: Look of surfaces.
-SOLID = Look(method="members", length=50, grain=2.0, gain=2.5, shading=0.8, supersampling=2)
+SOLID = Look(method="members", length=50, line_width=2.0, gain=2.5, shading=0.8, supersampling=2)
 
 RED, BLUE = (214, 39, 40), (31, 119, 180)

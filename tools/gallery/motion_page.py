@@ -25,16 +25,16 @@ SIDE, ANGLES, COUNT, RATE = 240, (-26.0, 10.0), 24, 20.0
 ORIENTED = Look(
     supersampling=2,
     flow=1.5,
-    oriented=True,
+    fade="tail",
     density=0.03,
-    grain=2.5,
+    line_width=2.5,
     length=36,
     high_pass=0.0,
     gain=1.8,
 )
 
 #: Lines of four directions, which drift toward the right of the picture.
-CROSSING = Look(supersampling=2, flow=1.5, length=36, grain=2.0)
+CROSSING = Look(supersampling=2, flow=1.5, length=36, line_width=2.0)
 
 
 def write() -> None:

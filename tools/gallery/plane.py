@@ -48,7 +48,7 @@ def draw_field(
 
 def enlarged(look: Look, supersampling: int) -> Look:
     """Return a look with its lengths in the pixels of a supersampled picture."""
-    lengths = ("length", "grain", "high_pass")
+    lengths = ("length", "line_width", "high_pass")
     return look.with_settings({name: getattr(look, name) * supersampling for name in lengths})
 
 

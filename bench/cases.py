@@ -11,6 +11,7 @@ from harness.planar import lic, planar_pixel_field
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.pixel_field import PixelField
 from rosy_addon.core.cache import Cache
 from rosy_addon.field.generate import axis_field
@@ -33,7 +34,7 @@ def plane(degree: int, size: int = SIZE) -> tuple[PixelField, np.ndarray]:
     plus = np.arctan2(y - 0.5 * size, x - 0.33 * size)
     minus = np.arctan2(y - 0.5 * size, x - 0.67 * size)
     field = planar_pixel_field((plus - minus) / degree + 0.3, degree)
-    return field, look_noise(field, LOOK)
+    return field, look_noise(field, pixel_look(LOOK))
 
 
 def compose_lic(method: str, degree: int, look: Look = LOOK, size: int = SIZE) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.flow import NO_DRIFT, Drift, drift_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.gpu.renderer import GpuRenderer
 from rosy_addon.gpu.resources import DrawItem
@@ -64,9 +64,15 @@ def open_device() -> Any:
         )
 
 
-def draw_texture(renderer: GpuRenderer, items: Sequence[DrawItem], camera: Any, look: Any) -> Any:
+def draw_texture(
+    renderer: GpuRenderer,
+    items: Sequence[DrawItem],
+    camera: Any,
+    look: Any,
+    drift: Drift = NO_DRIFT,
+) -> Any:
     """Draw a picture and leave it on the card."""
-    return run(renderer.texture_steps(items, ViewInput((), camera, look)))
+    return run(renderer.texture_steps(items, ViewInput((), camera, look, drift=drift)))
 
 
 def frame_times(
@@ -83,7 +89,7 @@ def frame_times(
         timer = device.context.query(time=True)
         start = time.perf_counter()
         with timer:
-            draw_texture(renderer, items, camera, flow_at(look, number))
+            draw_texture(renderer, items, camera, look, drift_at(look, number))
         device.finish()
         number += 1
         return time.perf_counter() - start, timer.elapsed * 1e-9

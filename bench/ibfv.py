@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from rosy_addon.compositor.compose import compose
-from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.flow import drift_at
 from rosy_addon.core.cache import Cache
 from rosy_addon.projection.gbuffer import GBuffer
 from rosy_addon.projection.project import project
@@ -43,7 +43,7 @@ def _next_frame(gbuffer: GBuffer, method: str) -> Callable[[], object]:
     look, cache, numbers = replace(cases.LOOK, method=method, flow=1.0), Cache(), itertools.count()
 
     def draw() -> None:
-        compose(gbuffer, flow_at(look, next(numbers)), cache=cache)
+        compose(gbuffer, look, cache=cache, drift=drift_at(look, next(numbers)))
         cache.evict_unused()
 
     return draw

@@ -19,6 +19,7 @@ from scipy import ndimage
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.pixel_field import PixelField, nearest_member, surface_pixel_field
 from rosy_addon.field.field_io import load_field
 from rosy_addon.field.generate import axis_field, generate
@@ -100,7 +101,7 @@ def _measure_fields(pixel_fields: Sequence[PixelField], look: Look) -> Measureme
     repeated = pixel_fields * len(SEEDS) if len(pixel_fields) == 1 else pixel_fields
     measurements = []
     for seed, field in zip(SEEDS, repeated, strict=True):
-        noise = look_noise(field, replace(look, seed=seed))
+        noise = look_noise(field, pixel_look(replace(look, seed=seed)))
         measurements.append(_measure_images(field, lic(field, look, noise)))
     names = [entry.name for entry in fields(Measurements)]
     means = [np.mean([getattr(each, name) for each in measurements], axis=0) for name in names]
@@ -155,7 +156,7 @@ def _seen(surface: Surface, field: RosyField) -> PixelField:
     """Return a field as a camera sees it."""
     camera = orbit_camera(surface.vertices, 30, 25, cases.SIZE, cases.SIZE, margin=0.02)
     gbuffer = project([MeshInstance(surface, np.eye(4), field)], camera)
-    return surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle, False)
+    return surface_pixel_field(gbuffer, field.degree, cases.LOOK.crease_angle)
 
 
 def _fields(data: Path | None) -> dict[str, Callable[[], list[PixelField]]]:

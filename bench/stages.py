@@ -9,6 +9,7 @@ from harness.planar import lic
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.lic import look_noise
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import diffuse
 from rosy_addon.core.cache import Cache
@@ -36,8 +37,8 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
     look, camera, instance = cases.LOOK, cases.camera(), cases.instance(triangles, DEGREE)
     cache = Cache()
     gbuffer = project([instance], camera, look.display, cache)
-    field = surface_pixel_field(gbuffer, DEGREE, look.crease_angle, look.cross_creases)
-    noise = look_noise(field, look)
+    field = surface_pixel_field(gbuffer, DEGREE, look.crease_angle)
+    noise = look_noise(field, pixel_look(look))
     points = np.column_stack([instance.surface.vertices, np.ones(len(instance.surface.vertices))])
     clip = points @ (camera.projection @ camera.view).T
     triangle = instance.surface.triangle_vertex
@@ -48,11 +49,9 @@ def _stages(triangles: int) -> dict[str, Callable[[], object]]:
         "project": lambda: project([instance], camera, look.display, cache),
         "  of which rasterize": lambda: rasterize(clip, triangle, camera.width, camera.height),
         "compose": lambda: compose(gbuffer, look),
-        "  of which neighbor links": lambda: neighbor_masks(
-            gbuffer, look.crease_angle, look.cross_creases
-        ),
+        "  of which neighbor links": lambda: neighbor_masks(gbuffer, look.crease_angle),
         "  of which directions on screen": lambda: screen_jacobians(gbuffer),
-        "  of which noise": lambda: look_noise(field, look),
+        "  of which noise": lambda: look_noise(field, pixel_look(look)),
         "  of which streamlines": lambda: lic(field, look, noise),
         "  of which shading": lambda: diffuse(gbuffer, look, ()),
     }

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compositor.flow import flow_at
+from ..compositor.flow import drift_at
 from ..compositor.look import Look, magnitude_range, uses_magnitude
 from ..core.cache import Cache
 from ..core.errors import RosyError, counted
@@ -245,8 +245,8 @@ class Film:
                 vectors = vectors_on_rest_shape(surface, rest, field.vectors)
                 field = replace(field, vectors=vectors, source_directions=None)
                 surface = surface.with_parts(rest_vertices=rest)
-            frame_look = flow_at(look, number, loop_frames)
-            yield ViewInput((mesh_instance(surface, field),), camera, frame_look)
+            instance, drift = mesh_instance(surface, field), drift_at(look, number, loop_frames)
+            yield ViewInput((instance,), camera, look, drift=drift)
 
     def _moments(self) -> Iterator[tuple[Surface, RosyField]]:
         """Yield the meshes and fields of the pictures."""
@@ -334,9 +334,9 @@ def _mean_turn(first: Field, second: Field) -> float:
 
 def _steady_between(turn: float, look: Look) -> int:
     """Return how many pictures between two fields keep streaks steady."""
-    if look.unit != "pixels":
+    if look.unit_size:
         return 0
-    steady = STEADY_TURN * look.grain / (look.length * look.step)
+    steady = STEADY_TURN * look.line_width / look.length
     return min(max(int(np.ceil(turn / steady - 1e-9)) - 1, 0), MAX_BETWEEN)
 
 

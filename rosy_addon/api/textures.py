@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..compositor.flow import Drift
 from ..compositor.look import Look, is_hatched
 from ..compositor.picture import Picture
 from ..compositor.shading import Light
@@ -108,6 +109,7 @@ def texture(
     udim: bool = False,
     light_direction: ArrayLike | None = None,
     content: str = "look",
+    flow_phase: float = 0.0,
     preset: str | os.PathLike[str] | None = None,
     color_values: str | ArrayLike | None = None,
     **settings: Any,
@@ -138,15 +140,16 @@ def texture(
         What the texture shows: the picture of the look, or the direction of the field, near to the
         `guiding_angle`. Red and green are its components, from -1 to 1: along tangent and bitangent in an
         anisotropy map of glTF, along u and v in a flow map. Blue is 1, and 0 where the field is undefined.
+    flow_phase : float
+        Where the streaks of a look with `flow` are in the cycle in which they drift and fade, 0 to 1.
     preset : str or path-like, optional
         Name of a preset, or a ``.json`` file; see `list_presets`.
     color_values : str or (F,), (V,) or (C,) array_like, optional
         Numbers that the hue of the streaks shows; see `render`. Hatching shows none.
     **settings
-        Settings of the look, after the preset: ``grain=3, seed=3``. Lengths in
-        pixels refer to a square with the area of the surface and 1024 pixels on each side, independent of
-        the size of the texture. With
-        ``unit="world", unit_size=0.002`` it is that many units of length.
+        Settings of the look, after the preset: ``line_width=3, seed=3``. Lengths in pixels refer to a
+        square with the area of the surface and 1024 pixels on each side, independent of the size of the
+        texture. With ``unit_size=0.002``, a pixel is that many units of length.
 
     Returns
     -------
@@ -178,6 +181,8 @@ def texture(
     check_texture_size(size, margin)
     if content not in CONTENTS:
         raise RosyError(f"content must be one of {', '.join(CONTENTS)}, not '{content}'")
+    if not 0 <= flow_phase <= 1:
+        raise RosyError(f"flow_phase must be a number from 0 to 1, not {flow_phase}")
     uv = uv_map(surface)
     instance = upright_instance(surface, field, None, corner_numbers(surface, color_values))
     drawn = draw_texture(
@@ -188,6 +193,7 @@ def texture(
         margin=margin,
         is_udim=udim,
         content=content,
+        drift=Drift(flow_phase),
         lights=None if light_direction is None else [_lamp(light_direction, instance)],
     )
     warn(drawn.overlap_note(surface.name))

@@ -18,8 +18,7 @@ from .contrast import blend_gain, scale_contrast, supersampling_gain
 from .covering import scatter_rows
 from .even_lines import EvenLines
 from .family_hues import family_hues
-from .filter_kernel import look_for_symmetry
-from .flow import with_cycle_distance
+from .flow import NO_DRIFT, Drift
 from .hatching import (
     LineModulation,
     has_breaks,
@@ -40,7 +39,7 @@ from .lic_images import (
     with_magnitude_range,
 )
 from .look import Look, colors_magnitude, colors_values, is_even, is_hatched
-from .look_units import look_in_pixels, supersampled_look
+from .look_units import PixelLook, pixel_look
 from .paper_grain import PAPER_GRAIN_CHANNELS, picture_paper_grain
 from .picture import Picture, common_color_range
 from .pixel_field import PixelField, entries_of_rows
@@ -68,6 +67,7 @@ def compose(
     mesh_cache: Cache | None = None,
     strips: Sequence[Strip] | None = None,
     draws_thresholds: bool = False,
+    drift: Drift = NO_DRIFT,
 ) -> Picture:
     """Draw the fields of a G-buffer.
 
@@ -77,7 +77,7 @@ def compose(
         Its resolution is that of the picture times `look.supersampling`, in both directions; or that
         of the picture, if it has a `coverage`.
     look : Look
-        Its lengths are in pixels of the picture or in Blender units, not in pixels of the G-buffer.
+        As the user set it.
     lights : sequence of Light
         Lights of the scene in the space of the camera. Used if the light of the look is "scene".
     reference : ReferenceRender, optional
@@ -93,6 +93,8 @@ def compose(
     draws_thresholds : bool
         Whether the picture has the thresholds of its ink (`ink_thresholds`), if the look has ink. They do
         not depend on the tone.
+    drift : Drift
+        How far streaks have drifted.
 
     Returns
     -------
@@ -106,48 +108,60 @@ def compose(
         If the source of the tone or of the colors does not exist; see `target_tone.check_tone` and
         `color_values.check_color_values`.
     """
-    camera = gbuffer.camera
-    if gbuffer.coverage is not None:
-        look = replace(look, supersampling=1)
-    if look.supersampling > 1:
+    camera, instances = gbuffer.camera, gbuffer.instances
+    is_antialiased = gbuffer.coverage is not None
+    supersampling = 1 if is_antialiased else look.supersampling
+    if supersampling > 1:
         strips = [Strip(0, camera.height, camera.height)]
     elif strips is None:
-        strips = divide_into_strips(look, camera, gbuffer.instances)
-    look = with_cycle_distance(look_in_pixels(look, camera, gbuffer.instances))
-    pixel_look = replace(supersampled_look(look), antialiased=gbuffer.coverage is not None)
+        strips = divide_into_strips(look, camera, instances)
     draws_thresholds = draws_thresholds and is_hatched(look)
     if draws_thresholds:
-        pixel_look = sharp_look(pixel_look)
+        look = sharp_look(look)
+    frame_look = pixel_look(look, camera, instances, supersampling, drift, is_antialiased)
     cache = Cache() if cache is None else cache
     stages = ComposeStages(gbuffer, cache, cache if mesh_cache is None else mesh_cache)
     with progress(0.0, SHARED_SHARE):
         with progress(0.0, 0.2):
-            canvas = _Canvas(gbuffer, look, lights, reference, cache, draws_thresholds)
+            canvas = _Canvas(gbuffer, frame_look, lights, reference, cache, draws_thresholds)
         layers = []
         for number, degree in enumerate(canvas.degrees):
             with progress(0.2 + 0.8 * number / len(canvas.degrees), 1.0):
-                layers.append(_prepared(stages, canvas, degree, pixel_look))
-    pictures = []
+                layers.append(_prepare_layer(stages, canvas, degree, frame_look))
     with progress(SHARED_SHARE, 1.0):
-        for number, strip in enumerate(strips):
-            for index, layer in enumerate(layers):
-                start = (number + index / len(layers)) / len(strips)
-                with progress(start, start + 0.95 / (len(layers) * len(strips))):
-                    _draw_layer(stages, canvas, layer, strip)
-            with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
-                pictures.append(canvas.picture(strip))
-    rgba, spread = (join_strips(images, strips) for images in zip(*pictures, strict=True))
-    color_range = common_color_range({layer.look.color_range for layer in layers})
-    if not colors_magnitude(look):
-        color_range = None
-    if canvas.map_position is not None:
-        color_range = value_ends(look, value_ranges(gbuffer.instances))
+        rgba, spread = _draw_strips(stages, canvas, layers, strips)
     return Picture(
         rgba,
         spread[..., 0] if draws_thresholds else None,
-        color_range,
+        _color_range(gbuffer, look, layers, canvas),
         line_count=max((layer.field.line_count for layer in layers), default=0),
     )
+
+
+def _draw_strips(
+    stages: ComposeStages, canvas: _Canvas, layers: Sequence[_Layer], strips: Sequence[Strip]
+) -> list[np.ndarray]:
+    """Draw all layers, strip by strip. Return the picture, and the spread of its thresholds."""
+    pictures = []
+    for number, strip in enumerate(strips):
+        for index, layer in enumerate(layers):
+            start = (number + index / len(layers)) / len(strips)
+            with progress(start, start + 0.95 / (len(layers) * len(strips))):
+                _draw_layer(stages, canvas, layer, strip)
+        with progress((number + 0.95) / len(strips), (number + 1) / len(strips)):
+            pictures.append(canvas.picture(strip))
+    return [join_strips(images, strips) for images in zip(*pictures, strict=True)]
+
+
+def _color_range(
+    gbuffer: GBuffer, look: Look, layers: Sequence[_Layer], canvas: _Canvas
+) -> tuple[float, float] | None:
+    """Return the values at the ends of the color map; None if it shows none, or none that are common."""
+    if canvas.map_position is not None:
+        return value_ends(look, value_ranges(gbuffer.instances))
+    if colors_magnitude(look):
+        return common_color_range({layer.look.color_range for layer in layers})
+    return None
 
 
 class _Canvas:
@@ -155,8 +169,7 @@ class _Canvas:
 
     Attributes
     ----------
-    look : Look
-        In pixels of the G-buffer.
+    look : PixelLook
     degrees : list of int
         Of the visible fields.
     tone_rgb : (P, 3) or (P, 1) float32 ndarray
@@ -172,7 +185,7 @@ class _Canvas:
     def __init__(
         self,
         gbuffer: GBuffer,
-        look: Look,
+        look: PixelLook,
         lights: Sequence[Light],
         reference: ReferenceRender | None,
         cache: Cache,
@@ -183,10 +196,10 @@ class _Canvas:
         self.look, self.draws_thresholds = look, draws_thresholds
         visible = np.flatnonzero(np.bincount(gbuffer.instance_id)).tolist()
         self.degrees = sorted({gbuffer.instance_degrees[index] for index in visible})
-        self.tone_rgb = target_tone(gbuffer, look, lights, reference, cache)
+        self.tone_rgb = target_tone(gbuffer, look.look, lights, reference, cache)
         self.map_position = None
         if colors_values(look) and not draws_thresholds:
-            self.map_position = map_positions(gbuffer, look)
+            self.map_position = map_positions(gbuffer, look.look)
         self.color = np.zeros((count, 3), dtype=np.float32)
         self.alpha = np.ones(count, dtype=np.float32)
         self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
@@ -260,8 +273,8 @@ class _Layer(NamedTuple):
     Attributes
     ----------
     field : PixelField
-    look : Look
-        In pixels of the G-buffer, for the symmetry of the field and the range of its magnitudes.
+    look : PixelLook
+        For the symmetry of the field and the range of its magnitudes.
     modulation : LineModulation
         Without what depends on the strip.
     tone : (P,) float32 ndarray or None
@@ -269,17 +282,17 @@ class _Layer(NamedTuple):
     """
 
     field: PixelField
-    look: Look
+    look: PixelLook
     modulation: LineModulation
     tone: np.ndarray | None = None
 
 
-def _prepared(stages: ComposeStages, canvas: _Canvas, degree: int, pixel_look: Look) -> _Layer:
+def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
     """Compute what the strips of the fields of one degree share."""
     report(0.0, "finding directions")
     with progress(0.0, 0.3):
-        field = stages.pixel_field(degree, pixel_look)
-    look = look_for_symmetry(pixel_look, field.symmetry)
+        field = stages.pixel_field(degree, look)
+    look = look.for_symmetry(field.symmetry)
     even_lines = paper_grain = outline = None
     if is_even(look):
         with progress(0.3, 0.6):
@@ -342,36 +355,30 @@ def _line_images(
     stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
 ) -> tuple[LicImages, LicImages | None]:
     """Return the images of the lines at the pixels of a strip, and those of their breaks if they have any."""
-    looks = [layer.look] if even_lines is None else []
-    if has_breaks(layer.look):
-        looks.append(replace(layer.look, length=break_steps(layer.look)))
+    look, is_broken = layer.look, has_breaks(layer.look)
+    looks = [look] if even_lines is None else []
+    if is_broken:
+        looks.append(look.with_length(break_steps(look)))
     images = stages.lic(layer.field, looks, strip) if looks else []
-    if even_lines is not None:
-        # Even lines stand for streaks.
-        members = even_lines.streaks[..., None]
-        images = [lic_images(members, np.ones(members.shape[1], dtype=np.float32)), *images]
-    return images[0], images[1] if has_breaks(layer.look) else None
+    break_images = images[-1] if is_broken else None
+    if even_lines is None:
+        return images[0], break_images
+    # Even lines stand for streaks.
+    members = even_lines.streaks[..., None]
+    return lic_images(members, np.ones(members.shape[1], dtype=np.float32)), break_images
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     """(M, n) means of the tones along lines, over the overshoot distance in each direction."""
-    # Weights that fall exponentially would reach too far.
-    method = "sheets" if layer.look.method == "ibfv" else layer.look.method
-    look = replace(
-        layer.look,
-        method=method,
-        length=overshoot_steps(layer.look),
-        taper=False,
-        oriented=False,
-        flow=0.0,
-        antialiased=False,
-    )
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.
     channels = np.ones((len(layer.tone), 3), dtype=np.float32)
     channels[:, 0] = layer.tone
-    (images,) = lic_lengths(layer.field, [look], channels, strip)
+    look = layer.look.for_means(overshoot_steps(layer.look))
+    # The weights of the method "ibfv" fall exponentially: they would reach too far.
+    method = "sheets" if look.method == "ibfv" else look.method
+    (images,) = lic_lengths(layer.field, [look], channels, strip, method)
     means = np.empty(images.members.shape[:2], dtype=np.float32)
     for block in reported_blocks(means.shape[1], "finding tones", 1.0, 1.0):
         centered = images.members[:, block] - np.float32(NOISE_MEAN)
@@ -381,13 +388,13 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
     return np.clip(means, 0, 1, out=means)
 
 
-def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.ndarray:
+def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> np.ndarray:
     """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     if look.anchor == "picture":
         subpixels = look.supersampling
-        grain = look.grain / subpixels
+        line_width = look.line_width / subpixels
         return picture_paper_grain(
-            field.pixel, field.width, grain, look.seed, subpixels, field.line_count
+            field.pixel, field.width, line_width, look.seed, subpixels, field.line_count
         )
     noise = stages.surface_paper_grain(field, look)
     report(1.0, "drawing the paper grain")
@@ -399,7 +406,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: Look) -> np.nda
     return heights
 
 
-def streak_tone(field: PixelField, look: Look, images: LicImages) -> np.ndarray:
+def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:
     """Correct the contrast of blended images: that of one image, times the gain of the look.
 
     Returns
@@ -416,7 +423,7 @@ def streak_tone(field: PixelField, look: Look, images: LicImages) -> np.ndarray:
     return tone
 
 
-def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: Look) -> np.ndarray:
+def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:
     """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
 
     (P, K) `tone` is that of `streak_tone`. Pixels without a number are gray.

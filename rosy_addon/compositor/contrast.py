@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .filter_kernel import full_sample_count, kernel_of
+from .filter_kernel import full_sample_count
 from .image_noise import NOISE_MEAN, streak_moments
-from .look import Look
+from .look_units import PixelLook
 
 
-def normalize_variance(mean: np.ndarray, effective_samples: np.ndarray, look: Look) -> np.ndarray:
+def normalize_variance(
+    mean: np.ndarray, effective_samples: np.ndarray, look: PixelLook
+) -> np.ndarray:
     """Scale averages over streamlines that ended early to the variance of full streamlines.
 
     The mean of n samples has full / n times the variance of the mean of all samples. Without this
@@ -22,20 +24,20 @@ def normalize_variance(mean: np.ndarray, effective_samples: np.ndarray, look: Lo
         Mean noise along each streamline.
     effective_samples : (P,) float32 ndarray
         n, at least 1.
-    look : Look
-        In pixels of the frame. Its `length`, `step`, `grain` and kernel are used.
+    look : PixelLook
+        Its `length`, `line_width` and kernel are used.
 
     Returns
     -------
     (P, K) float32 ndarray
     """
-    full_samples = np.float32(full_sample_count(look))
-    cells = effective_samples * np.float32(look.step / look.grain)
+    full_samples = np.float32(full_sample_count(look.length, look.kernel))
+    cells = effective_samples * np.float32(1 / look.line_width)
     factor = np.sqrt(effective_samples / full_samples) * np.minimum(cells / 2, 1)
     return NOISE_MEAN + (mean - NOISE_MEAN) * factor[:, None]
 
 
-def blend_gain(image_count: int, effective_samples: np.ndarray, look: Look) -> np.ndarray:
+def blend_gain(image_count: int, effective_samples: np.ndarray, look: PixelLook) -> np.ndarray:
     """Compute the factor that gives the mean of M member images the standard deviation of one.
 
     It is about sqrt(M). Equation 6 of the paper assumes that the M values at a pixel are
@@ -51,48 +53,48 @@ def blend_gain(image_count: int, effective_samples: np.ndarray, look: Look) -> n
         M.
     effective_samples : (P,) float32 ndarray
         Effective samples of a streamline, mean over the M lines of a pixel.
-    look : Look
-        In pixels of the frame. Its `length`, `step`, `grain`, `high_pass` and kernel are used.
+    look : PixelLook
+        Its `length`, `line_width`, `high_pass` and kernel are used.
 
     Returns
     -------
     (P,) float32 ndarray
         sqrt(M / (1 + r)), from 1 to sqrt(M).
     """
-    _, correlation_sum = streak_moments(*streak_args(look), image_count, kernel=kernel_of(look))
+    _, correlation_sum = streak_moments(*streak_args(look), image_count, kernel=look.kernel)
     pixel_correlation = np.clip(
-        correlation_sum * full_sample_count(look) / effective_samples, 0, image_count - 1
+        correlation_sum * full_sample_count(look.length, look.kernel) / effective_samples,
+        0,
+        image_count - 1,
     )
     return np.sqrt(image_count / (1 + pixel_correlation)).astype(np.float32)
 
 
-def supersampling_gain(look: Look) -> float:
+def supersampling_gain(look: PixelLook) -> float:
     """Compute the factor that gives supersampled streaks the contrast without supersampling.
 
     Parameters
     ----------
-    look : Look
-        In pixels of the supersampled frame.
+    look : PixelLook
+        Of the supersampled frame.
     """
     subpixels = look.supersampling
     supersampled_args = streak_args(look)
-    supersampled_std, _ = streak_moments(
-        *supersampled_args, average=subpixels, kernel=kernel_of(look)
-    )
+    supersampled_std, _ = streak_moments(*supersampled_args, average=subpixels, kernel=look.kernel)
     direct_std, _ = streak_moments(
-        *(length / subpixels for length in supersampled_args), kernel=kernel_of(look)
+        *(length / subpixels for length in supersampled_args), kernel=look.kernel
     )
     return direct_std / supersampled_std
 
 
-def expected_std(look: Look) -> float:
+def expected_std(look: PixelLook) -> float:
     """Compute the theoretical standard deviation of one member image, with full streamlines."""
-    return streak_moments(*streak_args(look), kernel=kernel_of(look))[0]
+    return streak_moments(*streak_args(look), kernel=look.kernel)[0]
 
 
-def streak_args(look: Look) -> tuple[float, float, float]:
-    """Length of the streamlines, and grain and high-pass width of the noise, in pixels."""
-    return (2 * look.length + 1) * look.step, look.grain, look.high_pass
+def streak_args(look: PixelLook) -> tuple[float, float, float]:
+    """Length of the streamlines, size of cells and high-pass width of the noise, in pixels."""
+    return 2 * look.length + 1, look.line_width, look.high_pass
 
 
 def scale_contrast(tone: np.ndarray, gain: np.ndarray | float) -> np.ndarray:

@@ -30,7 +30,7 @@ from ..core.deterministic_trig import cos_sin, vector_angle
 from ..core.progress import report
 from ..field.directional_field import evaluate_harmonics
 from .flow import forward_share
-from .look import Look
+from .look_units import PixelLook
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
 from .reported_blocks import reported_blocks
 
@@ -231,15 +231,15 @@ def member_lines(field: PixelField) -> np.ndarray:
     )
 
 
-def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering:
+def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Covering:
     """Build the covering of a pixel field. Sheet 0 is the member nearest to the guiding angle.
 
     Parameters
     ----------
     field : PixelField
         At least one pixel.
-    look : Look
-        In pixels of the frame. Its `step`, `guiding_angle` and `foreshorten` are used.
+    look : PixelLook
+        Its `guiding_angle` and `is_on_surface` are used.
     noise : (P, K) float32 ndarray
 
     Returns
@@ -255,7 +255,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
     cell_noise = np.zeros((cell_count, channels), dtype=np.float32)
     cell_noise[cell_of_pixel] = noise
     max_noise = max(float(np.abs(noise).max()), 1e-30)
-    max_slope = 2 * max_noise / (SHORT_STEP if look.foreshorten else 1.0)
+    max_slope = 2 * max_noise / (SHORT_STEP if look.is_on_surface else 1.0)
     quantize = [
         np.float32(INT16_MAX),
         np.float32(INT16_MAX / max_noise),
@@ -275,9 +275,9 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         for sheet in range(line_count):
             angle = look.guiding_angle + 2 * np.pi * sheet / per_turn
             direction = _apply_harmonics(field, block, *_rotate(x, y, angle))
-            step_x, step_y = _to_screen(field, block, *direction, look.foreshorten)
+            step_x, step_y = _to_screen(field, block, *direction, look.is_on_surface)
             slope_x, slope_y = step_x, step_y
-            if look.foreshorten:
+            if look.is_on_surface:
                 # Steps are at most one row or one column of pixels.
                 scale = 1 / np.maximum(np.maximum(np.abs(step_x), np.abs(step_y)), np.float32(1))
                 step_x, step_y = step_x * scale, step_y * scale
@@ -304,7 +304,7 @@ def build_covering(field: PixelField, look: Look, noise: np.ndarray) -> Covering
         packed_phase=packed_phase,
         state_table=state_table.reshape(-1, state_table.shape[2]),
         state_scales=(
-            look.step / INT16_MAX,
+            1 / INT16_MAX,
             max_noise / INT16_MAX,
             max_slope / INT16_MAX,
         ),

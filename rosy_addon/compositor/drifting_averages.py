@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from .filter_kernel import Kernel, kernel_of, kernel_weights, sample_weights
-from .flow import MAX_AXIAL_STEPS, channel_shifts, channel_weights, streamline_reach
-from .look import Look
+from .filter_kernel import Kernel, kernel_weights, sample_weights
+from .flow import MAX_AXIAL_STEPS, channel_shifts, channel_weights
+from .look_units import PixelLook
 
 #: Effective samples of a streamline that ends before its kernels begin. It is gray.
 MIN_EFFECTIVE_SAMPLES = 1e-3
@@ -28,8 +28,8 @@ class MovingKernel:
 
     Parameters
     ----------
-    look : Look
-        In pixels of the frame, with flow.
+    look : PixelLook
+        With flow.
     levels : int
         Of the lengths of streamlines, if they depend on the magnitude.
 
@@ -49,10 +49,11 @@ class MovingKernel:
         `filter_kernel.KernelWeights.effective_samples` of the kernels at rest.
     """
 
-    def __init__(self, look: Look, levels: int = 1) -> None:
-        self.length, self.kind = look.length, kernel_of(look)
-        self.shifts, self.weights = channel_shifts(look), channel_weights(look.flow_phase)
-        self.reach = streamline_reach(look)
+    def __init__(self, look: PixelLook, levels: int = 1) -> None:
+        self.length, self.kind = look.length, look.kernel
+        self.shifts = channel_shifts(look.flow_phase, look.flow_distance)
+        self.weights = channel_weights(look.flow_phase)
+        self.reach = look.streamline_reach()
         position = np.arange(-self.reach, self.reach + 1)
         self.energies = np.zeros((3, levels, len(position) + 1))
         self.full_samples = np.empty(levels)

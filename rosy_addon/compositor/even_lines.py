@@ -26,16 +26,12 @@ from ..field.frames import transform_components
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_values import view_plane_rotation
 from ..projection.surface_lines import SurfaceLines, cached_surface_lines
-from .look import Look
-from .look_units import instance_line_spacing
+from .look_units import PixelLook, instance_line_spacing
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .reported_blocks import reported_blocks
 from .streak_statistics import COVERAGE_STEPS, break_amount, smoothstep
 from .wobble import WOBBLE_STD
-
-#: Distance between lines, in widths of a line (`Look.grain`). At half coverage, lines are that wide.
-SPACING_GRAINS = 2.0
 
 #: Distances between lines on screen, in pixels of the picture, over which lines fade in.
 FADE_PIXELS = (1.3, 2.6)
@@ -93,7 +89,7 @@ class EvenLines:
         coarse = None if self.coarse_streaks is None else self.coarse_streaks[:, extent]
         return EvenLines(self.streaks[:, extent], self.period[:, extent], growth, coarse)
 
-    def coverage(self, line: int, target_coverage: np.ndarray, look: Look) -> np.ndarray:
+    def coverage(self, line: int, target_coverage: np.ndarray, look: PixelLook) -> np.ndarray:
         """Compute the coverage of each pixel by one line.
 
         Parameters
@@ -101,8 +97,8 @@ class EvenLines:
         line : int
         target_coverage : (P,) ndarray
             Width of the line as a fraction of the distance between lines, 0 to 1.
-        look : Look
-            In pixels of the frame. Its `crispness` and `supersampling` are used.
+        look : PixelLook
+            Its `crispness` and `supersampling` are used.
 
         Returns
         -------
@@ -127,7 +123,7 @@ class EvenLines:
         streak: np.ndarray,
         period: np.ndarray,
         width: np.ndarray,
-        look: Look,
+        look: PixelLook,
         pixels: np.ndarray | slice = slice(None),
     ) -> np.ndarray:
         """(n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
@@ -142,14 +138,14 @@ class EvenLines:
             covered += _box_filtered(np.float32(0.5) - position, between, edge)
         return resolved_share(period, look.supersampling) * (covered - width)
 
-    def crowding(self, line: int, look: Look) -> np.ndarray:
+    def crowding(self, line: int, look: PixelLook) -> np.ndarray:
         """Compute how much one line is crowded.
 
         Parameters
         ----------
         line : int
-        look : Look
-            In pixels of the frame. Its `grain` is used.
+        look : PixelLook
+            Its `line_distance` is used.
 
         Returns
         -------
@@ -174,10 +170,10 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
     return smoothstep((period - low) / (high - low))
 
 
-def crowded_pixels(look: Look) -> tuple[float, float]:
+def crowded_pixels(look: PixelLook) -> tuple[float, float]:
     """`CROWDED_SHARES` as distances in pixels of the frame."""
     low, high = CROWDED_SHARES
-    return low * SPACING_GRAINS * look.grain, high * SPACING_GRAINS * look.grain
+    return low * look.line_distance, high * look.line_distance
 
 
 def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:
@@ -203,7 +199,7 @@ def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> 
 
 def uneven_width(
     target_coverage: np.ndarray,
-    look: Look,
+    look: PixelLook,
     break_streak: np.ndarray | None,
     paper_grain: np.ndarray | None,
 ) -> np.ndarray:
@@ -213,7 +209,7 @@ def uneven_width(
     ----------
     target_coverage : (P,) ndarray
         Mean width, as a fraction of the distance between lines.
-    look : Look
+    look : PixelLook
     break_streak, paper_grain : (P,) ndarray or None
         With mean 0 and standard deviation 1; see `hatching.line_coverage`.
 
@@ -235,7 +231,7 @@ def uneven_width(
     return np.clip(width, 0, 1)
 
 
-def look_width_table(look: Look) -> np.ndarray:
+def look_width_table(look: PixelLook) -> np.ndarray:
     """(COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
     return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
@@ -269,7 +265,7 @@ def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> 
 def even_lines(
     gbuffer: GBuffer,
     field: PixelField,
-    look: Look,
+    look: PixelLook,
     wobble_angle: np.ndarray | None = None,
     cache: Cache | None = None,
 ) -> EvenLines:
@@ -281,8 +277,7 @@ def even_lines(
         With its mesh instances.
     field : PixelField
         Of one degree, from `gbuffer`.
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
     wobble_angle : (P,) float32 ndarray, optional
         Of the pixels of the field, from `wobble.wobble_angle`.
     cache : Cache, optional
@@ -322,7 +317,7 @@ class _InstanceLines:
         self,
         gbuffer: GBuffer,
         field: PixelField,
-        look: Look,
+        look: PixelLook,
         instance: MeshInstance,
         wobble_angle: np.ndarray | None,
         cache: Cache | None,
@@ -330,7 +325,7 @@ class _InstanceLines:
         self._gbuffer, self._field, self._look = gbuffer, field, look
         self._instance, self._wobble_angle, self._cache = instance, wobble_angle, cache
         #: Distance between lines on the surface, in Blender units.
-        self._spacing = instance_line_spacing(look, SPACING_GRAINS, gbuffer.camera, instance)
+        self._spacing = instance_line_spacing(look, gbuffer.camera, instance)
         # The sides of triangles from corner 0 to corners 1 and 2, in camera space.
         matrix = gbuffer.camera.view @ np.asarray(instance.matrix, dtype=np.float64)
         surface = instance.surface
@@ -404,14 +399,14 @@ class _InstanceLines:
         relative = members[0] * heading.conj()
         turn = vector_angle(relative.real, relative.imag) * np.float32(field.degree / (2 * np.pi))
         first_direction = step * np.rint(turn).astype(np.int32)
-        asked_pixels = np.float32(SPACING_GRAINS * look.grain)
+        asked_pixels = np.float32(look.line_distance)
         # Distance between lines on screen, relative to the one asked for.
-        unit = self._spacing / (SPACING_GRAINS * look.grain)
+        unit = self._spacing / look.line_distance
         scale = np.full(len(entries), unit * gbuffer.camera.pixels_per_unit, dtype=np.float32)
         if gbuffer.camera.is_perspective:
             scale /= -gbuffer.position[entries, 2]
         octaves = None
-        if look.unit == "pixels":
+        if not look.pixel_size:
             octaves = np.maximum(np.log2(np.maximum(scale, np.float32(1e-9))), 0)
         across = (field.screen_jacobian[:, 0].conj() * field.screen_jacobian[:, 1]).imag
         defined = (field.representation != 0) & (heading != 0)

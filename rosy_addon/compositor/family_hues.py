@@ -15,7 +15,7 @@ import numpy as np
 
 from .contrast import expected_std
 from .lic_images import LicImages
-from .look import Look
+from .look_units import PixelLook
 from .pixel_field import PixelField, all_members
 
 #: Sharpness of the softmax over the member images, per standard deviation of the streaks.
@@ -43,7 +43,7 @@ PALETTE = np.array(
 )
 
 
-def family_hues(field: PixelField, images: LicImages, look: Look) -> np.ndarray | None:
+def family_hues(field: PixelField, images: LicImages, look: PixelLook) -> np.ndarray | None:
     """Compute the color of each pixel from the families whose streaks are bright there.
 
     Parameters
@@ -51,8 +51,7 @@ def family_hues(field: PixelField, images: LicImages, look: Look) -> np.ndarray 
     field : PixelField
     images : LicImages
         Member images in the order of `all_members(field, look.guiding_angle)`.
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
 
     Returns
     -------
@@ -70,13 +69,13 @@ def family_hues(field: PixelField, images: LicImages, look: Look) -> np.ndarray 
     return total / weights.sum(axis=0)[:, None]
 
 
-def line_families(field: PixelField, look: Look) -> list[np.ndarray] | None:
+def line_families(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the family of each line at each pixel.
 
     Parameters
     ----------
     field : PixelField
-    look : Look
+    look : PixelLook
         Its `guiding_angle` determines the order of the lines.
 
     Returns

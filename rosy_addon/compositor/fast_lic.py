@@ -29,10 +29,10 @@ from .covering import (
     scatter_rows,
 )
 from .filter_kernel import full_sample_count
-from .flow import blend_channels, streamline_reach
+from .flow import blend_channels
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
-from .look import Look, has_flow, is_hatched
+from .look import has_flow, is_hatched
 from .look_units import PixelLook
 from .pixel_field import PixelField, entries_of_rows
 from .reported_blocks import reported_blocks
@@ -77,15 +77,15 @@ CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
 
 def fast_lic(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
+    field: PixelField, looks: Sequence[PixelLook], noise: np.ndarray, strip: Strip | None = None
 ) -> list[LicImages]:
     """Compute one LIC image for each of the M lines, for each of several lengths, with the same streamlines.
 
     Parameters
     ----------
     field : PixelField
-    looks : sequence of Look
-        In pixels of the frame. They differ in the `length` of streamlines. The first is the longest.
+    looks : sequence of PixelLook
+        They differ in the `length` of streamlines. The first is the longest.
     noise : (P, K) float32 ndarray
     strip : Strip, optional
         The rows of the images, if not all.
@@ -116,7 +116,7 @@ def fast_lic(
 
 
 def _line_averages(
-    field: PixelField, extent: slice, drawn: slice, looks: Sequence[Look], noise: np.ndarray
+    field: PixelField, extent: slice, drawn: slice, looks: Sequence[PixelLook], noise: np.ndarray
 ) -> list[tuple[np.ndarray, np.ndarray | None]]:
     """Compute the averages of the lines at the pixels `drawn`, along streamlines in `extent`, for each look.
 
@@ -143,7 +143,7 @@ def _line_averages(
     undefined = field.representation == 0
     own_noise = noise[undefined]
     if has_flow(looks[0]):
-        own_noise = blend_channels(own_noise, looks[0])
+        own_noise = blend_channels(own_noise, looks[0].flow_phase)
     for table in tables:
         table.init_undefined(covering.cell_of_pixel[undefined], own_noise)
     cell_limits = [_pixels_to_cells(limit, extent, covering) for limit in step_limits]
@@ -171,9 +171,9 @@ def _pixels_to_cells(
     return cell_limit
 
 
-def _write_averages(line_sums: np.ndarray, look: Look, member: np.ndarray) -> None:
+def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) -> None:
     """Write (n, K) averages of equal variance, from the (n, K + 1) sums and samples of a line."""
-    full_samples = np.float32(full_sample_count(look) - 0.5)
+    full_samples = np.float32(full_sample_count(look.length, look.kernel) - 0.5)
     for block in pixel_blocks(len(line_sums)):
         sums, effective_samples = line_sums[block, :-1], line_sums[block, -1].copy()
         mean = member[block]
@@ -298,7 +298,7 @@ class _LineAverages:
 def _cover_all_lines(
     covering: Covering,
     averages: Sequence[_LineAverages],
-    looks: Sequence[Look],
+    looks: Sequence[PixelLook],
     step_limits: Sequence[np.ndarray | None],
 ) -> None:
     """Trace streamlines until every line has the averages that it needs, one for each look."""
@@ -309,9 +309,9 @@ def _cover_all_lines(
     total = len(missing)
     fine = is_fine(look)
     max_uncovered = FINE_UNCOVERED_FRACTION if fine else MAX_UNCOVERED_FRACTION
-    spacing = max(int(SEED_SPACING_FACTOR * half_window * look.step), 1)
+    spacing = max(int(SEED_SPACING_FACTOR * half_window), 1)
     seeds = _grid_seeds(covering, averages[0], spacing)
-    batch_size = _batch_size(half_window + streamline_reach(look))
+    batch_size = _batch_size(half_window + look.streamline_reach())
     batch = StreamlineBatch(covering, looks, step_limits, half_window, batch_size, fine)
     threshold = 0.0
     for _ in range(MAX_ROUNDS):
@@ -335,7 +335,7 @@ def _cover_all_lines(
         remaining = [table.copy_from(missing, source) for table in averages]
         missing = remaining[0]
     # Lines whose neighbors have no average get streamlines of their own, without a half window.
-    batch_size = min(_batch_size(streamline_reach(look)), len(missing))
+    batch_size = min(_batch_size(look.streamline_reach()), len(missing))
     batch = StreamlineBatch(covering, looks, step_limits, 0, batch_size, fine)
     for batch_seeds in _batches(missing, batch_size):
         _write_streamlines(averages, batch.trace(batch_seeds))
@@ -363,17 +363,17 @@ def _write_streamlines(
         table.clear_sink()
 
 
-def has_slopes(look: Look) -> bool:
+def has_slopes(look: PixelLook) -> bool:
     """Whether the images of a look have slopes; see `LicImages`."""
     return is_fine(look) and is_hatched(look)
 
 
-def is_fine(look: Look) -> bool:
+def is_fine(look: PixelLook) -> bool:
     """Whether streaks are drawn with more accuracy: in antialiased pictures, and if they drift.
 
     Differences between neighboring streamlines do not drift. The eye sees them as a screen that stands still.
     """
-    return has_flow(look) or (isinstance(look, PixelLook) and look.antialiased)
+    return has_flow(look) or look.is_antialiased
 
 
 def _batch_size(half_length: int) -> int:

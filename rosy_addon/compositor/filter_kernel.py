@@ -8,13 +8,9 @@ Groeller and Purgathofer, Animating flow fields: rendering of oriented line inte
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-
-from ..field.symmetry import FieldSymmetry
-from .look import Look
 
 #: The kernels.
 Kernel = Literal["box", "taper", "ramp"]
@@ -28,16 +24,8 @@ WEIGHT_SLOPES: dict[Kernel, tuple[float, float]] = {
 }
 
 
-def look_for_symmetry(look: Look, symmetry: FieldSymmetry) -> Look:
-    """Return the look without orientation, if the lines of a field point both ways."""
-    return replace(look, oriented=False) if look.oriented and symmetry.has_opposites else look
-
-
-def kernel_of(look: Look) -> Kernel:
-    """Return the kernel of a look that is for the symmetry of a field."""
-    if look.oriented:
-        return "ramp"
-    return "taper" if look.taper else "box"
+#: The kernel of each value of `Look.fade`.
+KERNEL_OF_FADE: dict[str, Kernel] = {"none": "box", "ends": "taper", "tail": "ramp"}
 
 
 def sample_weights(position: np.ndarray, length: float, kernel: Kernel) -> np.ndarray:
@@ -95,10 +83,10 @@ def kernel_weights(forward: Any, backward: Any, full_length: Any, kernel: Kernel
     return KernelWeights(total, total**2 / (1 + forward_squares + backward_squares))
 
 
-def full_sample_count(look: Look) -> float:
-    """`KernelWeights.effective_samples` of streamlines that do not end early."""
-    length = np.float64(look.length)
-    return float(kernel_weights(length, length, length, kernel_of(look)).effective_samples)
+def full_sample_count(length: int, kernel: Kernel) -> float:
+    """Return `KernelWeights.effective_samples` of streamlines that do not end early."""
+    full = np.float64(length)
+    return float(kernel_weights(full, full, full, kernel).effective_samples)
 
 
 def _weight_sums(count: Any, slope: Any) -> tuple[Any, Any]:

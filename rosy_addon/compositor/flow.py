@@ -20,11 +20,10 @@ kernels that are periodic along the streamline. Those change their shape, and ha
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .image_noise import NOISE_MEAN
 from .look import Look, has_colored_noise, has_flow
 
 #: Channels of noise. Three is the least number for which the squares of the weights have a constant sum.
@@ -42,51 +41,56 @@ ONE_WAY_COSINE = math.sqrt(0.5)
 MAX_AXIAL_STEPS = 2
 
 
-def noise_channel_count(look: Look) -> int:
+class Drift(NamedTuple):
+    """How far streaks have drifted at a time of an animation.
+
+    Attributes
+    ----------
+    phase : float
+        Where they are in their cycle, 0 to 1.
+    cycle : float
+        The distance of the cycle, relative to `cycle_distance`.
+    """
+
+    phase: float = 0.0
+    cycle: float = 1.0
+
+
+#: The start of an animation, and pictures without drift.
+NO_DRIFT = Drift()
+
+
+def noise_channel_count(look: Any) -> int:
     """Return the number of noise channels that a look convolves."""
     if has_flow(look):
         return FLOW_CHANNELS
     return 3 if has_colored_noise(look) else 1
 
 
-def cycle_distance(look: Look) -> float:
-    """Return the pixels that streaks drift in a cycle."""
-    if look.flow_distance:
-        return look.flow_distance
-    return look.length * look.step * (IBFV_DISTANCE if look.method == "ibfv" else 1.0)
+def cycle_distance(length: int, method: str) -> float:
+    """Return the pixels that streaks of a length drift in a cycle, unless a loop shortens it."""
+    return length * (IBFV_DISTANCE if method == "ibfv" else 1.0)
 
 
-def with_cycle_distance(look: Look) -> Look:
-    """Return the look with the distance of a cycle, which looks of other lengths keep."""
-    return replace(look, flow_distance=cycle_distance(look)) if has_flow(look) else look
-
-
-def flow_at(look: Look, frame: float, loop_frames: int = 0) -> Look:
-    """Return the look of a frame of an animation.
+def drift_at(look: Look, frame: float, loop_frames: int = 0) -> Drift:
+    """Return how far the streaks of a look have drifted at a frame of an animation.
 
     Parameters
     ----------
     look : Look
-        Its `flow_phase` is that of frame 0.
     frame : float
         Counted from the first one.
     loop_frames : int
         Frames after which the animation is to begin again; 0 if it need not. The distance of a cycle is
         shortened so that the frames are whole cycles.
-
-    Returns
-    -------
-    Look
-        As it is, if its streaks do not drift.
     """
     if not has_flow(look):
-        return look
-    distance = cycle_distance(look)
+        return NO_DRIFT
+    full = distance = cycle_distance(look.length, look.method)
     if loop_frames:
         total = look.flow * loop_frames
-        distance = total / max(math.ceil(total / distance - 1e-9), 1)
-    phase = (look.flow_phase + frame * look.flow / distance) % 1.0
-    return replace(look, flow_distance=distance, flow_phase=phase)
+        distance = total / max(math.ceil(total / full - 1e-9), 1)
+    return Drift(frame * look.flow / distance % 1.0, distance / full)
 
 
 def _channel_positions(phase: float) -> np.ndarray:
@@ -100,29 +104,17 @@ def channel_weights(phase: float) -> np.ndarray:
     return math.sqrt(8 / 9) * np.sin(np.pi * position) ** 2
 
 
-def channel_shifts(look: Look) -> np.ndarray:
-    """Return the (3,) float64 steps that the streaks of the channels have drifted, either way."""
-    return (_channel_positions(look.flow_phase) - 0.5) * (cycle_distance(look) / look.step)
+def channel_shifts(phase: float, distance: float) -> np.ndarray:
+    """Return the (3,) float64 steps that the streaks of the channels have drifted, either way.
+
+    `distance` is the length of a cycle, in steps.
+    """
+    return (_channel_positions(phase) - 0.5) * distance
 
 
-def blend_channels(noise: np.ndarray, look: Look) -> np.ndarray:
+def blend_channels(noise: np.ndarray, phase: float) -> np.ndarray:
     """Return the (P, 1) float32 blend of (P, 3) noise around 0, with the variance of one channel."""
-    return noise @ channel_weights(look.flow_phase).astype(np.float32)[:, None]
-
-
-def unconvolved_noise(noise: np.ndarray, look: Look) -> np.ndarray:
-    """Return (P, K) noise as it is seen where nothing is convolved: with a single channel if there is flow."""
-    if not has_flow(look):
-        return noise
-    mean = np.float32(NOISE_MEAN)
-    return mean + blend_channels(noise - mean, look)
-
-
-def streamline_reach(look: Look) -> int:
-    """Return how many steps the kernel of a look reaches from its pixel, at most, in each direction."""
-    if not has_flow(look):
-        return look.length
-    return look.length + math.ceil(cycle_distance(look) / (2 * look.step)) + MAX_AXIAL_STEPS + 1
+    return noise @ channel_weights(phase).astype(np.float32)[:, None]
 
 
 def forward_share(cosine: np.ndarray) -> np.ndarray:

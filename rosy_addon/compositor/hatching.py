@@ -16,7 +16,7 @@ they do not change the tone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,8 @@ from .family_hues import line_families
 from .image_noise import NOISE_MEAN
 from .inks import MAX_INKS, has_ink_per_line, ink_count, inks_of
 from .lic_images import LicImages, magnitude_ends, relative_magnitude
-from .look import Look, colors_magnitude, is_hatched
+from .look import colors_magnitude, is_hatched
+from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH
 from .pixel_field import PixelField, all_members
 from .streak_statistics import (
@@ -96,26 +97,30 @@ class LineModulation(NamedTuple):
             None if even_lines is None else even_lines.part(extent),
         )
 
-    def relief(self, line: int, look: Look) -> np.ndarray | np.float32:
+    def relief(self, line: int, look: PixelLook) -> np.ndarray | np.float32:
         """Return what the paper adds to the streaks of a line: (P,) float32, or 0 without paper grain."""
         if self.paper_grain is None:
             return np.float32(0)
         return np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * self.paper_grain[line]
 
-    def break_streak(self, line: int, look: Look) -> np.ndarray | None:
+    def break_streak(self, line: int, look: PixelLook) -> np.ndarray | None:
         """Return the (P,) short streaks that break a line, with mean 0 and standard deviation 1."""
         if self.break_images is None:
             return None
         return standard_streak(self.break_images, line, look_streak_statistics(look).break_std)[0]
 
-    def spots(self, line: int, look: Look) -> np.ndarray:
+    def spots(self, line: int, look: PixelLook) -> np.ndarray:
         """Return (P,) float32 streaks of the undirected texture, NaN where the field is defined."""
         std = np.float32(look_streak_statistics(look).disc_std)
         return self.undirected / std + self.relief(line, look)
 
 
 def render_hatching(
-    field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation
+    field: PixelField,
+    images: LicImages,
+    look: PixelLook,
+    tone: np.ndarray,
+    modulation: LineModulation,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw the lines of a field with ink on paper.
 
@@ -124,8 +129,7 @@ def render_hatching(
     field : PixelField
     images : LicImages
         Member images in the order of `all_members(field, look.guiding_angle)`.
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
     tone : (P,) float32 ndarray
         Target tone, linear, 0 to 1.
     modulation : LineModulation
@@ -143,14 +147,18 @@ def render_hatching(
         ink, coverage = _render_one_ink(field, images, look, tone, modulation)
     else:
         ink, coverage = _render_many_inks(field, images, look, tone, modulation, ink_indices)
-    return inks_of(look).on_paper(ink, coverage)
+    return inks_of(look.look).on_paper(ink, coverage)
 
 
 def _render_one_ink(
-    field: PixelField, images: LicImages, look: Look, tone: np.ndarray, modulation: LineModulation
+    field: PixelField,
+    images: LicImages,
+    look: PixelLook,
+    tone: np.ndarray,
+    modulation: LineModulation,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the (P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
-    inks = inks_of(look)
+    inks = inks_of(look.look)
     by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
         magnitude = relative_magnitude(field, magnitude_ends(look, field))
@@ -176,7 +184,7 @@ def _render_one_ink(
 def _render_many_inks(
     field: PixelField,
     images: LicImages,
-    look: Look,
+    look: PixelLook,
     tone: np.ndarray,
     modulation: LineModulation,
     ink_indices: list[np.ndarray],
@@ -185,7 +193,7 @@ def _render_many_inks(
 
     Inks are transparent: the transmittances of crossing lines are multiplied.
     """
-    inks = inks_of(look, ink_count(look, field.line_count, field.family_count))
+    inks = inks_of(look.look, ink_count(look.look, field.line_count, field.family_count))
     transmittance = inks.complement_if_light(_line_tones(tone, modulation))
     target_transmittance = inks.target_transmittance(transmittance)
     bare_paper = np.ones_like(tone)
@@ -219,7 +227,7 @@ def line_coverage(
     line: int,
     target_coverage: np.ndarray,
     images: LicImages,
-    look: Look,
+    look: PixelLook,
     modulation: LineModulation,
 ) -> np.ndarray:
     """Compute the coverage of each pixel by one line.
@@ -279,7 +287,7 @@ def _above_threshold(
     streak: np.ndarray,
     target_coverage: np.ndarray,
     thresholds: np.ndarray,
-    look: Look,
+    look: PixelLook,
     slope: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return 1 where streaks exceed the threshold of the target coverage, with soft edges.
@@ -298,32 +306,32 @@ def _above_threshold(
     return smoothstep((streak - threshold) / (2 * half_width) + 0.5)
 
 
-def has_breaks(look: Look) -> bool:
+def has_breaks(look: Any) -> bool:
     """Return whether lines are broken into pieces, or vary in width as drawn by hand."""
     return is_hatched(look) and (look.breaks > 0 or look.wobble > 0)
 
 
-def has_overshoot(look: Look) -> bool:
+def has_overshoot(look: Any) -> bool:
     """Return whether lines continue past the borders of tones."""
     return is_hatched(look) and look.overshoot > 0
 
 
-def overshoot_steps(look: Look) -> int:
+def overshoot_steps(look: PixelLook) -> int:
     """Return the steps in each direction over which the tone is averaged for the overshoot."""
-    return max(round(look.overshoot / look.step), 1)
+    return max(round(look.overshoot), 1)
 
 
-def has_outline(look: Look) -> bool:
+def has_outline(look: Any) -> bool:
     """Return whether lines are drawn along silhouettes and creases."""
     return is_hatched(look) and look.outline > 0
 
 
-def has_paper_grain(look: Look) -> bool:
+def has_paper_grain(look: Any) -> bool:
     """Return whether the grain of the paper breaks up the ink."""
     return is_hatched(look) and look.paper_grain > 0
 
 
-def is_shaded_by_pixel(look: Look) -> bool:
+def is_shaded_by_pixel(look: Any) -> bool:
     """Return whether a pixel with several samples is shaded once, not at every sample.
 
     The streaks of other methods do not have the slopes that smooth the edges of the ink.
@@ -331,7 +339,7 @@ def is_shaded_by_pixel(look: Look) -> bool:
     return not is_hatched(look) or look.method == "sheets"
 
 
-def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
+def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the ink of each line at each pixel.
 
     The ink is that of the line's family. If the field does not distinguish its lines, it is chosen
@@ -343,7 +351,7 @@ def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
         Indices of inks (see `Inks.ink_at_tone`). If they are ranks, they are fractional where two
         lines swap ranks. None if all lines have the same ink.
     """
-    if not has_ink_per_line(look):
+    if not has_ink_per_line(look.look):
         return None
     families = line_families(field, look)
     if families is not None:
@@ -351,7 +359,7 @@ def line_ink_indices(field: PixelField, look: Look) -> list[np.ndarray] | None:
     return [soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)]
 
 
-def line_ranks(field: PixelField, look: Look) -> list[np.ndarray]:
+def line_ranks(field: PixelField, look: PixelLook) -> list[np.ndarray]:
     """M times (P,) float32: angle between each line and the guiding angle, scaled to 0 to M.
 
     A line has a rank from k to k + 1 if k other lines are nearer to the guiding angle. Where two
@@ -377,7 +385,10 @@ def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
 
 
 def line_shares(
-    field: PixelField, look: Look, transmittance: np.ndarray, even_lines: EvenLines | None = None
+    field: PixelField,
+    look: PixelLook,
+    transmittance: np.ndarray,
+    even_lines: EvenLines | None = None,
 ) -> list[np.ndarray]:
     """Compute the share of the ink that each line takes.
 
@@ -387,7 +398,7 @@ def line_shares(
     Parameters
     ----------
     field : PixelField
-    look : Look
+    look : PixelLook
         Its `guiding_angle`, `layers` and `layering` are used.
     transmittance : (M, P) or (1, P) ndarray
         Target transmittance of each line, or of all lines.
@@ -426,7 +437,7 @@ def onset_weights(darkness: np.ndarray, delays: Sequence[np.ndarray | float]) ->
 
 
 def _onset_darkness(
-    field: PixelField, look: Look, even_lines: EvenLines | None
+    field: PixelField, look: PixelLook, even_lines: EvenLines | None
 ) -> list[np.ndarray]:
     """Return the (P,) darkness at which each line joins. Above 1 for ranks beyond `look.layers`."""
     onsets = []

@@ -38,11 +38,12 @@ from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
 from .covering import SINK_CELL, Covering, build_covering, member_lines, unpack_neighbor_mask
-from .filter_kernel import full_sample_count, kernel_of, kernel_weights
-from .flow import FLOW_CHANNELS, cycle_distance
+from .filter_kernel import full_sample_count, kernel_weights
+from .flow import FLOW_CHANNELS
 from .image_noise import NOISE_MEAN
 from .lic_images import LicImages, lic_images, magnitude_step_limits
-from .look import Look, has_flow
+from .look import has_flow
+from .look_units import PixelLook
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField
 from .reported_blocks import reported_blocks
 
@@ -104,18 +105,20 @@ class StreakWaves:
             return lic_images(members, self.effective_samples)
 
 
-def wave_images(waves: Sequence[StreakWaves], looks: Sequence[Look]) -> list[LicImages]:
+def wave_images(waves: Sequence[StreakWaves], looks: Sequence[PixelLook]) -> list[LicImages]:
     """Return the LIC images of looks at their phases."""
     return [wave.images(look.flow_phase) for wave, look in zip(waves, looks, strict=True)]
 
 
-def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) -> list[StreakWaves]:
+def streak_waves(
+    field: PixelField, looks: Sequence[PixelLook], noise: np.ndarray
+) -> list[StreakWaves]:
     """Average the noise upstream of every state, for looks that differ in the length of streamlines.
 
     Parameters
     ----------
     field : PixelField
-    looks : sequence of Look
+    looks : sequence of PixelLook
         In pixels of the frame. The first is the longest.
     noise : (P, K) float32 ndarray
         The three channels of `flow`, if the looks have flow.
@@ -130,7 +133,7 @@ def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) ->
     with progress(0.0, 0.05):
         covering = build_covering(field, look, np.zeros((len(field.pixel), 1), np.float32))
     with progress(0.05, 0.1):
-        sheets = _Sheets(covering, is_upstream=not look.oriented)
+        sheets = _Sheets(covering, is_upstream=look.kernel != "ramp")
     with progress(0.1):
         decays = [_decay(field, each) for each in looks]
         doublings = max(_doubling_count(float(np.max(decay))) for decay in decays)
@@ -151,7 +154,7 @@ def streak_waves(field: PixelField, looks: Sequence[Look], noise: np.ndarray) ->
         ]
 
 
-def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
+def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
     """What is summed along streamlines, as complex numbers.
 
     Parameters
@@ -179,16 +182,16 @@ def _noise_sources(noise: np.ndarray, look: Look) -> list[np.ndarray]:
     return sources
 
 
-def _step_turn(look: Look) -> float:
+def _step_turn(look: PixelLook) -> float:
     """The angle by which the phase of the noise differs from that of the noise a step nearer."""
     if not has_flow(look):
         return 0.0
-    angle = 2 * np.pi * look.step / cycle_distance(look)
+    angle = 2 * np.pi / look.flow_distance
     # What comes from upstream left there earlier. What is downstream will be there later.
-    return angle if look.oriented else -angle
+    return angle if look.kernel == "ramp" else -angle
 
 
-def _is_two_sided(field: PixelField, look: Look) -> bool:
+def _is_two_sided(field: PixelField, look: PixelLook) -> bool:
     """Whether streaks are averages over both directions of a line, with equal weights."""
     return field.symmetry.has_opposites and not has_flow(look)
 
@@ -199,19 +202,19 @@ def _doubling_count(decay: float) -> int:
     return math.ceil(math.log2(max(steps, 1)))
 
 
-def _full_decay(field: PixelField, look: Look) -> np.float32:
+def _full_decay(field: PixelField, look: PixelLook) -> np.float32:
     """The ratio q of the weights of successive steps of full streamlines."""
-    samples = np.float64(full_sample_count(look))
+    samples = np.float64(full_sample_count(look.length, look.kernel))
     return np.float32(decay_of_samples(samples, _is_two_sided(field, look)))
 
 
-def _decay(field: PixelField, look: Look) -> np.ndarray:
+def _decay(field: PixelField, look: PixelLook) -> np.ndarray:
     """(P,) or () float32 ratios q of the weights of successive steps."""
     limits = magnitude_step_limits(field, look)
     if limits is None:
         return _full_decay(field, look)
     length = np.arange(look.length + 1, dtype=np.float64)
-    samples = kernel_weights(length, length, length, kernel_of(look)).effective_samples
+    samples = kernel_weights(length, length, length, look.kernel).effective_samples
     return decay_of_samples(samples, _is_two_sided(field, look)).astype(np.float32)[limits]
 
 
@@ -360,7 +363,9 @@ class _Sheets:
                 table[bit, cell] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
         return table.reshape(-1)
 
-    def sources(self, noise: np.ndarray, look: Look, sharpening: np.float32) -> list[np.ndarray]:
+    def sources(
+        self, noise: np.ndarray, look: PixelLook, sharpening: np.float32
+    ) -> list[np.ndarray]:
         """Return the (C,) `_noise_sources` of cells, 0 outside, from (P, K) noise; see `SHARPENING`."""
         plain: list[np.ndarray] = []
         for _, block, cell in self.blocks(1):
@@ -624,7 +629,7 @@ class _Sums:
         return values, weight, _square_sum(np.clip(rest, 0, 1), decay).astype(np.float32)
 
 
-def _line_waves(field: PixelField, covering: Covering, look: Look, sums: _Sums) -> StreakWaves:
+def _line_waves(field: PixelField, covering: Covering, look: PixelLook, sums: _Sums) -> StreakWaves:
     """Blend the two sheets of each line, and equalize the contrast."""
     lines, count = field.line_count, len(field.pixel)
     flows = has_flow(look)
@@ -640,7 +645,7 @@ def _line_waves(field: PixelField, covering: Covering, look: Look, sums: _Sums) 
             )
             if covering.has_directions:
                 is_along = bool(covering.is_along_member(state[:1])[0])
-                opposite = first_sheet + (lines if is_along == (not look.oriented) else 0)
+                opposite = first_sheet + (lines if is_along == (look.kernel != "ramp") else 0)
                 values, weight, squares = sums.at(opposite, block)
             else:
                 forward = covering.forward_share(state) if flows else np.float32(0.5)

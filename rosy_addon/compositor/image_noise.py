@@ -86,7 +86,7 @@ def hash_bits(
 def image_noise(
     pixel: np.ndarray,
     width: int,
-    grain: float,
+    cell: float,
     seed: int,
     channels: int,
     *,
@@ -101,7 +101,7 @@ def image_noise(
         Flat pixel indices, ascending.
     width : int
         Width of the frame in pixels.
-    grain : float
+    cell : float
         Side of a cell in pixels.
     seed : int
     channels : int
@@ -120,7 +120,7 @@ def image_noise(
     rectangle = tile_rectangle(pixel, width)
     noise = np.empty((len(pixel), channels), dtype=np.float32)
     for channel in range(channels):
-        settings = grain, seed, channel, density, high_pass
+        settings = cell, seed, channel, density, high_pass
         with progress(channel / channels, (channel + 1) / channels):
             tiles = cached_tiles(_noise_tiles, rectangle, *settings)
             for block in reported_blocks(len(pixel), STEP_LABEL, 1.0, 1.0):
@@ -131,7 +131,7 @@ def image_noise(
 
 def _noise_tiles(
     rectangle: TileRectangle,
-    grain: float,
+    cell: float,
     seed: int,
     channel: int,
     density: float,
@@ -141,7 +141,7 @@ def _noise_tiles(
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
-    cos, sin = np.cos(LATTICE_ANGLE) / grain, np.sin(LATTICE_ANGLE) / grain
+    cos, sin = np.cos(LATTICE_ANGLE) / cell, np.sin(LATTICE_ANGLE) / cell
     column = np.arange(left - margin, right + margin, dtype=np.float64)
     row = np.arange(bottom - margin, top + margin, dtype=np.float64)[:, None]
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
@@ -227,7 +227,7 @@ def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.n
 @lru_cache(maxsize=64)
 def streak_moments(
     length: float,
-    grain: float,
+    cell: float,
     high_pass: float,
     images: int = 1,
     average: int = 1,
@@ -241,7 +241,7 @@ def streak_moments(
     ----------
     length : float
         Length of the streamlines in pixels.
-    grain, high_pass : float
+    cell, high_pass : float
         Of the noise, in pixels.
     images : int
         M, the number of streamlines through a pixel. Their angles are multiples of pi / M.
@@ -270,17 +270,17 @@ def streak_moments(
     weights are a box filter of half the length applied twice: sinc(l k.u) becomes
     sinc(l k.u / 2)^2. The response of a ramp is complex, with the derivative of the sinc.
     """
-    k, dk = np.linspace(0, 4 / (1 + grain), 700, retstep=True)
+    k, dk = np.linspace(0, 4 / (1 + cell), 700, retstep=True)
     angle = np.arange(1440) * np.pi / 1440
     kx, ky = np.outer(k, np.cos(angle)), np.outer(k, np.sin(angle))
     cx, cy = (
         np.cos(LATTICE_ANGLE) * kx - np.sin(LATTICE_ANGLE) * ky,
         np.sin(LATTICE_ANGLE) * kx + np.cos(LATTICE_ANGLE) * ky,
     )
-    amplitude = np.sinc(grain * cx) * np.sinc(grain * cy) * np.sinc(kx) * np.sinc(ky)
+    amplitude = np.sinc(cell * cx) * np.sinc(cell * cy) * np.sinc(kx) * np.sinc(ky)
     if average > 1:
         amplitude *= np.sinc(average * kx) * np.sinc(average * ky)
-    power = (grain * NOISE_STD * amplitude) ** 2
+    power = (cell * NOISE_STD * amplitude) ** 2
     high_pass_gain = (
         1 - np.exp(-2 * (np.pi * BLUR_FACTOR * high_pass * k) ** 2) if high_pass else 1.0
     )

@@ -29,6 +29,7 @@ from .hatching import (
 )
 from .lic_images import LicImages
 from .look import Look
+from .look_units import PixelLook
 from .pixel_field import PixelField
 from .streak_statistics import (
     COVERAGE_STEPS,
@@ -82,7 +83,7 @@ def unlit_look(look: Look) -> Look:
 
 
 def line_thresholds(
-    line: int, images: LicImages | None, look: Look, modulation: LineModulation
+    line: int, images: LicImages | None, look: PixelLook, modulation: LineModulation
 ) -> np.ndarray:
     """Compute the coverage from which each pixel is covered by one line.
 
@@ -92,8 +93,8 @@ def line_thresholds(
         Index into `images.members`.
     images : LicImages or None
         None if the modulation has even lines.
-    look : Look
-        A `sharp_look`, in pixels of the frame.
+    look : PixelLook
+        Of a `sharp_look`.
     modulation : LineModulation
         Without `line_tones` and `outline`, which have no effect.
 
@@ -120,7 +121,7 @@ def line_thresholds(
 
 
 def _streak_thresholds(
-    streak: np.ndarray, break_streak: np.ndarray | None, look: Look, table: np.ndarray
+    streak: np.ndarray, break_streak: np.ndarray | None, look: PixelLook, table: np.ndarray
 ) -> np.ndarray:
     """Compute `line_thresholds` of streaks; `table` is `StreakStatistics.threshold`."""
     if break_streak is None:
@@ -136,7 +137,7 @@ def _streak_thresholds(
 
 
 def _even_line_thresholds(
-    line: int, break_streak: np.ndarray | None, look: Look, modulation: LineModulation
+    line: int, break_streak: np.ndarray | None, look: PixelLook, modulation: LineModulation
 ) -> np.ndarray:
     """Compute `line_thresholds` of even lines."""
     # 0 in the middle of a line, 1 between two lines.
@@ -180,7 +181,7 @@ def cyclic_places(first: np.ndarray) -> np.ndarray:
 
 
 def ordered_thresholds(
-    thresholds: np.ndarray, places: np.ndarray, undefined: np.ndarray, look: Look
+    thresholds: np.ndarray, places: np.ndarray, undefined: np.ndarray, look: PixelLook
 ) -> np.ndarray:
     """Sort the thresholds of lines by their order.
 
@@ -193,7 +194,7 @@ def ordered_thresholds(
         sum over the lines is 1.
     undefined : (P,) bool ndarray
         Where there are no lines, and the thresholds of the first hold for all ink together.
-    look : Look
+    look : PixelLook
         Its `layers` and `layering` are used where lines swap and where the field is undefined.
 
     Returns
@@ -328,7 +329,7 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
 def picture_thresholds(
     field: PixelField,
     images: LicImages | None,
-    look: Look,
+    look: PixelLook,
     modulation: LineModulation,
     samples_per_side: int = 1,
 ) -> np.ndarray:
@@ -343,8 +344,8 @@ def picture_thresholds(
     field : PixelField
     images : LicImages
         Member images in the order of `all_members(field, look.guiding_angle)`.
-    look : Look
-        A `sharp_look`, in pixels of the frame.
+    look : PixelLook
+        Of a `sharp_look`.
     modulation : LineModulation
         Without `line_tones`.
     samples_per_side : int

@@ -10,11 +10,12 @@ import numpy as np
 from ..core.memory import raise_mmap_threshold
 from ..core.progress import progress
 from .fast_lic import fast_lic
-from .flow import noise_channel_count
+from .flow import blend_channels, noise_channel_count
 from .ibfv import streak_waves, wave_images
-from .image_noise import image_noise
+from .image_noise import NOISE_MEAN, image_noise
 from .lic_images import LicImages
-from .look import Look
+from .look import has_flow
+from .look_units import PixelLook
 from .member_decomposition import member_decomposition
 from .per_pixel_lic import brute_force
 from .pixel_field import PixelField
@@ -22,18 +23,24 @@ from .strips import Strip
 
 
 def lic_lengths(
-    field: PixelField, looks: Sequence[Look], noise: np.ndarray, strip: Strip | None = None
+    field: PixelField,
+    looks: Sequence[PixelLook],
+    noise: np.ndarray,
+    strip: Strip | None = None,
+    method: str = "",
 ) -> list[LicImages]:
-    """Average noise along the streamlines of each member, with the method of the looks.
+    """Average noise along the streamlines of each member.
 
     Parameters
     ----------
     field : PixelField
-    looks : sequence of Look
-        In pixels of the frame. They differ in the length of streamlines. The first is the longest.
+    looks : sequence of PixelLook
+        They differ in the length of streamlines. The first is the longest.
     noise : (P, K) float32 ndarray
     strip : Strip, optional
         With the method "sheets", the images are those at its `averaged_rows`.
+    method : str
+        By default that of the looks.
 
     Returns
     -------
@@ -41,7 +48,7 @@ def lic_lengths(
         Of each look.
     """
     raise_mmap_threshold()
-    method = looks[0].method
+    method = method or looks[0].method
     if method == "sheets":
         return fast_lic(field, looks, noise, strip)
     if method == "ibfv":
@@ -54,15 +61,23 @@ def lic_lengths(
     return images
 
 
-def look_noise(field: PixelField, look: Look) -> np.ndarray:
+def look_noise(field: PixelField, look: PixelLook) -> np.ndarray:
     """(P, K) float32 image-space noise of a look at the pixels of a field."""
     return image_noise(field.pixel, field.width, **noise_args(look))
 
 
-def noise_args(look: Look) -> dict[str, Any]:
+def unconvolved_noise(noise: np.ndarray, look: PixelLook) -> np.ndarray:
+    """Return (P, K) noise as it is seen where nothing is convolved: with a single channel if there is flow."""
+    if not has_flow(look):
+        return noise
+    mean = np.float32(NOISE_MEAN)
+    return mean + blend_channels(noise - mean, look.flow_phase)
+
+
+def noise_args(look: PixelLook) -> dict[str, Any]:
     """Return the noise settings of a look as parameters of `image_noise` and `surface_noise`."""
     return {
-        "grain": look.grain,
+        "cell": look.line_width,
         "seed": look.seed,
         "channels": noise_channel_count(look),
         "density": look.density,

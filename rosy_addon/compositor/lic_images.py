@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
-from .look import Look, magnitude_range
+from .look import magnitude_range
+from .look_units import PixelLook
 from .pixel_field import PixelField
 from .reported_blocks import reported_blocks
 
@@ -59,7 +60,7 @@ def lic_images(
     return LicImages(members, blend, effective_samples, slopes)
 
 
-def magnitude_step_limits(field: PixelField, look: Look) -> np.ndarray | None:
+def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | None:
     """Return the (P,) int32 steps in each direction if they depend on the magnitude, None otherwise."""
     if not look.magnitude_length:
         return None
@@ -77,7 +78,7 @@ def relative_magnitude(field: PixelField, ends: tuple[float, float]) -> np.ndarr
     return (clipped - low) / (high - low)
 
 
-def magnitude_ends(look: Look, field: PixelField) -> tuple[float, float]:
+def magnitude_ends(look: PixelLook, field: PixelField) -> tuple[float, float]:
     """Return the magnitudes at the bottom and at the top of the range of a look.
 
     If the look sets none, they are 0 and the largest magnitude of the field.
@@ -88,7 +89,7 @@ def magnitude_ends(look: Look, field: PixelField) -> tuple[float, float]:
     return distinct_ends(*ends)
 
 
-def with_magnitude_range(look: Look, field: PixelField) -> Look:
+def with_magnitude_range(look: PixelLook, field: PixelField) -> PixelLook:
     """Return a look that colors magnitudes, with its range set to `magnitude_ends`.
 
     Parts of the field can then be drawn one by one.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,7 +22,6 @@ from ..core.settings import (
     number,
     numbers,
     settings_of,
-    stage_key,
     switch,
 )
 
@@ -41,10 +41,15 @@ def colors_values(look: Any) -> bool:
     return look.hue == "values"
 
 
-def magnitude_range(look: Look) -> tuple[float, float] | None:
+def magnitude_range(look: Any) -> tuple[float, float] | None:
     """Return the magnitudes at the ends of the range of a look; None if the fields determine them."""
     is_set = uses_magnitude(look) and not colors_values(look) and any(look.color_range)
     return look.color_range if is_set else None
+
+
+def crease_angle_of(look: Any) -> float | None:
+    """Return the least angle between normals at a crease, in radians. None if there are no creases."""
+    return look.crease_angle if look.crease_angle < math.pi else None
 
 
 def is_hatched(look: Any) -> bool:
@@ -52,19 +57,19 @@ def is_hatched(look: Any) -> bool:
     return look.ink != "soft"
 
 
-def is_even(look: Look) -> bool:
+def is_even(look: Any) -> bool:
     """Return whether lines of ink are drawn at even distances."""
     return look.ink == "even"
 
 
-def has_colored_noise(look: Look) -> bool:
+def has_colored_noise(look: Any) -> bool:
     """Return whether streaks are made of three channels of noise."""
     return look.hue == "noise" and not is_hatched(look)
 
 
 def _has_streaks(look: Any) -> bool:
     """Return whether streaks of noise are drawn, or break even lines."""
-    return not (is_even(look) and not (look.breaks or look.wobble))
+    return not is_even(look) or bool(look.breaks or look.wobble)
 
 
 def has_flow(look: Any) -> bool:
@@ -80,7 +85,7 @@ def _is_lit(look: Any) -> bool:
     return look.shading > 0 and (look.tone == "light" or look.tone_lit)
 
 
-def has_tone_inks(look: Look) -> bool:
+def has_tone_inks(look: Any) -> bool:
     """Return whether the color of the ink depends on the tone."""
     return is_hatched(look) and look.hue == "tone"
 
@@ -103,12 +108,12 @@ def _ink(applies: Callable[[Any], bool] = is_hatched) -> dict[str, Any]:
 class Look:
     """All settings that determine how a field is drawn, as in presets and panels.
 
-    Lengths are in pixels of the finished picture or, with the unit "world", in multiples of
+    Lengths are in pixels of the finished picture or, if `unit_size` is not 0, in multiples of
     `unit_size` Blender units.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
-    this package, and declare and use the uniform of that name in the shader. All else is derived
-    from the field; see `rosy_addon.core.settings`.
+    this package, and declare and use the uniform of that name in the shader. A length is also a field
+    of `look_units.PixelLook`. All else is derived from the field; see `rosy_addon.core.settings`.
 
     Raises
     ------
@@ -157,45 +162,35 @@ class Look:
         panel_before="method",
         stage=Stage.GBUFFER,
     )
-    unit: str = choice(
-        "pixels",
-        "Unit of lengths",
-        {
-            "pixels": "Pixels of the picture: line width does not depend on the distance",
-            "world": "Blender units: lines belong to the object, as if engraved, and are wider when "
-            "near",
-        },
-        panel="streaks",
-    )
     unit_size: float = number(
-        0.01,
-        1e-6,
+        0.0,
+        0.0,
         1e6,
-        "Size in Blender units that replaces one pixel in lengths",
+        "Blender units that replace one pixel in lengths: lines belong to the object, as if engraved, and are "
+        "wider when near. 0: lengths are in pixels of the picture, whatever the distance",
         unit="length",
         panel="streaks",
         panel_label="Pixel Size",
-        applies=lambda look: look.unit != "pixels",
     )
     length: int = number(
         40,
         1,
         8000,
-        "Length of the streaks: the number of steps in each direction",
+        "Length of the streaks in pixels, in each direction",
         is_pixel_length=True,
         panel="streaks",
         applies=_has_streaks,
     )
-    taper: bool = switch(
-        False,
-        "Fade streaks toward their ends. Lines end in points and change less when the view zooms",
-        panel="streaks",
-        applies=_has_streaks,
-    )
-    oriented: bool = switch(
-        False,
-        "Fade streaks from head to tail, so that they show which way they point. For fields of odd degree; "
-        "sparse streaks, of low density, show it best",
+    fade: str = choice(
+        "none",
+        "Where streaks fade",
+        {
+            "none": "Nowhere: streaks have the same strength from end to end",
+            "ends": "Toward both ends. Lines end in points and change less when the view zooms",
+            "tail": "From head to tail, so that they show which way they point. For fields of odd degree; "
+            "sparse streaks, of low density, show it best",
+        },
+        option_labels={"none": "Nowhere", "ends": "At Both Ends", "tail": "At the Tail"},
         panel="streaks",
         applies=_has_streaks,
     )
@@ -203,20 +198,11 @@ class Look:
         0.0,
         0.0,
         65536.0,
-        "Least distance in pixels between arrowheads over the lines, which show which way they point. For "
-        "fields of odd degree. 0: none",
+        "Least distance in pixels between arrowheads over the lines, which show which way they point. They "
+        "are a quarter as long. For fields of odd degree. 0: none",
         label="Arrowheads",
         is_pixel_length=True,
         **_shading("streaks"),
-    )
-    arrow_size: float = number(
-        12.0,
-        0.0,
-        65536.0,
-        "Length of the arrowheads in pixels, which is at least 3",
-        label="Arrowhead Size",
-        is_pixel_length=True,
-        **_shading("streaks", lambda look: look.arrows > 0),
     )
     flow: float = number(
         0.0,
@@ -229,35 +215,24 @@ class Look:
         panel="streaks",
         applies=_can_flow,
     )
-    flow_distance: float = number(
-        0.0,
-        0.0,
-        8000.0,
-        "Pixels that a streak drifts while it appears and fades again. 0: half its length, or twice its length "
-        "with the method IBFV",
-        is_pixel_length=True,
-        panel="streaks",
-        applies=has_flow,
-    )
-    flow_phase: float = number(
-        0.0,
-        0.0,
-        1.0,
-        "Position in the cycle in which streaks drift and fade. Animations and live views set it",
-        panel="streaks",
-        applies=has_flow,
-    )
-    step: float = number(1.0, 0.05, 1.0, "Length of a step in pixels", panel="streaks")
-    grain: float = number(
+    line_width: float = number(
         1.5,
         0.5,
         256.0,
-        "Width of the lines in pixels: the size of a cell of the noise, or half the distance "
-        "between even lines",
-        label="Line Width",
+        "Width of the streaks in pixels, which is the size of a cell of the noise",
         is_pixel_length=True,
         preview_low=0.75,
         panel="streaks",
+    )
+    line_distance: float = number(
+        3.0,
+        1.0,
+        512.0,
+        "Distance between even lines in pixels. At half coverage, lines are half as wide",
+        is_pixel_length=True,
+        preview_low=1.5,
+        panel="streaks",
+        applies=is_even,
     )
     density: float = number(
         0.1,
@@ -331,20 +306,14 @@ class Look:
         panel="ink",
         panel_before="layers",
     )
-    foreshorten: bool = switch(
-        False,
-        "Shorten streaks where the surface is slanted, instead of keeping their length in the picture",
-        panel="streaks",
-    )
-    cross_creases: bool = switch(False, "Continue streaks across sharp creases", panel="streaks")
     crease_angle: float = number(
         0.7,
         0.0,
         3.1416,
-        "Minimum angle between the normals of adjacent pixels at a sharp crease",
+        "Minimum angle between the normals on both sides of a sharp crease, where streaks end and outlines are "
+        "drawn. 180 degrees: no creases",
         unit="angle",
         panel="streaks",
-        applies=lambda look: not look.cross_creases,
     )
     magnitude_length: bool = switch(
         False,
@@ -429,7 +398,7 @@ class Look:
             "hatch": "Streaks of ink on paper, broken and uneven as by hand, whose number and width "
             "follow the tone",
             "even": "Long lines of ink at even distances on the surface, which swell and thin with the "
-            "tone, as in engravings. The distance is twice the line width",
+            "tone, as in engravings",
         },
         label="Ink Style",
         panel_label="Style",
@@ -534,12 +503,3 @@ class Look:
             if isinstance(known[name], Numbers) and isinstance(value, list):
                 changes[name] = tuple(value)
         return replace(self, **changes)
-
-
-def lic_key(look: Look) -> tuple[Any, ...]:
-    """Return a key of the settings that LIC images depend on.
-
-    Two looks with equal keys have the same LIC images of the same G-buffer.
-    """
-    length_range = magnitude_range(look) if look.magnitude_length else None
-    return (*stage_key(look, Stage.LIC), has_colored_noise(look), length_range)

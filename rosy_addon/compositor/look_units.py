@@ -1,17 +1,21 @@
-"""Conversion of the lengths of a look to pixels of the frame that is drawn."""
+"""`PixelLook`: a look with its lengths in pixels of the frame that is drawn, and other scales of looks."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..core.settings import pixel_lengths, settings_of, switch
+from ..core.settings import Stage, pixel_lengths, settings_of
+from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
-from .look import Look
+from .filter_kernel import KERNEL_OF_FADE, Kernel
+from .flow import MAX_AXIAL_STEPS, NO_DRIFT, Drift, cycle_distance
+from .look import Look, has_colored_noise, has_flow, magnitude_range
 
 #: Lengths in Blender units follow the camera in steps of 1 / 32 octave, so that tables made for a
 #: look can be reused while the camera moves.
@@ -26,60 +30,157 @@ SPACING_STEPS_PER_OCTAVE = 8
 MIN_DISTANCE_FACTOR = 0.25
 
 
-@dataclass(frozen=True)
-class PixelLook(Look):
-    """A look with its lengths in pixels of the frame that is drawn, which may be out of range."""
+@dataclass(frozen=True, kw_only=True)
+class PixelLook:
+    """A look as one frame is drawn with it: lengths in pixels of the frame, and streaks at a time.
 
-    antialiased: bool = switch(
-        False,
-        "Draw streaks more accurately, as pixels have several samples; see `GBuffer.coverage`",
-    )
+    The settings of the look that are no lengths are attributes as well: ``pixel_look.crispness``.
 
-    def __post_init__(self) -> None:
-        """Check nothing: the original look was checked."""
+    Attributes
+    ----------
+    look : Look
+        As the user set it.
+    length : int
+        Steps of streamlines in each direction.
+    arrows, flow, line_width, line_distance, high_pass, overshoot, outline : float
+        The settings of these names, in pixels of the frame. They may be out of range.
+    supersampling : int
+        Pixels of the frame along a side of a pixel of the picture.
+    pixel_size : float
+        Blender units that a pixel stands for; 0 if the lengths of the look are in pixels.
+    color_range : (float, float)
+        The setting of this name or, once a field is known that sets it, its `magnitude_ends`.
+    kernel : {"box", "taper", "ramp"}
+        The filter kernel.
+    flow_phase : float
+        Where drifting streaks are in their cycle, 0 to 1; see `flow`.
+    flow_distance : float
+        Pixels that they drift in it.
+    is_antialiased : bool
+        Whether streaks are drawn more accurately, as pixels have several samples; see
+        `GBuffer.coverage`.
+    is_on_surface : bool
+        Whether steps have one length on the surface, as in textures, and not in the picture.
+    """
+
+    look: Look
+    length: int
+    arrows: float
+    flow: float
+    line_width: float
+    line_distance: float
+    high_pass: float
+    overshoot: float
+    outline: float
+    supersampling: int = 1
+    pixel_size: float = 0.0
+    color_range: tuple[float, float]
+    kernel: Kernel
+    flow_phase: float = 0.0
+    flow_distance: float = 0.0
+    is_antialiased: bool = False
+    is_on_surface: bool = False
+
+    def __getattr__(self, name: str) -> Any:
+        """Return a setting that is no length."""
+        if name not in settings_of(Look):
+            raise AttributeError(name)
+        return getattr(self.look, name)
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of the look by name, with the lengths in pixels of the frame."""
+        return {name: getattr(self, name) for name in settings_of(Look)}
+
+    def lic_key(self) -> tuple[Any, ...]:
+        """Return a key of all that LIC images depend on.
+
+        Two looks with equal keys have the same LIC images of the same G-buffer.
+        """
+        applied = (
+            getattr(self, name) if setting.applies(self) else setting.default
+            for name, setting in settings_of(Look).items()
+            if setting.stage <= Stage.LIC
+        )
+        length_range = magnitude_range(self) if self.magnitude_length else None
+        return (
+            *(*applied, has_colored_noise(self), length_range),
+            *(self.pixel_size, self.kernel, self.flow_phase, self.flow_distance),
+            *(self.is_antialiased, self.is_on_surface),
+        )
+
+    def streamline_reach(self) -> int:
+        """Return how many steps the kernel reaches from its pixel, at most, in each direction."""
+        if not has_flow(self):
+            return self.length
+        return self.length + math.ceil(self.flow_distance / 2) + MAX_AXIAL_STEPS + 1
+
+    def for_symmetry(self, symmetry: FieldSymmetry) -> PixelLook:
+        """Return the look for a field. Lines that point both ways have no head and tail."""
+        if self.kernel == "ramp" and symmetry.has_opposites:
+            return replace(self, kernel="box")
+        return self
+
+    def with_length(self, length: int) -> PixelLook:
+        """Return the look with streamlines of another length, in steps."""
+        return replace(self, length=length)
+
+    def for_means(self, length: int) -> PixelLook:
+        """Return the look that takes plain means over a length, in steps: without fading and drift."""
+        return replace(self, length=length, kernel="box", flow=0.0, is_antialiased=False)
+
+    def in_samples(self, side: int) -> PixelLook:
+        """Return the look for a frame with `side` x `side` samples in place of each pixel."""
+        lengths = {setting.name: getattr(self, setting.name) for setting in pixel_lengths(Look)}
+        return replace(
+            self,
+            **{name: length * side for name, length in lengths.items()},
+            supersampling=self.supersampling * side,
+            pixel_size=self.pixel_size / side,
+            flow_distance=self.flow_distance * side,
+        )
 
 
-def supersampled_look(look: Look) -> PixelLook:
-    """Return the look with its lengths in pixels of the supersampled frame."""
-    settings = {name: getattr(look, name) for name in settings_of(Look)}
-    for setting in pixel_lengths(Look):
-        settings[setting.name] *= look.supersampling
-    settings["unit_size"] /= look.supersampling
-    return PixelLook(**settings)
+def pixel_look(
+    look: Look,
+    camera: Camera | None = None,
+    instances: Sequence[MeshInstance] = (),
+    supersampling: int = 1,
+    drift: Drift = NO_DRIFT,
+    is_antialiased: bool = False,
+) -> PixelLook:
+    """Return a look in pixels of a frame.
 
-
-def look_in_pixels(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> Look:
-    """Return the look with its lengths converted from Blender units to pixels.
-
-    The scale is that of a pixel at the center of the meshes. A look whose unit is "pixels" is
-    returned unchanged.
+    Blender units become pixels by the scale at the center of the meshes.
 
     Parameters
     ----------
     look : Look
-    camera : Camera
-        Its resolution is that of the picture times `look.supersampling`, in both directions.
+    camera : Camera, optional
+        Of the frame. Needed if there are meshes.
     instances : sequence of MeshInstance
         All meshes in the scene. Only those with a field affect the scale.
-
-    Returns
-    -------
-    Look
-        Its `unit_size` is the size of a pixel at that center, in Blender units.
+    supersampling : int
+        Pixels of the frame along a side of a pixel of the picture.
+    drift : Drift
+    is_antialiased : bool
+        See `PixelLook`.
     """
     bounds = [instance.world_bounds() for instance in instances if instance.field is not None]
-    if look.unit == "pixels" or not bounds:
-        return look
-    exact_scale = look.unit_size / (
-        pixel_world_size(np.concatenate(bounds), camera) * look.supersampling
-    )
-    return scaled_look(
-        look, 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
-    )
+    scale = 1.0
+    if look.unit_size and bounds:
+        exact_scale = look.unit_size / (
+            pixel_world_size(np.concatenate(bounds), camera) * supersampling
+        )
+        scale = 2 ** (np.rint(np.log2(exact_scale) * STEPS_PER_OCTAVE) / STEPS_PER_OCTAVE)
+    in_picture = _scaled_pixel_look(look, scale, look.unit_size, drift)
+    return replace(in_picture.in_samples(supersampling), is_antialiased=is_antialiased)
 
 
-def look_on_surface(look: Look, step: float, pixel: float) -> Look:
-    """Return the look for lines on a surface that no camera sees, with its lengths in steps.
+def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_DRIFT) -> PixelLook:
+    """Return a look for lines on a surface that no camera sees, with its lengths in steps.
+
+    Its streaks are traced with the method "sheets" and anchored to the surface. There is no picture in
+    which lines could be near a guiding angle.
 
     Parameters
     ----------
@@ -87,38 +188,59 @@ def look_on_surface(look: Look, step: float, pixel: float) -> Look:
     step : float
         Length of a step of streamlines, in Blender units.
     pixel : float
-        Blender units that replace a pixel, if the unit of the look is "pixels".
-
-    Returns
-    -------
-    Look
-        Foreshortened, as steps have one length on the surface.
+        Blender units that replace a pixel, if the lengths of the look are in pixels.
+    drift : Drift
     """
-    unit_size = pixel if look.unit == "pixels" else look.unit_size
-    look = replace(
-        look,
-        unit="world",
-        unit_size=float(np.clip(unit_size, *_range_of("unit_size"))),
-        method="sheets",
-        anchor="surface",
-        foreshorten=True,
-        supersampling=1,
-        guiding_angle=0.0,
-        step=1.0,
-        length=max(round(look.length * look.step), 1),
+    unit_size = look.unit_size or pixel
+    look = replace(look, method="sheets", anchor="surface", guiding_angle=0.0, supersampling=1)
+    on_surface = _scaled_pixel_look(look, unit_size / step, unit_size, drift)
+    return replace(on_surface, is_on_surface=True)
+
+
+def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
+    """Return a look with lengths in pixels, `scale` times its own, and pixels in place of `unit_size`."""
+    lengths, scale = _scaled_lengths(look, scale)
+    if not has_flow(look):
+        drift = NO_DRIFT
+    return PixelLook(
+        look=look,
+        **lengths,
+        pixel_size=unit_size / scale,
+        color_range=look.color_range,
+        kernel=KERNEL_OF_FADE[look.fade],
+        flow_phase=drift.phase,
+        flow_distance=cycle_distance(lengths["length"], look.method) * drift.cycle,
     )
-    return scaled_look(look, unit_size / step)
 
 
 def scaled_look(look: Look, scale: float) -> Look:
-    """Multiply the lengths of a look, as far as their ranges allow."""
-    scale = float(np.clip(scale, *_scale_limits(look)))
+    """Return a look for a picture that is larger by a scale, as far as the ranges of lengths allow."""
+    lengths, scale = _scaled_lengths(look, scale)
+    return replace(look, **lengths, unit_size=look.unit_size / scale)
+
+
+def _scaled_lengths(look: Look, scale: float) -> tuple[dict[str, Any], float]:
+    """Multiply the lengths of a look, as far as their ranges allow.
+
+    Noise cells stay at least as large as a pixel, as smaller ones are not visible.
+
+    Returns
+    -------
+    lengths : dict
+        By the names of the settings.
+    scale : float
+        By which they are multiplied.
+    """
+    max_scale = min(
+        setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
+    )
+    min_scale = 1.0 / look.line_width
+    scale = float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
     lengths = {}
     for setting in pixel_lengths(Look):
         length = getattr(look, setting.name) * scale
         lengths[setting.name] = max(round(length), 1) if setting.is_integer else length
-    unit_size = float(np.clip(look.unit_size / scale, *_range_of("unit_size")))
-    return replace(look, **lengths, unit_size=unit_size)
+    return lengths, scale
 
 
 def preview_look(look: Look, downscale: int) -> Look:
@@ -131,7 +253,7 @@ def preview_look(look: Look, downscale: int) -> Look:
         Pixels of the view along each side of a pixel of the preview.
     """
     settings: dict[str, Any] = {"supersampling": 1}
-    if look.unit == "pixels":
+    if not look.unit_size:
         for setting in pixel_lengths(Look):
             value = getattr(look, setting.name)
             value = value // downscale if setting.is_integer else value / downscale
@@ -152,56 +274,26 @@ def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     return max(float(depth), min_depth) / camera.pixels_per_unit
 
 
-def instance_line_spacing(
-    look: Look, grains: float, camera: Camera, instance: MeshInstance
-) -> float:
+def instance_line_spacing(look: PixelLook, camera: Camera, instance: MeshInstance) -> float:
     """Return the distance between even lines on a mesh instance, in Blender units.
 
     Parameters
     ----------
-    look : Look
-        In pixels of the frame; see `look_in_pixels` and `supersampled_look`.
-    grains : float
-        The distance in widths of a line.
+    look : PixelLook
     camera : Camera
         Of the frame.
     instance : MeshInstance
-        With the unit "pixels", the distance is that of pixels at its center.
+        If the lengths of the look are in pixels, the distance is that of pixels at its center.
     """
-    if look.unit != "pixels":
-        return grains * look.grain * look.unit_size
-    exact = grains * look.grain * pixel_world_size(instance.world_bounds(), camera)
+    if look.pixel_size:
+        return look.line_distance * look.pixel_size
+    exact = look.line_distance * pixel_world_size(instance.world_bounds(), camera)
     step = np.rint(np.log2(exact) * SPACING_STEPS_PER_OCTAVE)
     return float(2 ** (step / SPACING_STEPS_PER_OCTAVE))
 
 
-def cell_size_args(look: Look) -> dict[str, Any]:
-    """Return the parameters of `surface_noise` for the size of noise cells on the surface.
-
-    Parameters
-    ----------
-    look : Look
-        In pixels of the frame; see `look_in_pixels` and `supersampled_look`.
-    """
-    if look.unit == "pixels":
+def cell_size_args(look: PixelLook) -> dict[str, Any]:
+    """Return the parameters of `surface_noise` for the size of noise cells on the surface."""
+    if not look.pixel_size:
         return {"pixel": 0.0, "smallest": 0.0}
-    return {"pixel": look.unit_size, "smallest": float(look.supersampling)}
-
-
-def _range_of(name: str) -> tuple[float, float]:
-    """Return the least and the largest value of a setting."""
-    setting = settings_of(Look)[name]
-    return setting.low, setting.high
-
-
-def _scale_limits(look: Look) -> tuple[float, float]:
-    """Return the minimum and maximum factors by which the lengths of a look can be multiplied.
-
-    The maximum keeps all lengths within their ranges. The minimum keeps noise cells at least as
-    large as a pixel, as smaller ones are not visible.
-    """
-    max_scale = min(
-        setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
-    )
-    min_scale = max(1.0, settings_of(Look)["grain"].low) / look.grain
-    return min(min_scale, 1.0), max(max_scale, 1.0)
+    return {"pixel": look.pixel_size, "smallest": float(look.supersampling)}

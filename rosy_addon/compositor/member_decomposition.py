@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.progress import progress
 from .lic_images import LicImages
-from .look import Look
+from .look_units import PixelLook
 from .per_pixel_lic import (
     DirectionSampler,
     convolve_members,
@@ -25,7 +25,7 @@ from .pixel_field import PixelField, all_members, blend_weights, neighbor_table
 from .reported_blocks import reported_blocks
 
 
-def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
+def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicImages:
     """Compute two sets of member images, and blend them.
 
     The first set follows V_i, the member nearest to the guiding angle phi + 2 pi i / N. Where two
@@ -36,7 +36,7 @@ def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> Li
     Parameters
     ----------
     field : PixelField
-    look : Look
+    look : PixelLook
         In pixels of the frame.
     noise : (P, K) float32 ndarray
 
@@ -64,7 +64,7 @@ def member_decomposition(field: PixelField, look: Look, noise: np.ndarray) -> Li
 
 
 def _one_set(
-    field: PixelField, look: Look, noise: np.ndarray, neighbors: np.ndarray, angle: float
+    field: PixelField, look: PixelLook, noise: np.ndarray, neighbors: np.ndarray, angle: float
 ) -> LicImages:
     """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
     with progress(0.0):
@@ -84,7 +84,7 @@ def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
     return lambda entry, offset: interpolate_direction(table.take(entry, axis=0), offset)
 
 
-def _first_set_weight(field: PixelField, look: Look) -> np.ndarray:
+def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
     """(P,) float32 weight of the first set in the blend."""
     if look.view_plane:
         weight = blend_weights(field, look.guiding_angle)

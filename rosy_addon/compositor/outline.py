@@ -8,8 +8,6 @@ are visible. Marks that are too short are not drawn, unless they are the border 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..core.cache import Cache
@@ -21,8 +19,8 @@ from ..projection.gbuffer import GBuffer
 from ..projection.outline_mesh import cached_outline_mesh
 from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
 from ..projection.project import project_samples
-from .look import Look
-from .look_units import supersampled_look
+from .look import crease_angle_of
+from .look_units import PixelLook
 from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
@@ -44,7 +42,7 @@ MAX_OUTLINE_SAMPLES = 1 << 20
 PART_BORDER, EMPTY_BORDER = 1, 2
 
 #: The settings of a look that an outline depends on.
-OUTLINE_SETTINGS = ("outline", "crease_angle", "cross_creases", "supersampling", "display")
+OUTLINE_SETTINGS = ("outline", "crease_angle", "supersampling", "display")
 
 #: Label of all steps.
 STEP_LABEL = "drawing outlines"
@@ -53,7 +51,7 @@ STEP_LABEL = "drawing outlines"
 NEIGHBORS_4 = ((1, 0, 5), (-1, 0, 3), (0, 1, 7), (0, -1, 1))
 
 
-def outline_coverage(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> np.ndarray:
+def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = None) -> np.ndarray:
     """Compute the coverage of each pixel by outlines.
 
     Parameters
@@ -61,9 +59,8 @@ def outline_coverage(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -
     gbuffer : GBuffer
         Creases are drawn if its instances are known. If its pixels have several samples, outlines are
         drawn at the samples near them.
-    look : Look
-        In pixels of the frame. Its `outline`, `crease_angle`, `cross_creases`, `supersampling` and
-        `display` are used.
+    look : PixelLook
+        Its `outline`, `crease_angle`, `supersampling` and `display` are used.
     cache : Cache, optional
         Stores what does not depend on the view.
 
@@ -120,7 +117,7 @@ def _bands(gbuffer: GBuffer, entries: np.ndarray, margin: int) -> list[tuple[sli
 
 
 def _sample_outline(
-    gbuffer: GBuffer, look: Look, entries: np.ndarray, is_near: np.ndarray, cache: Cache | None
+    gbuffer: GBuffer, look: PixelLook, entries: np.ndarray, is_near: np.ndarray, cache: Cache | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the coverage of samples by outlines.
 
@@ -128,8 +125,7 @@ def _sample_outline(
     ----------
     gbuffer : GBuffer
         Its pixels have several samples.
-    look : Look
-        In its pixels.
+    look : PixelLook
     entries : (n,) intp ndarray
         The pixels whose samples are looked at.
     is_near : (P,) bool ndarray
@@ -144,7 +140,7 @@ def _sample_outline(
     """
     with progress(0.0, 0.4):
         samples, home, shown = project_samples(gbuffer, entries, look.display, cache)
-    look = supersampled_look(replace(look, supersampling=gbuffer.samples.side))
+    look = look.in_samples(gbuffer.samples.side)
     with progress(0.4, 0.8):
         edges = _Edges(samples, look, cache)
     edges.line_width[~is_near[home]] = 0
@@ -170,8 +166,7 @@ class _Edges:
     Parameters
     ----------
     gbuffer : GBuffer
-    look : Look
-        In its pixels.
+    look : PixelLook
     cache : Cache, optional
 
     Attributes
@@ -180,7 +175,7 @@ class _Edges:
         Largest width of lines that begin at a pixel; 0 where there is no edge.
     """
 
-    def __init__(self, gbuffer: GBuffer, look: Look, cache: Cache | None) -> None:
+    def __init__(self, gbuffer: GBuffer, look: PixelLook, cache: Cache | None) -> None:
         self._gbuffer, self._look = gbuffer, look
         self._count = count = len(gbuffer.pixel)
         self._defined = gbuffer.representation != 0
@@ -200,7 +195,7 @@ class _Edges:
             self._depth[block], _, _, self._tolerance[block] = depth_slopes(gbuffer, block)
         with progress(0.2, 0.6, STEP_LABEL):
             #: The `neighbor_masks` without creases.
-            self._mask = neighbor_masks(gbuffer, look.crease_angle, True)
+            self._mask = neighbor_masks(gbuffer, None)
         self.line_width = np.zeros(count, dtype=np.float32)
         #: (P,) bits `PART_BORDER` and `EMPTY_BORDER`.
         self._border = np.zeros(count, dtype=np.uint8)
@@ -253,7 +248,7 @@ class _Edges:
         """
         gbuffer, look, defined = self._gbuffer, self._look, self._defined
         instance = gbuffer.instances[instance_id]
-        crease_angle = None if look.cross_creases else look.crease_angle
+        crease_angle = crease_angle_of(look)
         with progress(0.0, 0.5):
             mesh = cached_outline_mesh(instance.surface, instance.matrix, crease_angle, cache)
         if len(mesh.crease_ends):

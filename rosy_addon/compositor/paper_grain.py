@@ -15,13 +15,13 @@ import numpy as np
 
 from ..core.progress import progress, report
 from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
-from .look import Look
+from .look_units import PixelLook
 from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
-#: grains, and its minimum in pixels.
-FINEST_SIGMA_GRAINS, MIN_SIGMA_PIXELS = 0.16, 0.7
+#: line widths, and its minimum in pixels.
+FINEST_SIGMA_WIDTHS, MIN_SIGMA_PIXELS = 0.16, 0.7
 
 #: Combined with the seed of a look, so that the paper grain is independent of the streaks.
 SEED_SALT = 0x5EED
@@ -33,9 +33,9 @@ BAND_WEIGHTS = (1.0, 0.6, 0.4)
 #: deviations of the streaks.
 PAPER_GRAIN_STRENGTH = 1.2
 
-#: Noise cells of the grain that is anchored to surfaces: size in grains of the streaks, minimum
+#: Noise cells of the grain that is anchored to surfaces: size in line widths, minimum
 #: size in pixels of the picture, and width of the high pass in cells.
-SURFACE_CELL_GRAINS, MIN_SURFACE_CELL_PIXELS, HIGH_PASS_CELLS = 0.4, 1.5, 6.0
+SURFACE_CELL_WIDTHS, MIN_SURFACE_CELL_PIXELS, HIGH_PASS_CELLS = 0.4, 1.5, 6.0
 
 #: Number of independent noise channels on surfaces. Lines use them in turn.
 PAPER_GRAIN_CHANNELS = 3
@@ -45,7 +45,12 @@ STEP_LABEL = "drawing the paper grain"
 
 
 def picture_paper_grain(
-    pixel: np.ndarray, width: int, grain: float, seed: int, subpixels: int = 1, line_count: int = 1
+    pixel: np.ndarray,
+    width: int,
+    line_width: float,
+    seed: int,
+    subpixels: int = 1,
+    line_count: int = 1,
 ) -> np.ndarray:
     """Make paper grain that is anchored to the picture.
 
@@ -59,8 +64,8 @@ def picture_paper_grain(
         Flat pixel indices into a supersampled frame, ascending.
     width : int
         Width of that frame in pixels.
-    grain : float
-        Size of the noise cells of the streaks, in pixels of the picture. The paper grain scales
+    line_width : float
+        Width of the lines in pixels of the picture. The paper grain scales
         with it.
     seed : int
     subpixels : int
@@ -72,9 +77,9 @@ def picture_paper_grain(
     (line_count, P) float32 ndarray
         Heights with mean 0 and standard deviation 1. Ink adheres better where they are larger.
     """
-    offset = line_offset(grain)
+    offset = line_offset(line_width)
     rectangle = tile_rectangle(pixel, width, subpixels, extra_columns=(line_count - 1) * offset)
-    tiles = cached_tiles(_grain_tiles, rectangle, grain, seed)
+    tiles = cached_tiles(_grain_tiles, rectangle, line_width, seed)
     heights = np.empty((line_count, len(pixel)), dtype=np.float32)
     for block in reported_blocks(len(pixel), STEP_LABEL):
         row, column = np.divmod(pixel[block], np.int32(width))
@@ -84,7 +89,7 @@ def picture_paper_grain(
     return heights
 
 
-def surface_paper_grain_args(look: Look) -> dict[str, Any]:
+def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
     """Return the parameters of `surface_noise` for paper grain that is anchored to surfaces.
 
     The noise has `PAPER_GRAIN_CHANNELS` channels. Their standard deviation is
@@ -92,33 +97,32 @@ def surface_paper_grain_args(look: Look) -> dict[str, Any]:
 
     Parameters
     ----------
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
     """
-    grain = max(SURFACE_CELL_GRAINS * look.grain, MIN_SURFACE_CELL_PIXELS * look.supersampling)
+    cell = max(SURFACE_CELL_WIDTHS * look.line_width, MIN_SURFACE_CELL_PIXELS * look.supersampling)
     return {
-        "grain": grain,
+        "cell": cell,
         "seed": look.seed ^ SEED_SALT,
         "channels": PAPER_GRAIN_CHANNELS,
         "density": 0.5,
-        "high_pass": HIGH_PASS_CELLS * grain,
+        "high_pass": HIGH_PASS_CELLS * cell,
     }
 
 
-def line_offset(grain: float) -> int:
+def line_offset(line_width: float) -> int:
     """Pixels between the grain of successive lines, enough for it to be uncorrelated."""
-    return int(np.ceil(3 * _band_sigmas(grain)[-1]))
+    return int(np.ceil(3 * _band_sigmas(line_width)[-1]))
 
 
-def _band_sigmas(grain: float) -> list[float]:
+def _band_sigmas(line_width: float) -> list[float]:
     """Standard deviations in pixels of the blurs whose differences are the frequency bands."""
-    finest_sigma = max(FINEST_SIGMA_GRAINS * grain, MIN_SIGMA_PIXELS)
+    finest_sigma = max(FINEST_SIGMA_WIDTHS * line_width, MIN_SIGMA_PIXELS)
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 
 
-def _grain_tiles(rectangle: TileRectangle, grain: float, seed: int) -> np.ndarray:
+def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.ndarray:
     """Flat float32 heights in a rectangle of the picture, row by row."""
-    sigmas = _band_sigmas(grain)
+    sigmas = _band_sigmas(line_width)
     margin = 4 * box_radius(sigmas[-1])
     left, right, bottom, top = rectangle
     column = np.arange(left - margin, right + margin, dtype=np.int32)

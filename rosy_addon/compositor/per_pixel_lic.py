@@ -14,9 +14,9 @@ import numpy as np
 from ..core.progress import progress, report
 from ..projection.pixel_blocks import pixel_blocks
 from .contrast import normalize_variance
-from .filter_kernel import WEIGHT_SLOPES, kernel_of, kernel_weights
+from .filter_kernel import WEIGHT_SLOPES, kernel_weights
 from .lic_images import LicImages, lic_images, magnitude_step_limits
-from .look import Look
+from .look_units import PixelLook
 from .pixel_field import NEIGHBOR_OFFSETS, PixelField, all_members, neighbor_table, normalized
 from .reported_blocks import reported_blocks
 
@@ -27,7 +27,7 @@ DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
 LineTracer = Callable[[slice], DirectionSampler]
 
 
-def brute_force(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
+def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicImages:
     """Compute one LIC image for each of the M lines.
 
     There are no breaking points and no second set of images, but every step of every streamline
@@ -36,7 +36,7 @@ def brute_force(field: PixelField, look: Look, noise: np.ndarray) -> LicImages:
     Parameters
     ----------
     field : PixelField
-    look : Look
+    look : PixelLook
         In pixels of the frame.
     noise : (P, K) float32 ndarray
 
@@ -101,14 +101,14 @@ def _best_match_sampler(
 
 
 def members_on_screen(
-    field: PixelField, look: Look, angle: float, count: int
+    field: PixelField, look: PixelLook, angle: float, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the first members of a field, and their directions on screen.
 
     Parameters
     ----------
     field : PixelField
-    look : Look
+    look : PixelLook
         Its `foreshorten` is used.
     angle : float
         The first member is nearest to it, in radians.
@@ -125,13 +125,13 @@ def members_on_screen(
         members[:, block] = all_members(part, angle)[:count]
         for member, direction in zip(members, directions, strict=True):
             in_plane = part.member_direction(member[block])
-            direction[block] = part.to_screen(in_plane, look.foreshorten)
+            direction[block] = part.to_screen(in_plane)
     return members, directions
 
 
 def convolve_members(
     field: PixelField,
-    look: Look,
+    look: PixelLook,
     noise: np.ndarray,
     neighbors: np.ndarray,
     tracers: Sequence[LineTracer],
@@ -141,7 +141,7 @@ def convolve_members(
     Parameters
     ----------
     field : PixelField
-    look : Look
+    look : PixelLook
         In pixels of the frame. Its `length`, `step`, kernel and `magnitude` are used.
     noise : (P, K) float32 ndarray
     neighbors : (9, P + 1) int32 ndarray
@@ -159,7 +159,7 @@ def convolve_members(
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
-    kernel = kernel_of(look)
+    kernel = look.kernel
     for member, tracer in enumerate(tracers):
         for block in pixel_blocks(count):
             block_limit = None if step_limit is None else step_limit[block]
@@ -257,7 +257,7 @@ def integrate_noise(
     neighbors: np.ndarray,
     direction_at: DirectionSampler,
     noise: np.ndarray,
-    look: Look,
+    look: PixelLook,
     side: int,
     step_limit: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -280,7 +280,7 @@ def integrate_noise(
         between calls.
     noise : (P + 1, K) float32 ndarray
         0 in row P.
-    look : Look
+    look : PixelLook
         In pixels of the frame. Its `length`, `step` and kernel are used.
     side : {1, -1}
         The half of the streamline: forward or backward.
@@ -294,8 +294,8 @@ def integrate_noise(
     samples : (B,) float32 ndarray
         Number of these samples.
     """
-    end, step = neighbors.shape[1] - 1, side * look.step
-    weight_slope = WEIGHT_SLOPES[kernel_of(look)][0 if side > 0 else 1]
+    end = neighbors.shape[1] - 1
+    weight_slope = WEIGHT_SLOPES[look.kernel][0 if side > 0 else 1]
     neighbors = neighbors.reshape(-1)
     entry = np.arange(block.start, block.stop, dtype=np.int32)
     offset = np.zeros((len(entry), 2), dtype=np.float32)
@@ -308,10 +308,10 @@ def integrate_noise(
     for step_index in range(1, look.length + 1):
         direction = direction_at(entry, offset)
         if previous_direction is None:
-            offset += np.float32(step) * direction
+            offset += np.float32(side) * direction
         else:
             offset += (
-                np.float32(1.5 * step) * direction - np.float32(0.5 * step) * previous_direction
+                np.float32(1.5 * side) * direction - np.float32(0.5 * side) * previous_direction
             )
         previous_direction = direction
         # At most to a neighbor, even where the direction turns sharply.

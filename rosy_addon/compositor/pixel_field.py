@@ -220,20 +220,16 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     return table
 
 
-def surface_pixel_field(
-    gbuffer: GBuffer, degree: int, crease_angle: float, cross_creases: bool
-) -> PixelField:
+def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | None) -> PixelField:
     """Extract the field of one degree from a G-buffer.
 
     Parameters
     ----------
     gbuffer : GBuffer
     degree : int
-    crease_angle : float
+    crease_angle : float or None
         Streamlines end where the normals of neighboring pixels differ by more than this angle,
-        in radians.
-    cross_creases : bool
-        Whether streamlines cross creases. If so, `crease_angle` is ignored.
+        in radians. None: they cross creases.
 
     Returns
     -------
@@ -242,7 +238,7 @@ def surface_pixel_field(
     """
     count = len(gbuffer.pixel)
     with progress(0.0, 0.5):
-        mask = neighbor_masks(gbuffer, crease_angle, cross_creases)
+        mask = neighbor_masks(gbuffer, crease_angle)
     jacobians = np.empty((2, count), dtype=np.complex64).T
     instance_selected = np.asarray(gbuffer.instance_degrees) == degree
     selected = np.empty(count, dtype=bool)

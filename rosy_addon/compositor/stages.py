@@ -14,12 +14,11 @@ from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.surface_sampling import feature_curvatures
 from .even_lines import EvenLines, even_lines
-from .flow import unconvolved_noise
 from .ibfv import streak_waves, wave_images
-from .lic import lic_lengths, look_noise, noise_args
+from .lic import lic_lengths, look_noise, noise_args, unconvolved_noise
 from .lic_images import LicImages
-from .look import Look, has_flow, lic_key
-from .look_units import cell_size_args
+from .look import crease_angle_of, has_flow
+from .look_units import PixelLook, cell_size_args
 from .outline import OUTLINE_SETTINGS, outline_coverage
 from .paper_grain import surface_paper_grain_args
 from .pixel_field import PixelField, surface_pixel_field
@@ -36,7 +35,7 @@ class ComposeStages:
     """The intermediate results of one G-buffer, computed once and stored in a cache.
 
     The key of a result contains the G-buffer and the settings that it depends on. A look that
-    differs only in other settings reuses it. All looks have lengths in pixels of the G-buffer.
+    differs only in other settings reuses it.
 
     Parameters
     ----------
@@ -52,19 +51,19 @@ class ComposeStages:
         self._cache = cache
         self._mesh_cache = mesh_cache
 
-    def pixel_field(self, degree: int, look: Look) -> PixelField:
+    def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
         """Pixel field of one degree, rotated by the wobble of the look."""
-        settings = look.crease_angle, look.cross_creases
+        crease_angle = crease_angle_of(look)
         field = self._cache.get_or_create(
-            ("pixel field", self._gbuffer, degree, *settings),
-            partial(surface_pixel_field, self._gbuffer, degree, *settings),
+            ("pixel field", self._gbuffer, degree, crease_angle),
+            partial(surface_pixel_field, self._gbuffer, degree, crease_angle),
         )
         if not has_wobble(look):
             return field
         angle = self._wobble_angle(look)[field.gbuffer_index]
         return rotate_pixel_field(field, np.float32(look.wobble) * angle)
 
-    def noise(self, field: PixelField, look: Look) -> np.ndarray:
+    def noise(self, field: PixelField, look: PixelLook) -> np.ndarray:
         """(P, K) float32 noise of a look at the pixels of a field."""
         if look.anchor == "surface":
             args = noise_args(look) | cell_size_args(look)
@@ -75,50 +74,55 @@ class ComposeStages:
         return self._cache.get_or_create(key, partial(look_noise, field, look))
 
     def lic(
-        self, field: PixelField, looks: Sequence[Look], strip: Strip | None = None
+        self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None = None
     ) -> list[LicImages]:
         """Compute the LIC images of a field at the pixels of a strip, or find them in the cache.
 
         The looks differ in the length of streamlines. The first is the longest. Methods other than "sheets"
         have no strips.
         """
+        key = "LIC images", self._gbuffer, field.degree, strip, *(look.lic_key() for look in looks)
+        return self._cache.get_or_create(key, partial(self._new_lic, field, looks, strip))
 
-        def convolved(convolve: Callable[..., Any]) -> Any:
-            with progress(0.0, NOISE_SHARE):
-                noise = self.noise(field, looks[0])
-            with progress(NOISE_SHARE, 1.0):
-                return convolve(field, looks, noise)
+    def _new_lic(
+        self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None
+    ) -> list[LicImages]:
+        """Compute LIC images, those of the method "ibfv" with flow from waves that are in the cache."""
+        if looks[0].method != "ibfv" or not has_flow(looks[0]):
+            return self._convolved(partial(lic_lengths, strip=strip), field, looks)
+        # The waves are the same at all times and speeds; see `ibfv`.
+        still = [replace(look, flow=1.0, flow_phase=0.0).lic_key() for look in looks]
+        key = "streak waves", self._gbuffer, field.degree, *still
+        compute = partial(self._convolved, streak_waves, field, looks)
+        return wave_images(self._cache.get_or_create(key, compute), looks)
 
-        def compute() -> list[LicImages]:
-            if looks[0].method != "ibfv" or not has_flow(looks[0]):
-                return convolved(partial(lic_lengths, strip=strip))
-            # The waves of the streaks of a flow serve all frames; see `ibfv`.
-            still = [lic_key(replace(look, flow=1.0, flow_phase=0.0)) for look in looks]
-            key = "streak waves", self._gbuffer, field.degree, *still
-            waves = self._cache.get_or_create(key, partial(convolved, streak_waves))
-            return wave_images(waves, looks)
+    def _convolved(
+        self, convolve: Callable[..., Any], field: PixelField, looks: Sequence[PixelLook]
+    ) -> Any:
+        """Make the noise of a field, and return what a method of LIC makes of it."""
+        with progress(0.0, NOISE_SHARE):
+            noise = self.noise(field, looks[0])
+        with progress(NOISE_SHARE, 1.0):
+            return convolve(field, looks, noise)
 
-        key = "LIC images", self._gbuffer, field.degree, strip, *map(lic_key, looks)
-        return self._cache.get_or_create(key, compute)
-
-    def undirected_texture(self, field: PixelField, look: Look) -> np.ndarray | None:
+    def undirected_texture(self, field: PixelField, look: PixelLook) -> np.ndarray | None:
         """Compute the texture where the field is undefined; see `undirected_texture`."""
         if field.representation.all():
             return None
         noise = unconvolved_noise(self.noise(field, look), look)
-        return undirected_texture(field, noise, look.grain)
+        return undirected_texture(field, noise, look.line_width)
 
-    def even_lines(self, field: PixelField, look: Look) -> EvenLines:
+    def even_lines(self, field: PixelField, look: PixelLook) -> EvenLines:
         """Compute the evenly spaced lines of a field, or find them in the cache."""
 
         def compute() -> EvenLines:
             angle = self._wobble_angle(look)[field.gbuffer_index] if has_wobble(look) else None
             return even_lines(self._gbuffer, field, look, angle, self._mesh_cache)
 
-        key = "even lines", self._gbuffer, field.degree, lic_key(look)
+        key = "even lines", self._gbuffer, field.degree, look.lic_key()
         return self._cache.get_or_create(key, compute)
 
-    def outline(self, field: PixelField, look: Look) -> np.ndarray:
+    def outline(self, field: PixelField, look: PixelLook) -> np.ndarray:
         """(P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
         coverage = self._cache.get_or_create(
             ("outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)),
@@ -126,7 +130,7 @@ class ComposeStages:
         )
         return coverage[field.gbuffer_index]
 
-    def surface_paper_grain(self, field: PixelField, look: Look) -> np.ndarray:
+    def surface_paper_grain(self, field: PixelField, look: PixelLook) -> np.ndarray:
         """(P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
 
         They are not normalized: the mean is `NOISE_MEAN`.
@@ -147,7 +151,7 @@ class ComposeStages:
         noise = self._cache.get_or_create(key, compute)
         return noise[field.gbuffer_index]
 
-    def _wobble_angle(self, look: Look) -> np.ndarray:
+    def _wobble_angle(self, look: PixelLook) -> np.ndarray:
         """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
-        key = "wobble", self._gbuffer, look.anchor, look.grain, *cell_size_args(look).values()
+        key = "wobble", self._gbuffer, look.anchor, look.line_width, *cell_size_args(look).values()
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..core.cache import Cache
 from ..core.progress import progress, report
-from .filter_kernel import Kernel, kernel_of
+from .filter_kernel import Kernel
 from .image_noise import image_noise
-from .look import Look
+from .look_units import PixelLook
 from .paper_grain import PAPER_GRAIN_STRENGTH, picture_paper_grain, surface_paper_grain_args
 from .surface_noise import OCTAVES, octave_weights
 from .undirected import disc_means
@@ -27,18 +27,18 @@ MAX_SOFTNESS, MIN_SOFTNESS = 1.6, 0.2
 #: Break amount that the wobble 1 adds everywhere.
 WOBBLE_BREAKS = 0.5
 
-#: Half the length of the pieces of broken lines, in grains, and its upper bound, as a fraction of
+#: Half the length of the pieces of broken lines, in line widths, and its upper bound, as a fraction of
 #: the length of the streamlines.
-BREAK_LENGTH_GRAINS, MAX_BREAK_FRACTION = 4.0, 0.4
+BREAK_LENGTH_WIDTHS, MAX_BREAK_FRACTION = 4.0, 0.4
 
 #: Entries of tables of thresholds, by coverage, and the number of break amounts that are sampled.
 COVERAGE_STEPS, BREAK_LEVELS = 256, 17
 
-#: Side of the sample of noise: in grains, and its least value in pixels.
-SAMPLE_GRAINS, MIN_SAMPLE_PIXELS = 64, 320
+#: Side of the sample of noise: in line widths, and its least value in pixels.
+SAMPLE_WIDTHS, MIN_SAMPLE_PIXELS = 64, 320
 
-#: Largest grain of the sample in pixels. Coarser noise is measured at a smaller scale.
-MAX_SAMPLE_GRAIN = 12.0
+#: Largest line width of the sample in pixels. Coarser noise is measured at a smaller scale.
+MAX_SAMPLE_WIDTH = 12.0
 
 #: Bins of the histogram of a sample.
 HISTOGRAM_BINS = 1600
@@ -52,7 +52,7 @@ STATISTICS_CACHE = Cache(max_bytes=1 << 16)
 
 #: The settings of a look that the statistics depend on.
 STATISTICS_SETTINGS = (
-    *("length", "step", "grain", "density", "high_pass", "taper", "oriented", "anchor"),
+    *("length", "line_width", "density", "high_pass", "kernel", "anchor"),
     *("crispness", "breaks", "wobble", "paper_grain", "supersampling"),
 )
 
@@ -87,13 +87,12 @@ class StreakStatistics(NamedTuple):
     paper_grain_std: float = 1.0
 
 
-def look_streak_statistics(look: Look) -> StreakStatistics:
+def look_streak_statistics(look: PixelLook) -> StreakStatistics:
     """Return the statistics of streaks, from the cache if they are there.
 
     Parameters
     ----------
-    look : Look
-        In pixels of the frame.
+    look : PixelLook
     """
     key = tuple(getattr(look, name) for name in STATISTICS_SETTINGS)
     statistics = STATISTICS_CACHE.get(key)
@@ -103,38 +102,37 @@ def look_streak_statistics(look: Look) -> StreakStatistics:
     return statistics
 
 
-def _measured(look: Look) -> StreakStatistics:
+def _measured(look: PixelLook) -> StreakStatistics:
     """Measure the statistics of streaks in a sample of noise."""
     report(0.0, STEP_LABEL)
-    scale = min(MAX_SAMPLE_GRAIN / look.grain, 1.0)
-    grain, kernel = scale * look.grain, kernel_of(look)
-    side = max(int(SAMPLE_GRAINS * grain), MIN_SAMPLE_PIXELS)
+    scale = min(MAX_SAMPLE_WIDTH / look.line_width, 1.0)
+    line_width, kernel = scale * look.line_width, look.kernel
+    side = max(int(SAMPLE_WIDTHS * line_width), MIN_SAMPLE_PIXELS)
     length_pixels, break_pixels = (
-        max(round(scale * ((2 * steps + 1) * look.step)), 1)
-        for steps in (look.length, break_steps(look))
+        max(round(scale * (2 * steps + 1)), 1) for steps in (look.length, break_steps(look))
     )
     width = side + length_pixels
     anchored = look.anchor == "surface"
-    noise = _noise_sample((side, width), grain, look.density, scale * look.high_pass, anchored)
+    noise = _noise_sample((side, width), line_width, look.density, scale * look.high_pass, anchored)
     report(0.2, STEP_LABEL)
     streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, kernel))
     report(0.3, STEP_LABEL)
     break_means = _line_means(noise, min(break_pixels, length_pixels), side, kernel)
     break_streaks, break_std = _standardized(break_means)
     report(0.4, STEP_LABEL)
-    spots, disc_std = _standardized(disc_means(noise[:, :side], grain))
+    spots, disc_std = _standardized(disc_means(noise[:, :side], line_width))
     report(0.5, STEP_LABEL)
     paper_relief, paper_grain_std = 0.0, 1.0
     amplitude = PAPER_GRAIN_STRENGTH * look.paper_grain
     if amplitude and anchored:
         args = surface_paper_grain_args(look)
-        lengths = scale * args["grain"], scale * args["high_pass"]
+        lengths = scale * args["cell"], scale * args["high_pass"]
         heights = _noise_sample(streaks.shape, lengths[0], args["density"], lengths[1], True)
         paper_grain_std = float(heights.std())
         paper_relief = amplitude / paper_grain_std * (heights - heights.mean())
     elif amplitude:
         pixel = np.arange(streaks.size, dtype=np.int32)
-        heights = picture_paper_grain(pixel, len(streaks[0]), grain, 1)
+        heights = picture_paper_grain(pixel, len(streaks[0]), line_width, 1)
         paper_relief = amplitude * heights[0].reshape(streaks.shape)
     report(0.6, STEP_LABEL)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
@@ -185,9 +183,9 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
     return min_amount + (1 - min_amount) * breaks * (1 - target_coverage) ** 2
 
 
-def break_steps(look: Look) -> int:
+def break_steps(look: PixelLook) -> int:
     """Steps in each direction of the short streaks that break lines into pieces."""
-    steps = min(BREAK_LENGTH_GRAINS * look.grain / look.step, MAX_BREAK_FRACTION * look.length)
+    steps = min(BREAK_LENGTH_WIDTHS * look.line_width, MAX_BREAK_FRACTION * look.length)
     return max(round(steps), 1)
 
 
@@ -217,11 +215,11 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
 
 
 def _noise_sample(
-    shape: tuple[int, int], grain: float, density: float, high_pass: float, anchored: bool
+    shape: tuple[int, int], cell: float, density: float, high_pass: float, anchored: bool
 ) -> np.ndarray:
     """Make an image of noise in image space or, if `anchored`, as on a surface.
 
-    On the surface, the cells of the middle octave have the size `grain` on screen.
+    On the surface, the cells of the middle octave have the size `cell` on screen.
     """
     pixel = np.arange(shape[0] * shape[1], dtype=np.int32)
     octave_offsets = np.arange(OCTAVES) - OCTAVES // 2 if anchored else np.zeros(1)
@@ -229,7 +227,7 @@ def _noise_sample(
     for octave_offset, weight in zip(
         octave_offsets, octave_weights(octave_offsets) if anchored else (1.0,), strict=True
     ):
-        cell_size = grain * 2.0**octave_offset
+        cell_size = cell * 2.0**octave_offset
         cells = image_noise(pixel, shape[1], cell_size, 1, 1, density=density, high_pass=high_pass)
         noise += np.float32(weight) * cells.reshape(shape)
     return noise

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
+from .covering import SINK_CELL, Covering
 from .drifting_averages import MAX_LEVELS, DriftingAverages, MovingKernel
-from .filter_kernel import kernel_of, kernel_weights
-from .flow import streamline_reach
-from .look import Look, has_flow
-
-#: Steps between compactions, which remove streamlines that have ended.
-COMPACT_INTERVAL = 8
+from .filter_kernel import kernel_weights
+from .look import has_flow
+from .look_units import PixelLook
+from .streamline_tracing import COMPACT_INTERVAL, TracedLanes, axial_steps, lateral_offset
 
 #: Factor of the derivative of noise across a streamline. A central difference over two pixels
 #: predicts the change over half a pixel only in part. This value gives streaks the width that they
@@ -27,21 +24,6 @@ INTERPOLATED_GAIN = 1.0
 #: Distance from the center of a pixel within which the average of a streamline is preferred,
 #: pixels.
 MAX_LATERAL_OFFSET = 0.25
-
-#: Steps after which streamlines that return to a state end. Shorter ones may return.
-MIN_LOOP_STEPS = 256
-
-#: Pixels within which a state may still be that of the same passage, not a return.
-MIN_LOOP_PIXELS = 4.0
-
-#: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
-PLASTIC_NUMBER = 1.3247179572447460
-
-#: Columns by which the offsets of the seeds of a sheet are shifted against those of the sheet before.
-SHEET_SHIFT = 17
-
-#: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
-MAX_SEAM_OFFSET = np.float32(1.5)
 
 
 class StreamlineBatch:
@@ -56,9 +38,8 @@ class StreamlineBatch:
     Parameters
     ----------
     covering : Covering
-    looks : sequence of Look
-        In pixels of the frame. Their `length`, `step` and kernel are used. Averages are taken over
-        each of the lengths; all else is the same.
+    looks : sequence of PixelLook
+        Averages are taken over the `length` of each; all else is the same.
     step_limits : sequence of (C,) intp ndarray or None
         Steps in each direction that the average of a cell covers, for each look. None for its
         `length`.
@@ -75,7 +56,7 @@ class StreamlineBatch:
     def __init__(
         self,
         covering: Covering,
-        looks: Sequence[Look],
+        looks: Sequence[PixelLook],
         step_limits: Sequence[np.ndarray | None],
         half_window: int,
         max_streamlines: int,
@@ -83,9 +64,9 @@ class StreamlineBatch:
     ) -> None:
         self._covering = covering
         look = looks[0]
-        self._lengths, self._kernel = [look.length for look in looks], kernel_of(look)
+        self._lengths, self._kernel = [look.length for look in looks], look.kernel
         self._half_window = half_window
-        self._max_steps = half_window + max(map(streamline_reach, looks))
+        self._max_steps = half_window + max(look.streamline_reach() for look in looks)
         self._moving_kernels = []
         if has_flow(look):
             self._moving_kernels = [
@@ -95,14 +76,13 @@ class StreamlineBatch:
         step_scale, noise_scale, slope_scale = covering.state_scales
         self._step_scale, self._noise_scale = np.float32(1.5 * step_scale), np.float32(noise_scale)
         lateral_gain = (INTERPOLATED_GAIN if interpolates else LATERAL_GAIN) * slope_scale
-        self._lateral_gain = np.float32(lateral_gain / look.step * step_scale)
+        self._lateral_gain = np.float32(lateral_gain * step_scale)
         # The same, in the unit of the noise of states.
         self._noise_gain = self._lateral_gain / self._noise_scale if interpolates else None
-        self._max_lateral = np.float32(MAX_LATERAL_OFFSET * look.step / step_scale)
+        self._max_lateral = np.float32(MAX_LATERAL_OFFSET / step_scale)
         self._step_limits = [
             None if limit is None else np.tile(limit, covering.line_count) for limit in step_limits
         ]
-        self._min_loop_steps = math.ceil(MIN_LOOP_PIXELS / look.step)
         lanes, channels = 2 * max_streamlines, covering.noise_channels
         self._has_second_sums = self._kernel != "box" or bool(self._moving_kernels)
         self._sums = np.empty((self._max_steps + 1, lanes, channels), dtype=np.complex64)
@@ -256,145 +236,51 @@ class StreamlineBatch:
         last_step : int
             Last row that is filled.
         """
-        covering, lanes = self._covering, 2 * len(seeds)
-        scalar_type = np.float64 if covering.noise_channels == 1 else np.complex128
-        state_table = covering.state_table.view(scalar_type)[:, 0]
-        # A streamline makes at most one full turn in four steps.
-        max_winding = self._max_steps // 4 + 2
-        sheet_offset, backward_offset = covering.sheet_offsets(max_winding)
-        sheet, cell = np.divmod(seeds, covering.cell_count)
-        cell = np.concatenate([cell, cell])
-        sheet = (
-            np.concatenate([sheet, sheet + backward_offset])
-            + max_winding * covering.sheets_per_turn
-        )
-        packed_phase = covering.packed_phase.take(cell)
-        target_phase = packed_phase + sheet.astype(np.float32)
-        seed_offsets = _r2_offsets(covering, seeds)
-        position = np.concatenate([seed_offsets, seed_offsets])
-        previous_direction = None
-        total = np.zeros((lanes, covering.noise_channels), dtype=np.complex64)
-        # Lanes that had not ended at the last compaction; None before the first one.
-        active, step_counts = None, np.full(lanes, self._max_steps)
-        active_counts = step_counts
-        loops = _LoopFinder(self._min_loop_steps)
-        step_scale = self._step_scale / np.float32(1.5)
+        lanes = TracedLanes(self._covering, seeds, self._max_steps)
         for step in range(self._max_steps + 1):
-            state = sheet_offset.take(sheet, mode="clip")
-            state += cell
-            record = state_table.take(state, mode="clip").view(np.int16).astype(np.float32)
-            record = record.view(np.complex64).reshape(len(cell), -1)
-            direction = record[:, 0].copy()
+            state, direction, noise = lanes.look_up()
             lateral = None
+            if self._noise_gain is not None or step <= self._half_window:
+                lateral = lateral_offset(lanes.position, direction)
             if self._noise_gain is not None:
-                lateral = _lateral_offset(position, direction)
-                noise = record[:, 1:]
                 noise.real += (lateral * self._noise_gain)[:, None] * noise.imag
-            elif step <= self._half_window:
-                lateral = _lateral_offset(position, direction)
-            total += record[:, 1:]
-            lane = slice(lanes) if active is None else active
-            self._totals[lane] = total
-            self._sums[step, :lanes] = self._totals[:lanes]
-            if self._has_second_sums and step:
-                self._sums[step, :lanes] += self._sums[step - 1, :lanes]
+            lanes.total += noise
+            self._store_sums(step, lanes)
             if step <= self._half_window:
-                records = [(self._states, state), (self._lateral_offset, lateral)]
-                if self._axial_offset is not None:
-                    axial = _axial_steps(position, direction, step_scale)
-                    records.append((self._axial_offset, axial))
-                for buffer, values in records:
-                    buffer[step, :lanes] = SINK_CELL  # and 0, of lanes that have ended
-                    buffer[step, lane] = values
+                self._store_passage(step, lanes, state, direction, lateral)
             if step == self._max_steps:
                 break
-            # Two-step Adams-Bashforth method, 3/2 d - 1/2 d_previous.
-            displacement = direction.copy() if previous_direction is None else previous_direction
-            flat_displacement, offset = displacement.view(np.float32), position.view(np.float32)
-            flat_displacement *= np.float32(-1 / 3)
-            displacement += direction
-            flat_displacement *= self._step_scale
-            position += displacement
-            previous_direction = direction
-            np.rint(offset, out=flat_displacement)
-            np.maximum(flat_displacement, np.float32(-1), out=flat_displacement)
-            np.minimum(flat_displacement, np.float32(1), out=flat_displacement)
-            position -= displacement
-            ended, crossing, seam = self._step_cells(
-                cell,
-                unpack_neighbor_mask(packed_phase),
-                flat_displacement[::2],
-                flat_displacement[1::2],
-            )
-            active_counts[ended] = step
-            looping = loops.find(step, state, cell)
-            active_counts[looping] = step
-            cell[looping] = SINK_CELL
-            if len(crossing):
-                steps = covering.seams.steps
-                reached = steps.displaced(seam, position[crossing]) + steps.offset.take(seam)
-                axes = reached.view(np.float32)
-                np.clip(axes, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=axes)
-                position[crossing] = reached
-                direction[crossing] = steps.displaced(seam, direction[crossing])
-                target_phase[crossing] += covering.seams.sheet_shift.take(seam)
-            packed_phase = covering.packed_phase.take(cell, mode="clip")
-            target_phase -= packed_phase
-            np.rint(target_phase, out=target_phase)
-            sheet = target_phase.astype(np.intp)
-            target_phase += packed_phase
+            lanes.advance(step, state, direction, self._step_scale)
             if step % COMPACT_INTERVAL == COMPACT_INTERVAL - 1:
-                remaining = np.flatnonzero(cell)
-                if len(remaining) < 0.9 * len(cell):
-                    active = np.arange(lanes) if active is None else active
-                    step_counts[active] = active_counts
-                    if not len(remaining):
-                        self._extend_sums(step, lanes)
-                        return step_counts, step
-                    active, active_counts, cell, sheet = (
-                        values[remaining] for values in (active, active_counts, cell, sheet)
-                    )
-                    packed_phase, target_phase, total = (
-                        values[remaining] for values in (packed_phase, target_phase, total)
-                    )
-                    position, previous_direction = (
-                        position[remaining],
-                        previous_direction[remaining],
-                    )
-                    loops.keep(remaining)
-        if active is not None:
-            step_counts[active] = active_counts
-        return step_counts, self._max_steps
+                lanes.compact()
+                if lanes.have_ended:
+                    self._extend_sums(step, lanes.count)
+                    return lanes.step_counts(), step
+        return lanes.step_counts(), self._max_steps
 
-    def _step_cells(
-        self, cell: np.ndarray, mask: np.ndarray, column: np.ndarray, row: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Step cells by -1 to 1 columns and rows, in place.
+    def _store_sums(self, step: int, lanes: TracedLanes) -> None:
+        """Fill a row of `_sums`. Lanes that have ended keep their totals."""
+        self._totals[lanes.index] = lanes.total
+        self._sums[step, : lanes.count] = self._totals[: lanes.count]
+        if self._has_second_sums and step:
+            self._sums[step, : lanes.count] += self._sums[step - 1, : lanes.count]
 
-        Returns
-        -------
-        ended, crossing : (n,) intp ndarray
-            Indices of the streamlines that end, and of those that cross a seam.
-        seam : (n,) intp ndarray
-            The numbers of these steps across seams.
-        """
-        crossing = seam = np.empty(0, dtype=np.intp)
-        blocked = np.flatnonzero(mask != ALL_NEIGHBORS)
-        bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
-        is_blocked = mask[blocked] >> bit & 1 == 0
-        blocked, bit = blocked[is_blocked], bit[is_blocked]
-        is_tracing = cell[blocked] != SINK_CELL
-        ended, seams = blocked[is_tracing], self._covering.seams
-        if seams is not None and len(ended):
-            is_crossing, seam = seams.find(cell[ended], bit[is_tracing])
-            crossing, ended = ended[is_crossing], ended[~is_crossing]
-        cell_offset = row * np.float32(self._covering.width)
-        cell_offset += column
-        cell += cell_offset.astype(np.intp)
-        cell[blocked] = SINK_CELL
-        if len(crossing):
-            cell[crossing] = seams.target_cell.take(seam)
-        return ended, crossing, seam
+    def _store_passage(
+        self,
+        step: int,
+        lanes: TracedLanes,
+        state: np.ndarray,
+        direction: np.ndarray,
+        lateral: np.ndarray,
+    ) -> None:
+        """Fill a row of the buffers of states and offsets. Lanes that have ended are in the sink."""
+        records = [(self._states, state), (self._lateral_offset, lateral)]
+        if self._axial_offset is not None:
+            axial = axial_steps(lanes.position, direction, self._step_scale / np.float32(1.5))
+            records.append((self._axial_offset, axial))
+        for buffer, values in records:
+            buffer[step, : lanes.count] = SINK_CELL  # 0, which is no offset, too
+            buffer[step, lanes.index] = values
 
     def _extend_sums(self, last_step: int, lanes: int) -> None:
         """Fill the rows after the end of the last streamline, where sums of prefix sums still grow."""
@@ -478,63 +364,3 @@ class StreamlineBatch:
         lane = np.arange(lanes)
         lane = np.where(is_opposite, (lane + half) % lanes, lane)
         return flat.take(row * stride + lane, axis=0)
-
-
-class _LoopFinder:
-    """Finds streamlines that return to a state, in a number of steps like that of the loop.
-
-    Each state is compared with one state of the past, which is replaced at steps that are powers of
-    two (Brent, An improved Monte Carlo factorization algorithm, 1980).
-
-    Parameters
-    ----------
-    min_steps : int
-        Steps of a loop, at least.
-    """
-
-    def __init__(self, min_steps: int) -> None:
-        self._min_steps = min_steps
-        self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
-
-    def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
-        """Indices of the streamlines that have returned to a state, and not ended otherwise."""
-        if step in (MIN_LOOP_STEPS, 2 * self._past_step):
-            self._past_step, self._past_state = step, state
-        elif step >= self._past_step + self._min_steps:
-            return np.flatnonzero((state == self._past_state) & (next_cell != SINK_CELL))
-        return np.empty(0, dtype=np.intp)
-
-    def keep(self, remaining: np.ndarray) -> None:
-        """Forget the streamlines that have ended; those with these indices remain."""
-        if len(self._past_state):
-            self._past_state = self._past_state[remaining]
-
-
-def _lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
-    lateral = position.imag * direction.real
-    lateral -= position.real * direction.imag
-    return lateral
-
-
-def _axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-    """(n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
-    square = direction.real * direction.real + direction.imag * direction.imag
-    along = position.real * direction.real + position.imag * direction.imag
-    return along / np.minimum(-step_scale * square, np.float32(-1))
-
-
-def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
-    """(n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
-
-    If all streamlines started at the centers, they would step to the next row of pixels at the same
-    time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. They
-    depend on nothing but the place of a seed, so that streamlines stay where they are if a field changes
-    a little.
-    """
-    sheet, cell = np.divmod(seeds, covering.cell_count)
-    row, column = np.divmod(cell, covering.width)
-    row, column = row + 0.5, column + 0.5 + SHEET_SHIFT * sheet
-    near, far = 1 / PLASTIC_NUMBER, 1 / PLASTIC_NUMBER**2
-    position = (near * column + far * row) % 1 + 1j * ((far * column + near * row) % 1)
-    return (position - (0.5 + 0.5j)).astype(np.complex64)

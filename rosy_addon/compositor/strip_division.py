@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +19,7 @@ from .hatching import (
 )
 from .image_noise import MAX_MARGIN, high_pass_margin
 from .look import Look, is_even, magnitude_range, uses_magnitude
-from .look_units import look_in_pixels
+from .look_units import PixelLook, pixel_look
 from .outline import FULL_MARK_LENGTH
 from .paper_grain import surface_paper_grain_args
 from .streak_statistics import break_steps
@@ -64,7 +63,7 @@ def divide_into_strips(
     if look.method == "sheets":
         degrees = {field.degree for instance in instances if (field := instance.field) is not None}
         lines = max((FieldSymmetry(degree, ()).line_count for degree in degrees), default=1)
-        margin = _longest_margin(look_in_pixels(replace(look, supersampling=1), camera, instances))
+        margin = _longest_margin(pixel_look(look, camera, instances))
         rows = max(
             STRIP_STATES / (2 * lines * camera.width), MIN_STRIP_MARGINS * margin, 2 * OVERLAP_ROWS
         )
@@ -113,12 +112,12 @@ def group_strips(
 
 def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) -> int:
     """Return how many rows around a strip its pixels may depend on."""
-    look = look_in_pixels(replace(look, supersampling=1), camera, instances)
+    look = pixel_look(look, camera, instances)
     noise = 0
     if look.anchor == "surface":
         # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
-        noise = high_pass_margin(look.high_pass) + int(np.ceil(look.grain))
-    disc = int(np.abs(disc_offsets(look.grain)).max())
+        noise = high_pass_margin(look.high_pass) + int(np.ceil(look.line_width))
+    disc = int(np.abs(disc_offsets(look.line_width)).max())
     rows = max(_longest_margin(look), disc) + noise
     if has_paper_grain(look) and look.anchor == "surface":
         rows = max(rows, high_pass_margin(surface_paper_grain_args(look)["high_pass"]))
@@ -127,11 +126,11 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
     return OVERLAP_ROWS + rows + NEIGHBOR_ROWS
 
 
-def _longest_margin(look: Look) -> int:
+def _longest_margin(look: PixelLook) -> int:
     """Return the largest `streamline_margin` of all images that a look takes."""
     lengths = [look.length]
     if has_breaks(look):
         lengths.append(break_steps(look))
     if has_overshoot(look):
         lengths.append(overshoot_steps(look))
-    return streamline_margin(replace(look, length=max(lengths)))
+    return streamline_margin(look.with_length(max(lengths)))

@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .flow import streamline_reach
-from .look import Look
+from .look_units import PixelLook
 
 #: Rows of the strip above in which a strip takes averages of streamlines, too.
 OVERLAP_ROWS = 12
@@ -54,9 +53,9 @@ class Strip(NamedTuple):
         return self.start, min(self.stop + FADE_ROWS, self.height)
 
 
-def streamline_margin(look: Look) -> int:
+def streamline_margin(look: PixelLook) -> int:
     """Return how many rows streamlines may leave a strip."""
-    return int(streamline_reach(look) * look.step) + 2
+    return look.streamline_reach() + 2
 
 
 def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.ndarray:

@@ -46,11 +46,11 @@ LATTICE_ANGLES = (0.61, 1.13, 0.37)
 #: neither.
 OCTAVES = 3
 
-#: Range of the ratio of the size of cells to `grain` in which the contrast is corrected for it.
+#: Range of the ratio of the size of cells to `cell` in which the contrast is corrected for it.
 CONTRAST_SCALE_RANGE = (0.25, 4.0)
 
-#: Radius of curvature on screen, in grains, below which a feature is small; see `feature_scale`.
-FEATURE_GRAINS = 32.0
+#: Radius of curvature on screen, in cells, below which a feature is small; see `feature_scale`.
+FEATURE_CELLS = 32.0
 
 #: Number of bits of the largest index of a cell.
 MAX_CELL_BITS = 28
@@ -61,7 +61,7 @@ OCTAVE_OFFSET = 64
 
 def surface_noise(
     gbuffer: GBuffer,
-    grain: float,
+    cell: float,
     seed: int,
     channels: int,
     *,
@@ -78,7 +78,7 @@ def surface_noise(
     ----------
     gbuffer : GBuffer
         With its mesh instances.
-    grain : float
+    cell : float
         Approximate side of a cell on screen, in pixels.
     seed : int
     channels : int
@@ -88,7 +88,7 @@ def surface_noise(
     high_pass : float
         Variations wider than about this many pixels are removed. 0 leaves the noise white.
     pixel : float
-        Size in Blender units that replaces a pixel as the unit of `grain`: cells then have a fixed
+        Size in Blender units that replaces a pixel as the unit of `cell`: cells then have a fixed
         size on the surface. 0 gives cells of a fixed size on screen.
     smallest : float
         Minimum side of a cell on screen, in pixels. Only used if `pixel` is not 0.
@@ -110,14 +110,14 @@ def surface_noise(
     for block in reported_blocks(len(gbuffer.pixel), STEP_LABEL, 0.3, 0.6):
         block_rest = rest.block(block)
         instance_id = gbuffer.instance_id[block]
-        scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / grain)
+        scale = cell_scale(units, instance_id, block_rest.pixel_size, smallest / cell)
         if detail:
-            scale = scale * feature_scale(curvature[block], block_rest.pixel_size, grain, detail)
-        size = np.maximum(block_rest.pixel_size * scale, 1e-30) * np.float32(grain)
+            scale = scale * feature_scale(curvature[block], block_rest.pixel_size, cell, detail)
+        size = np.maximum(block_rest.pixel_size * scale, 1e-30) * np.float32(cell)
         block_hash = instance_hash[instance_id]
         solid_noise(block_rest, size, block_hash, seed, density, out=total[:, block])
         # The variance of a mean along a streamline is proportional to the size of cells. The factor
-        # keeps it at that of cells of the size `grain`.
+        # keeps it at that of cells of the size `cell`.
         total[:, block] /= np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     del rest  # as large as all other arrays together
     if high_pass:
@@ -220,11 +220,11 @@ def cell_scale(
 
 
 def feature_scale(
-    curvature: np.ndarray, pixel_size: np.ndarray, grain: float, detail: float
+    curvature: np.ndarray, pixel_size: np.ndarray, cell: float, detail: float
 ) -> np.ndarray:
     """Compute the factor by which cells are smaller on small features.
 
-    It is proportional to the radius of curvature on screen below `FEATURE_GRAINS` grains.
+    It is proportional to the radius of curvature on screen below `FEATURE_CELLS` cells.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def feature_scale(
         In 1 / Blender unit of object space.
     pixel_size : (n,) float32 ndarray
         `RestCoordinates.pixel_size`.
-    grain : float
+    cell : float
         In pixels.
     detail : float
         The factor is at least 1 - detail.
@@ -241,7 +241,7 @@ def feature_scale(
     -------
     (n,) float32 ndarray
     """
-    bend = curvature * pixel_size * np.float32(FEATURE_GRAINS * grain)
+    bend = curvature * pixel_size * np.float32(FEATURE_CELLS * cell)
     return 1 / np.clip(bend, 1, np.float32(1 / (1 - detail)))
 
 

@@ -13,8 +13,8 @@ from .image_noise import NOISE_MEAN
 from .pixel_field import PixelField, entries_of_rows
 from .reported_blocks import reported_blocks
 
-#: Radius of the disc in grains: spots are then about as wide as lines.
-DISC_GRAINS = 1.0
+#: Radius of the disc in line widths: spots are then about as wide as lines.
+DISC_WIDTHS = 1.0
 
 #: Samples of the noise in a disc.
 SAMPLE_COUNT = 32
@@ -26,16 +26,18 @@ GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 STEP_LABEL = "drawing undirected texture"
 
 
-def disc_offsets(grain: float) -> np.ndarray:
+def disc_offsets(line_width: float) -> np.ndarray:
     """Return the (SAMPLE_COUNT, 2) int32 pixel offsets (dx, dy) of the samples of a disc."""
     # A sunflower spiral is spread evenly over the unit disc.
     index = np.arange(SAMPLE_COUNT)
     radius, angle = np.sqrt((index + 0.5) / SAMPLE_COUNT), index * GOLDEN_ANGLE
     disc = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1).astype(np.float32)
-    return np.floor(np.float32(DISC_GRAINS * grain) * disc + np.float32(0.5)).astype(np.int32)
+    return np.floor(np.float32(DISC_WIDTHS * line_width) * disc + np.float32(0.5)).astype(np.int32)
 
 
-def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np.ndarray | None:
+def undirected_texture(
+    field: PixelField, noise: np.ndarray, line_width: float
+) -> np.ndarray | None:
     """Average the noise over a disc around each pixel where the field is undefined.
 
     Samples of the disc beyond the pixels of the field are left out.
@@ -44,7 +46,7 @@ def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np
     ----------
     field : PixelField
     noise : (P, K) float32 ndarray
-    grain : float
+    line_width : float
         Width of a cell of the noise in pixels.
 
     Returns
@@ -56,7 +58,7 @@ def undirected_texture(field: PixelField, noise: np.ndarray, grain: float) -> np
     undefined = np.flatnonzero(field.representation == 0)
     if not len(undefined):
         return None
-    offsets = disc_offsets(grain)
+    offsets = disc_offsets(line_width)
     margin = int(np.abs(offsets).max())
     stride = field.width + 2 * margin
     texture = np.full(len(noise), np.nan, dtype=np.float32)
@@ -93,14 +95,14 @@ def _padded(field: PixelField, pixel: np.ndarray, stride: int) -> np.ndarray:
     return row.astype(np.intp) * stride + column
 
 
-def disc_means(noise: np.ndarray, grain: float) -> np.ndarray:
+def disc_means(noise: np.ndarray, line_width: float) -> np.ndarray:
     """Average an image of noise over a disc around each pixel.
 
     Parameters
     ----------
     noise : (H, W) ndarray
         Taken as periodic.
-    grain : float
+    line_width : float
         Width of a cell of the noise in pixels.
 
     Returns
@@ -108,6 +110,6 @@ def disc_means(noise: np.ndarray, grain: float) -> np.ndarray:
     (H, W) float32 ndarray
     """
     total = np.zeros(noise.shape, dtype=np.float32)
-    for dx, dy in disc_offsets(grain).tolist():
+    for dx, dy in disc_offsets(line_width).tolist():
         total += np.roll(noise, (-dy, -dx), axis=(0, 1))
     return total / np.float32(SAMPLE_COUNT)

@@ -9,6 +9,7 @@ surface and keep their wavelength on screen.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,8 +17,8 @@ from ..core.deterministic_trig import cos_sin, unit_phasor
 from ..core.progress import progress
 from ..projection.gbuffer import GBuffer
 from ..projection.rest_coordinates import rest_coordinates
-from .look import Look, is_hatched
-from .look_units import cell_size_args
+from .look import is_hatched
+from .look_units import PixelLook, cell_size_args
 from .pixel_field import PixelField, product
 from .reported_blocks import reported_blocks
 from .surface_noise import cell_scale, instance_units
@@ -25,8 +26,8 @@ from .surface_noise import cell_scale, instance_units
 #: Number of plane waves in the sum.
 WAVE_COUNT = 7
 
-#: Mean wavelength, in grains.
-MEAN_WAVELENGTH_GRAINS = 40.0
+#: Mean wavelength, in line widths.
+MEAN_WAVELENGTH_WIDTHS = 40.0
 
 #: Standard deviation of the angle between lines and field at `Look.wobble` 1, radians.
 WOBBLE_STD = 0.09
@@ -37,7 +38,7 @@ WOBBLE_STD = 0.09
 UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
 
 
-def has_wobble(look: Look) -> bool:
+def has_wobble(look: Any) -> bool:
     """Whether lines wobble as if drawn by hand."""
     return is_hatched(look) and look.wobble > 0
 
@@ -59,15 +60,15 @@ def wave_table() -> np.ndarray:
     return table.astype(np.float32)
 
 
-def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
+def wobble_angle(gbuffer: GBuffer, look: PixelLook) -> np.ndarray:
     """Compute the angle between lines and field at `Look.wobble` 1.
 
     Parameters
     ----------
     gbuffer : GBuffer
         With its mesh instances, if the look is anchored to the surface.
-    look : Look
-        In pixels of the frame. Its `anchor`, `grain` and unit of lengths are used.
+    look : PixelLook
+        Its `anchor`, `line_width` and unit of lengths are used.
 
     Returns
     -------
@@ -75,7 +76,7 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
         Radians, with a mean of about 0 and a standard deviation of about `WOBBLE_STD`.
     """
     count = len(gbuffer.pixel)
-    grain = np.float32(look.grain)
+    line_width = np.float32(look.line_width)
     cell_size, rest = cell_size_args(look), None
     if look.anchor == "surface":
         units = instance_units(gbuffer, cell_size["pixel"])
@@ -88,22 +89,22 @@ def wobble_angle(gbuffer: GBuffer, look: Look) -> np.ndarray:
             position = np.stack([column, row, 0 * row]).astype(np.float32)
             size = np.ones(len(row), dtype=np.float32)
         else:
-            block_rest, min_scale = rest.block(block), cell_size["smallest"] / look.grain
+            block_rest, min_scale = rest.block(block), cell_size["smallest"] / look.line_width
             instance_id = gbuffer.instance_id[block]
             scale = cell_scale(units, instance_id, block_rest.pixel_size, min_scale)
             position, size = block_rest.at_offset(0, 0), block_rest.pixel_size * scale
-        angle[block] = solid_wobble_angle(position, np.maximum(size, 1e-30) * grain)
+        angle[block] = solid_wobble_angle(position, np.maximum(size, 1e-30) * line_width)
     return angle
 
 
-def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
+def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarray:
     """Compute the angle between lines and field at `Look.wobble` 1, at positions in rest space.
 
     Parameters
     ----------
     position : (3, n) float32 ndarray
-    grain : (n,) or () float32 ndarray
-        Size of the cells of the noise there.
+    line_width : (n,) or () float32 ndarray
+        Width of the lines there.
 
     Returns
     -------
@@ -111,7 +112,7 @@ def solid_wobble_angle(position: np.ndarray, grain: np.ndarray) -> np.ndarray:
         Radians.
     """
     # The base-2 logarithm of the mean wavelength.
-    level = np.log2(grain * np.float32(MEAN_WAVELENGTH_GRAINS))
+    level = np.log2(line_width * np.float32(MEAN_WAVELENGTH_WIDTHS))
     level = np.broadcast_to(level, position.shape[1:])
     octave = np.floor(level)
     blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)

@@ -291,18 +291,6 @@ def pixel_lengths(cls: type) -> list[Number]:
     return [item for item in described if isinstance(item, Number) and item.is_pixel_length]
 
 
-def stage_key(settings: Any, stage: Stage) -> tuple[Any, ...]:
-    """Return a key of the values that the result of a stage depends on.
-
-    Settings that do not apply count with their defaults.
-    """
-    return tuple(
-        getattr(settings, name) if setting.applies(settings) else setting.default
-        for name, setting in settings_of(type(settings)).items()
-        if setting.stage <= stage
-    )
-
-
 def panel_settings(cls: type, panel: str) -> tuple[str, ...]:
     """Return the names of the settings that a panel shows, from top to bottom."""
     shown = {name: item for name, item in settings_of(cls).items() if item.panel == panel}

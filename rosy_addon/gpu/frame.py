@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compositor.look import Look
+from ..compositor.look_units import PixelLook
 from ..projection.camera import Camera
 from ..rendering.view_input import ViewInput
 from .mesh_buffers import MAX_TRIANGLES, FieldKind
@@ -59,8 +59,8 @@ class Frame:
     view : ViewInput
     camera : Camera
         Of the pixels of the frame: those of the picture, or its samples.
-    look : Look
-        Its lengths are in these pixels. Its supersampling is their number in one of the picture, along a side.
+    look : PixelLook
+        In these pixels.
     samples : Frame or None
         The samples of the pixels, if these have several. The pixels are shaded once.
     textures : dict of str to texture
@@ -75,7 +75,7 @@ class Frame:
     items: Sequence[DrawItem]
     view: ViewInput
     camera: Camera
-    look: Look
+    look: PixelLook
     samples: Frame | None = None
     textures: dict[str, Any] = field(default_factory=dict)
     prepared: dict[Hashable, Any] = field(default_factory=dict)
@@ -120,7 +120,7 @@ class Frame:
 
     @cached_property
     def _shared_uniforms(self) -> dict[str, Any]:
-        return {**vars(self.look), **camera_uniforms(self.camera)}
+        return {**self.look.settings(), **camera_uniforms(self.camera)}
 
     def image(self, name: str, texel_format: str = "RGBA32F", layers: int = 0) -> Any:
         """Return the image of a name, of the size of the frame; see `GpuResources.image`."""

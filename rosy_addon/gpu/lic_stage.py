@@ -10,9 +10,7 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any
 
-from ..compositor.even_lines import COARSE_RATIO, SPACING_GRAINS
-from ..compositor.filter_kernel import look_for_symmetry
-from ..compositor.flow import streamline_reach
+from ..compositor.even_lines import COARSE_RATIO
 from ..compositor.lic import noise_args
 from ..compositor.look import is_even, is_hatched, magnitude_range, uses_magnitude
 from ..compositor.look_units import instance_line_spacing
@@ -40,7 +38,7 @@ def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
         return {}
     lookups: dict[Hashable, Callable[[], Any]] = {}
     for instance_id, item, _ in frame.fields_in_view():
-        spacing = instance_line_spacing(look, SPACING_GRAINS, frame.camera, item.instance)
+        spacing = instance_line_spacing(look, frame.camera, item.instance)
         for ratio in (1.0, COARSE_RATIO):
             lookups["lines", instance_id, ratio] = partial(
                 frame.resources.line_records, item, look.display, ratio * spacing
@@ -133,9 +131,7 @@ def _ink_textures(frame: Frame, kind: FieldKind) -> dict[str, Any]:
     """Return the lookup tables of the ink, and images that the look does not have."""
     resources, look = frame.resources, frame.look
     result = {
-        "ink_thresholds": lookup_tables.thresholds(
-            resources, look_for_symmetry(look, kind.symmetry)
-        ),
+        "ink_thresholds": lookup_tables.thresholds(resources, look.for_symmetry(kind.symmetry)),
         "disc_offsets": lookup_tables.undirected_offsets(resources, look),
         "ink_table": lookup_tables.ink_table(resources, kind, look),
     }
@@ -160,7 +156,7 @@ def _trace(
 ) -> None:
     """Trace streamlines by passes over bands: all lines of a pixel, or a layer for each line."""
     left, bottom, right, top = box
-    half_steps = streamline_reach(frame.look) if uniforms["half_length"] else 0
+    half_steps = frame.look.streamline_reach() if uniforms["half_length"] else 0
     row_steps = (right - left) * kind.line_count * 2 * half_steps
     # Whole work groups: a partial one would reach into rows that belong to the next band.
     groups = max(MAX_DISPATCH_STEPS // max(row_steps, 1) // WORKGROUP_SIZE[1], 1)

@@ -14,7 +14,8 @@ from ..compositor.hatching import has_paper_grain
 from ..compositor.image_noise import image_noise
 from ..compositor.inks import ink_count, inks_of
 from ..compositor.lic import noise_args
-from ..compositor.look import Look, is_even, is_hatched
+from ..compositor.look import is_even, is_hatched
+from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import line_offset, picture_paper_grain
 from ..compositor.streak_statistics import look_streak_statistics
 from ..compositor.undirected import disc_offsets
@@ -32,13 +33,13 @@ def palette(resources: GpuResources) -> Any:
     return resources.lookup_texture("palette", None, lambda: PALETTE[None])
 
 
-def color_map(resources: GpuResources, look: Look) -> Any:
+def color_map(resources: GpuResources, look: PixelLook) -> Any:
     """Return the color map of a look."""
     name = look.color_map
     return resources.lookup_texture("colors", name, lambda: color_stops(name)[None])
 
 
-def thresholds(resources: GpuResources, look: Look) -> Any:
+def thresholds(resources: GpuResources, look: PixelLook) -> Any:
     """Return the thresholds of `streak_statistics`, in the first channel.
 
     Row 0 is for streaks, or for even lines the widths of `even_lines.look_width_table`. Row 1 is for
@@ -52,18 +53,18 @@ def thresholds(resources: GpuResources, look: Look) -> Any:
     return resources.lookup_texture("thresholds", rows.tobytes(), lambda: rows[..., None])
 
 
-def undirected_offsets(resources: GpuResources, look: Look) -> Any:
+def undirected_offsets(resources: GpuResources, look: PixelLook) -> Any:
     """Return `undirected.disc_offsets` in the first two channels."""
     if not is_hatched(look):
         return palette(resources)
     return resources.lookup_texture(
-        "disc_offsets", look.grain, lambda: disc_offsets(look.grain)[None]
+        "disc_offsets", look.line_width, lambda: disc_offsets(look.line_width)[None]
     )
 
 
-def ink_table(resources: GpuResources, kind: FieldKind, look: Look) -> Any:
+def ink_table(resources: GpuResources, kind: FieldKind, look: PixelLook) -> Any:
     """Return the inks of `inks.Inks`: the dark ones, then the light ones."""
-    inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
+    inks = inks_of(look.look, ink_count(look.look, kind.line_count, kind.family_count))
     stops = np.concatenate([inks.dark, inks.light])
     return resources.lookup_texture("inks", stops.tobytes(), lambda: stops[None])
 
@@ -74,7 +75,7 @@ def waves(resources: GpuResources) -> Any:
 
 
 def picture_grain(
-    resources: GpuResources, width: int, height: int, look: Look, line_count: int
+    resources: GpuResources, width: int, height: int, look: PixelLook, line_count: int
 ) -> Any:
     """Return `paper_grain.picture_paper_grain` in the first channel.
 
@@ -82,16 +83,16 @@ def picture_grain(
     """
     if not has_paper_grain(look):
         return palette(resources)
-    width += (line_count - 1) * line_offset(look.grain)
+    width += (line_count - 1) * line_offset(look.line_width)
 
     def values_at(pixel: np.ndarray, width: int) -> np.ndarray:
-        return picture_paper_grain(pixel, width, look.grain, look.seed)
+        return picture_paper_grain(pixel, width, look.line_width, look.seed)
 
-    key = look.grain, look.seed
+    key = look.line_width, look.seed
     return _pixel_texture(resources, "paper_grain", key, width, height, values_at)
 
 
-def picture_noise(resources: GpuResources, width: int, height: int, look: Look) -> Any:
+def picture_noise(resources: GpuResources, width: int, height: int, look: PixelLook) -> Any:
     """Return the noise of `image_noise.image_noise` for a frame of this size."""
     settings = noise_args(look)
     values_at = partial(image_noise, **settings)

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from ..compositor.hatching import has_outline
+from ..compositor.look import crease_angle_of
 from .defines import CREASE_SLICES, CREASES_PER_ROW
 from .frame import Frame
 from .passes import ComputePass
@@ -19,7 +20,7 @@ def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
     if not has_outline(frame.look):
         return {}
     drawn = frame if frame.samples is None else frame.samples
-    angle = None if frame.look.cross_creases else frame.look.crease_angle
+    angle = crease_angle_of(frame.look)
     return {
         ("outline", instance_id): partial(frame.resources.outline_textures, item, angle)
         for instance_id, item, _ in drawn.fields_in_view()

@@ -16,7 +16,7 @@ import numpy as np
 from ..compositor.color_values import check_color_values
 from ..compositor.family_hues import PALETTE
 from ..compositor.look import Look, colors_magnitude, magnitude_range
-from ..compositor.look_units import look_in_pixels, supersampled_look
+from ..compositor.look_units import pixel_look
 from ..compositor.picture import Picture, common_color_range
 from ..compositor.picture_key import fixed_color_range
 from ..compositor.target_tone import check_tone
@@ -197,13 +197,15 @@ class GpuRenderer:
 
     def _frame(self, items: Sequence[DrawItem], view: ViewInput) -> Frame:
         """Return the frame of the pixels, and of their samples, if these are several."""
-        look = look_in_pixels(view.look, view.sample_camera, [item.instance for item in items])
+        instances = [item.instance for item in items]
+        look = pixel_look(view.look, view.camera, instances, drift=view.drift)
         frame = Frame(self.resources, items, view, view.camera, look)
-        if look.supersampling == 1:
+        side = view.look.supersampling
+        if side == 1:
             return frame
-        fine_look = supersampled_look(look)
+        fine_look = look.in_samples(side)
         samples = replace(frame, camera=view.sample_camera, look=fine_look, textures={})
-        return replace(frame, look=replace(look, supersampling=1), samples=samples)
+        return replace(frame, samples=samples)
 
     def composite(
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0

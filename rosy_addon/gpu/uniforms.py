@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,11 @@ from ..compositor.contrast import expected_std, streak_args
 from ..compositor.even_lines import (
     FADE_PIXELS,
     MAX_EDGE_WIDTH,
-    SPACING_GRAINS,
     WOBBLE_SHIFT,
     crowded_pixels,
 )
 from ..compositor.family_hues import SOFTMAX_SHARPNESS
-from ..compositor.filter_kernel import full_sample_count, kernel_of, look_for_symmetry
+from ..compositor.filter_kernel import full_sample_count
 from ..compositor.flow import channel_shifts, channel_weights
 from ..compositor.hatching import (
     ONSET_LEAD,
@@ -35,12 +33,13 @@ from ..compositor.look import (
     Look,
     colors_magnitude,
     colors_values,
+    crease_angle_of,
     has_flow,
     is_even,
     is_hatched,
     magnitude_range,
 )
-from ..compositor.look_units import cell_size_args, instance_line_spacing
+from ..compositor.look_units import PixelLook, cell_size_args, instance_line_spacing
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, PAPER_GRAIN_STRENGTH, line_offset
 from ..compositor.shading import Light, lights_of
 from ..compositor.streak_statistics import (
@@ -50,13 +49,13 @@ from ..compositor.streak_statistics import (
     softness,
 )
 from ..compositor.surface_noise import (
-    FEATURE_GRAINS,
+    FEATURE_CELLS,
     LATTICE_SCALE,
     SUBPIXEL_OFFSETS,
     lattice_axes,
 )
 from ..compositor.target_tone import ReferenceRender, tone_curve
-from ..compositor.wobble import MEAN_WAVELENGTH_GRAINS, WOBBLE_STD, has_wobble
+from ..compositor.wobble import MEAN_WAVELENGTH_WIDTHS, WOBBLE_STD, has_wobble
 from ..projection.camera import Camera
 from ..projection.shadow_maps import NORMAL_BIAS_PIXELS
 from .defines import (
@@ -107,15 +106,15 @@ def camera_to_pixels(camera: Camera) -> tuple[float, ...]:
     return tuple((scaled / (2 * camera.pixels_per_unit)).ravel())
 
 
-def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
+def look_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     """Return the uniforms of line integral convolution and ink that are computed from the look.
 
-    Lengths are in pixels of the frame. Shaders read settings themselves as well; see `Frame.run`.
+    Shaders read settings themselves as well; see `Frame.run`.
     """
-    look = look_for_symmetry(look, kind.symmetry)
-    kernel = kernel_of(look)
+    look = look.for_symmetry(kind.symmetry)
+    kernel, break_length = look.kernel, break_steps(look)
     _, crossing = streak_moments(*streak_args(look), kind.line_count, kernel=kernel)
-    inks = inks_of(look, ink_count(look, kind.line_count, kind.family_count))
+    inks = inks_of(look.look, ink_count(look.look, kind.line_count, kind.family_count))
     statistics = look_streak_statistics(look) if is_hatched(look) else None
     ends = magnitude_range(look)
     return {
@@ -123,8 +122,7 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "kernel": KERNELS[kernel],
         **_flow_uniforms(kind, look),
         "half_length": 0 if is_even(look) else look.length,
-        "full_samples": full_sample_count(look),
-        "step_length": look.step,
+        "full_samples": full_sample_count(look.length, kernel),
         "crossing_correlation": crossing,
         # The streaks that drift have one channel, unlike their noise.
         "noise_channels": 1 if has_flow(look) else noise_args(look)["channels"],
@@ -140,15 +138,15 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
         "is_light_ink": int(inks.is_light),
         "softness": softness(look.crispness),
         "streak_std": statistics.std if statistics else 1.0,
-        "break_steps": break_steps(look) if has_breaks(look) else 0,
+        "break_steps": break_length if has_breaks(look) else 0,
         "overshoot_steps": overshoot_steps(look) if has_overshoot(look) else 0,
-        "break_samples": full_sample_count(replace(look, length=break_steps(look))),
+        "break_samples": full_sample_count(break_length, kernel),
         "break_std": statistics.break_std if statistics else 1.0,
         "disc_std": statistics.disc_std if statistics else 1.0,
         "wobble_strength": look.wobble if has_wobble(look) else 0.0,
         "paper_grain_depth": _paper_grain_depth(look, statistics),
         "paper_grain_channels": PAPER_GRAIN_CHANNELS if look.anchor == "surface" else 0,
-        "paper_grain_shift": line_offset(look.grain),
+        "paper_grain_shift": line_offset(look.line_width),
         # Not defines: compilers reorder sums with constants, and the result would change.
         "onset_range": ONSET_RANGE,
         "onset_lead": ONSET_LEAD,
@@ -159,18 +157,18 @@ def look_uniforms(kind: FieldKind, look: Look) -> dict[str, Any]:
     }
 
 
-def _flow_uniforms(kind: FieldKind, pixel_look: Look) -> dict[str, Any]:
+def _flow_uniforms(kind: FieldKind, look: PixelLook) -> dict[str, Any]:
     """Return the uniforms of streaks that drift: which way, and the shifts and weights of the channels."""
-    if not has_flow(pixel_look):
+    if not has_flow(look):
         return {"flow_mode": FLOW_NONE, "flow_shifts": (0.0,) * 4, "flow_weights": (0.0,) * 4}
     return {
         "flow_mode": FLOW_TO_ANGLE if kind.symmetry.has_opposites else FLOW_ALONG,
-        "flow_shifts": (*channel_shifts(pixel_look), 0.0),
-        "flow_weights": (*channel_weights(pixel_look.flow_phase), 0.0),
+        "flow_shifts": (*channel_shifts(look.flow_phase, look.flow_distance), 0.0),
+        "flow_weights": (*channel_weights(look.flow_phase), 0.0),
     }
 
 
-def _paper_grain_depth(look: Look, statistics: StreakStatistics | None) -> float:
+def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> float:
     if statistics is None or not has_paper_grain(look):
         return 0.0
     return PAPER_GRAIN_STRENGTH * look.paper_grain / statistics.paper_grain_std
@@ -251,7 +249,7 @@ def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     }
 
 
-def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
+def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that unfolds the covering."""
     return {
         **covering_uniforms(kind),
@@ -260,12 +258,13 @@ def direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str,
     }
 
 
-def min_normal_cosine(look: Look) -> float:
+def min_normal_cosine(look: PixelLook) -> float:
     """Return the cosine of the largest angle between the normals of pixels that continue each other."""
-    return -2.0 if look.cross_creases else float(np.cos(look.crease_angle))
+    angle = crease_angle_of(look)
+    return -2.0 if angle is None else float(np.cos(angle))
 
 
-def screen_direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> dict[str, Any]:
+def screen_direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict[str, Any]:
     """Return the uniforms that map members to directions on screen."""
     orders = kind.harmonic_orders
     return {
@@ -276,13 +275,13 @@ def screen_direction_uniforms(kind: FieldKind, look: Look, camera: Camera) -> di
     }
 
 
-def even_line_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
+def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that evaluates the even lines of one instance.
 
-    `look` is in pixels of the frame, whose camera is `camera`.
+    `camera` is that of the frame.
     """
-    spacing = instance_line_spacing(look, SPACING_GRAINS, camera, item.instance)
-    asked_pixels = SPACING_GRAINS * look.grain if look.unit == "pixels" else 0.0
+    spacing = instance_line_spacing(look, camera, item.instance)
+    asked_pixels = 0.0 if look.pixel_size else look.line_distance
     return {
         **covering_uniforms(item.kind),
         **screen_direction_uniforms(item.kind, look, camera),
@@ -309,8 +308,8 @@ def surface_noise_uniforms(settings: dict[str, Any]) -> dict[str, Any]:
         "density_threshold": round(density * 2**24),
         "noise_channels": settings["channels"],
         "seed": settings["seed"],
-        "min_cell_scale": settings["smallest"] / settings["grain"],
-        "feature_grains": FEATURE_GRAINS / LATTICE_SCALE,
+        "min_cell_scale": settings["smallest"] / settings["cell"],
+        "feature_cells": FEATURE_CELLS / LATTICE_SCALE,
         "max_bend": 1 / (1 - settings.get("detail", 0.0)),
     }
 
@@ -319,16 +318,16 @@ def surface_cell_uniforms(
     settings: dict[str, Any], item: DrawItem, camera: Camera
 ) -> dict[str, Any]:
     """Return the size of the noise cells of one surface, in its own units."""
-    cell = settings["grain"] * LATTICE_SCALE
+    cell = settings["cell"] * LATTICE_SCALE
     return {
         "pixel_size": cell / (camera.pixels_per_unit * item.object_scale),
         "cell_size": cell * settings["pixel"] / item.object_scale,
     }
 
 
-def wobble_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any]:
+def wobble_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the wavelength of the wobble, in pixels or in the units of a surface."""
-    wavelength = look.grain * MEAN_WAVELENGTH_GRAINS
+    wavelength = look.line_width * MEAN_WAVELENGTH_WIDTHS
     cell_size = cell_size_args(look)
     on_surface = look.anchor == "surface"
     pixels_per_object_unit = camera.pixels_per_unit * item.object_scale if on_surface else 1.0
@@ -336,5 +335,5 @@ def wobble_uniforms(look: Look, item: DrawItem, camera: Camera) -> dict[str, Any
         "on_surface": int(on_surface),
         "pixel_size": wavelength / pixels_per_object_unit,
         "cell_size": wavelength * cell_size["pixel"] * on_surface / item.object_scale,
-        "min_cell_scale": cell_size["smallest"] / look.grain,
+        "min_cell_scale": cell_size["smallest"] / look.line_width,
     }

@@ -36,7 +36,7 @@ from ..scene.evaluated_field import temp_attributes
 from ..scene.files import picture_stem
 from ..scene.keys import update_keys
 from ..scene.look_inputs import nonfinite_policy
-from ..scene.look_properties import look_at_frame, read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import PictureState, read_picture_states
 from ..scene.pictures import (
     ImageSequence,
@@ -247,7 +247,7 @@ def _frame_steps(
     frame: int,
 ) -> Steps[tuple[SceneData, list[_Frame]]]:
     """Draw one frame from all cameras."""
-    look = look_at_frame(scene, read_look(scene.rosy) if look is None else look, frame)
+    look = read_look(scene.rosy) if look is None else look
     # The look may be animated, and its method decides which device can draw it.
     device = select_device(settings.device, look)
     sources = [frame_camera(scene, frame)] if cameras is None else list(cameras)
@@ -266,6 +266,7 @@ def _frame_steps(
     states = read_picture_states(scene, depsgraph, sources, scene_data.mesh_states, is_frame=True)
     drawn = []
     for index, view in enumerate(views):
+        view = replace(view, drift=drift_in_scene(scene, look, frame))
         start, stop = index / len(sources), (index + 1) / len(sources)
         name = scene.name if cameras is None else view.camera.name
         path = _path_of_frame(settings, name, cameras, frame)
@@ -311,6 +312,7 @@ def _input_hash(view: ViewInput, device: str, settings: OutputSettings) -> bytes
     camera, reference = view.camera, view.reference
     parts: list = [
         view.look,
+        *view.drift,
         camera.view,
         camera.projection,
         camera.width,

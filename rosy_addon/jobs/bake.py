@@ -14,7 +14,7 @@ from ..gpu.select import image_steps, select_device
 from ..scene.camera_planes import update_backdrops
 from ..scene.cameras import CameraSource, render_camera
 from ..scene.keys import update_keys
-from ..scene.look_properties import look_at_frame, read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.picture_state import read_picture_states
 from ..scene.pictures import (
     BakeResult,
@@ -76,9 +76,8 @@ def bake(
         If there is nothing to draw or it cannot be drawn; see `read_views`, `select_device`,
         `picture_steps` and `check_targets`.
     """
-    look = look_at_frame(
-        scene, read_look(scene.rosy) if look is None else look, scene.frame_current_final
-    )
+    look = read_look(scene.rosy) if look is None else look
+    drift = drift_in_scene(scene, look, scene.frame_current_final)
     settings = read_output_settings(scene) if settings is None else settings
     draws_thresholds = settings.relight and is_hatched(look)
     if draws_thresholds:
@@ -94,7 +93,7 @@ def bake(
     device = select_device(settings.device, look)
     drawings = []
     for index, view in enumerate(views):
-        view = replace(view, draws_thresholds=draws_thresholds)
+        view = replace(view, draws_thresholds=draws_thresholds, drift=drift)
         steps = image_steps(view, device, settings.as_float, workers=workers)
         start, stop = (0.97 * done / len(sources) for done in (index, index + 1))
         picture, image_data = yield from part(steps, start, stop)

@@ -13,7 +13,7 @@ from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE
 from ..core.errors import RosyError
 from ..scene.look_inputs import color_attribute_of
-from ..scene.look_properties import read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.meshes import uv_map_name
 from ..scene.picture_state import bakes_light, read_texture_state
 from ..scene.pictures import OutputSettings, apply_texture, check_targets, read_output_settings
@@ -91,7 +91,11 @@ def bake_texture(
     lights = _lights_to_bake(scene, depsgraph) if bakes_light(scene.rosy, look) else None
     is_udim = scene.rosy.texture_udim
     texture_settings = TextureSettings(
-        scene.rosy.texture_size, scene.rosy.texture_margin, is_udim, content
+        scene.rosy.texture_size,
+        scene.rosy.texture_margin,
+        is_udim,
+        content,
+        drift_in_scene(scene, look, scene.frame_current_final),
     )
     colors = texture_colors_values(look, content)
     color_attribute = color_attribute_of(scene, look) if colors else None

@@ -62,11 +62,12 @@ def _fast_look(look: Look) -> Look:
         {
             "method": "sheets" if look.method == "brute" else look.method,
             "supersampling": 1 if look.method == "members" else 2,
-            "unit": "pixels",
+            "unit_size": 0.0,
             "tone": "light",
             "color_range": (0.0, 0.0) if colors_values(look) else look.color_range,
             "length": min(look.length, PREVIEW_SIZE // 2),
-            "grain": min(look.grain, PREVIEW_SIZE / 2),
+            "line_width": min(look.line_width, PREVIEW_SIZE / 2),
+            "line_distance": min(look.line_distance, PREVIEW_SIZE),
             "high_pass": min(look.high_pass, PREVIEW_SIZE / 4),
         }
     )

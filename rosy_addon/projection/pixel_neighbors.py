@@ -58,24 +58,22 @@ def screen_jacobians(gbuffer: GBuffer) -> np.ndarray:
     return jacobians.T
 
 
-def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -> np.ndarray:
+def neighbor_masks(gbuffer: GBuffer, crease_angle: float | None) -> np.ndarray:
     """Find, for each pixel, the neighbors to which a streamline may step.
 
     Parameters
     ----------
     gbuffer : GBuffer
-    crease_angle : float
+    crease_angle : float or None
         Radians. If the normals of neighboring pixels differ by more, there is a crease between
-        them.
-    cross_creases : bool
-        Whether streamlines may cross creases.
+        them. None: there are no creases.
 
     Returns
     -------
     (P,) uint16 ndarray
         Bit ``(dy + 1) * 3 + (dx + 1)`` is set if the surface continues on the neighbor at (dx, dy).
         Then the neighbor shows the same mesh instance, and they are separated neither by a
-        silhouette nor, unless creases may be crossed, by a crease. Bit 4, the pixel itself, is
+        silhouette nor by a crease. Bit 4, the pixel itself, is
         always set. The relation is symmetric.
 
     Notes
@@ -102,7 +100,7 @@ def neighbor_masks(gbuffer: GBuffer, crease_angle: float, cross_creases: bool) -
         right_column = max(right_column, int(column[block].max()))
     # One empty column on either side.
     width = right_column - left_column + 3
-    min_normal_cosine = None if cross_creases else np.float32(np.cos(crease_angle))
+    min_normal_cosine = None if crease_angle is None else np.float32(np.cos(crease_angle))
     band_rows = max(BLOCK_PIXELS // width, 1)
     first_row, row_count = int(row[0]), int(row[-1] - row[0]) + 1
     for row_start in range(first_row, first_row + row_count, band_rows):

@@ -167,6 +167,7 @@ def _draw_strips(
             cache,
             strips,
             draws_thresholds=view.draws_thresholds,
+            drift=view.drift,
         )
 
 

@@ -13,7 +13,7 @@ from ..annotation.key_contents import PictureKey, sorted_indices
 from ..annotation.singularity_marks import cached_singularities, singularity_marks
 from ..annotation.singularity_settings import shows_singularities
 from ..compositor.look import Look
-from ..compositor.look_units import look_in_pixels
+from ..compositor.look_units import pixel_look
 from ..compositor.picture import Picture
 from ..compositor.picture_key import color_scale_of, fixed_color_range
 from ..core.cache import BAKE_CACHE, Cache
@@ -21,8 +21,12 @@ from ..core.progress import progress
 from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
-#: Least length of an arrowhead, pixels.
-MIN_SIZE = 3.0
+#: Length of an arrowhead, relative to the least distance between places. The arrowheads of up to five directions
+#: reach 1.75 lengths from their place, outline included, so half a length stays free between those of neighbors.
+ARROW_LENGTH = 0.25
+
+#: Least length of an arrowhead, pixels. In a smaller one, the outline leaves nothing of the fill.
+MIN_ARROW_LENGTH = 3.0
 
 
 def has_marks(look: Look) -> bool:
@@ -71,12 +75,12 @@ def view_arrows(
     view: ViewInput, cache: Cache | None = None, *, is_exact: bool = True
 ) -> ArrowMarks:
     """Find the arrowheads of a view whose look has them; see `arrow_marks`."""
-    look = look_in_pixels(view.look, view.sample_camera, view.instances)
+    look = pixel_look(view.look, view.camera, view.instances)
     return arrow_marks(
         view.instances,
         view.camera,
         look.arrows,
-        max(look.arrow_size, MIN_SIZE),
+        max(ARROW_LENGTH * look.arrows, MIN_ARROW_LENGTH),
         display=look.display,
         clip_planes=view.clip_planes,
         cache=cache,

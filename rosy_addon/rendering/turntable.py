@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compositor.flow import flow_at
+from ..compositor.flow import drift_at
 from ..compositor.look import Look, has_flow
 from ..compositor.picture import Picture
 from ..compositor.shading import Light
@@ -90,7 +90,8 @@ def turntable_views(
         azimuth = view_angles[0] + (0 if still else 360 * index / count)
         camera = orbit_camera(points, azimuth, view_angles[1], *size, perspective=perspective)
         camera_lights = tuple(light.transformed(camera.view) for light in lights)
-        yield ViewInput((instance,), camera, flow_at(look, index, count), camera_lights)
+        drift = drift_at(look, index, count)
+        yield ViewInput((instance,), camera, look, camera_lights, drift=drift)
 
 
 def draw_next(view: ViewInput, cache: Cache, **options: Any) -> Picture:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..compositor.flow import NO_DRIFT, Drift
 from ..compositor.hatching import is_shaded_by_pixel
 from ..compositor.look import Look
 from ..compositor.shading import Light
@@ -48,6 +49,8 @@ class ViewInput:
         Used by the tone "picture".
     clip_planes : (6, 4) float64 ndarray or None
         World space. The negative side of each plane is cut away.
+    drift : Drift
+        How far streaks have drifted, if the look has flow.
     draws_thresholds : bool
         Whether the picture has the thresholds of its ink; see `compose`. Only numpy draws
         them.
@@ -59,6 +62,7 @@ class ViewInput:
     lights: tuple[Light, ...] = ()
     reference: ReferenceRender | None = None
     clip_planes: np.ndarray | None = None
+    drift: Drift = NO_DRIFT
     draws_thresholds: bool = False
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..compositor.flow import flow_at
+from ..compositor.flow import Drift, drift_at
 from ..compositor.look import Look
 from ..core.color import alpha_from_hex, from_hex, to_hex
 from ..core.settings import Color, Number, Numbers, Setting, settings_of
@@ -41,10 +41,9 @@ def color_components(code: str, setting: Color) -> list[float]:
     return [*color, alpha_from_hex(code)] if setting.has_alpha else color
 
 
-def look_at_frame(scene: bpy.types.Scene, look: Look, frame: float) -> Look:
-    """Return the look of a frame. Its streaks may drift, in a loop over the frame range of the scene."""
-    count = scene.frame_end - scene.frame_start + 1
-    return flow_at(look, frame - scene.frame_start, count)
+def drift_in_scene(scene: bpy.types.Scene, look: Look, frame: float) -> Drift:
+    """Return how far streaks have drifted at a frame. The frame range of the scene is a loop."""
+    return drift_at(look, frame - scene.frame_start, scene.frame_end - scene.frame_start + 1)
 
 
 def matches_look(settings: Any, look: Look) -> bool:

@@ -15,12 +15,18 @@ from ..compositor.color_values import (
     value_scale,
 )
 from ..compositor.compose import colorize, streak_tone
-from ..compositor.filter_kernel import look_for_symmetry
-from ..compositor.flow import noise_channel_count, with_cycle_distance
-from ..compositor.lic import lic_lengths
+from ..compositor.flow import NO_DRIFT, Drift, noise_channel_count
+from ..compositor.ink_thresholds import sharp_look
+from ..compositor.lic import lic_lengths, noise_args
 from ..compositor.lic_images import with_magnitude_range
-from ..compositor.look import Look, colors_magnitude, colors_values, is_hatched
-from ..compositor.look_units import look_on_surface
+from ..compositor.look import (
+    Look,
+    colors_magnitude,
+    colors_values,
+    crease_angle_of,
+    is_hatched,
+)
+from ..compositor.look_units import PixelLook, surface_pixel_look
 from ..compositor.pixel_field import PixelField
 from ..compositor.shading import Light
 from ..core.cache import BAKE_CACHE, Cache
@@ -67,19 +73,15 @@ TEXTURE_SETTINGS = (
     *(
         "ink",
         "display",
-        "unit",
         "unit_size",
         "length",
-        "taper",
-        "oriented",
+        "fade",
         "flow",
-        "flow_distance",
-        "flow_phase",
-        "step",
-        "grain",
+        "line_width",
+        "line_distance",
         "density",
     ),
-    *("high_pass", "hue", "seed", "gain", "cross_creases", "crease_angle"),
+    *("high_pass", "hue", "seed", "gain", "crease_angle"),
     *("magnitude_length", "color_range", "color_map"),
     *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
@@ -98,7 +100,7 @@ CONTENTS = {
 }
 
 #: The settings of a look that a map of directions is drawn with.
-DIRECTION_SETTINGS = ("display", "cross_creases", "crease_angle", "guiding_angle")
+DIRECTION_SETTINGS = ("display", "crease_angle", "guiding_angle")
 
 #: Smallest fraction of overlapping charts that is reported to the user. It is measured in whole texels.
 NOTABLE_OVERLAP = 0.05
@@ -157,6 +159,7 @@ def draw_texture(
     is_udim: bool = False,
     lights: Sequence[Light] | None = None,
     content: str = "look",
+    drift: Drift = NO_DRIFT,
     cache: Cache | None = None,
 ) -> Texture:
     """Draw the field of a mesh as a texture.
@@ -170,8 +173,8 @@ def draw_texture(
     uv : (C, 2) ndarray
         u and v at the corners of the surface.
     look : Look
-        The light and the settings of a camera have no effect. With the unit "pixels", a pixel is that of a square with the area of the surface and `SURFACE_PIXELS` pixels on
-        each side.
+        The light and the settings of a camera have no effect. If its lengths are in pixels, a pixel is that of a
+        square with the area of the surface and `SURFACE_PIXELS` pixels on each side.
     size : int
         Texels on each side of the texture, or of a tile of it.
     margin : int
@@ -183,6 +186,8 @@ def draw_texture(
         thresholds, and its ink is drawn by the material.
     content : str
         One of `CONTENTS`.
+    drift : Drift
+        How far streaks have drifted, if the look has flow.
     cache : Cache, optional
         Stores what does not depend on the look.
 
@@ -201,11 +206,12 @@ def draw_texture(
     if texture_colors_values(look, content):
         check_color_values(look, [instance])
     raise_mmap_threshold()
+    crease_angle = crease_angle_of(look)
     with progress(0.0, 0.05):
         mesh = build_tangent_mesh(
             instance,
             display=look.display,
-            cross_creases=look.cross_creases,
+            cross_creases=crease_angle is None,
             crease_angle=look.crease_angle,
             cache=cache,
         )
@@ -218,22 +224,26 @@ def draw_texture(
     step = step_length(mesh, charts, texels)
     on = TexelSurface(instance, mesh, charts, texels, step)
     with progress(0.15, 0.3):
-        field = texel_field(on, None if look.cross_creases else look.crease_angle)
-    surface_look = look_on_surface(look, step, float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS)
-    surface_look = with_cycle_distance(look_for_symmetry(surface_look, field.symmetry))
+        field = texel_field(on, crease_angle)
     is_direction = content != "look"
     is_ink = is_hatched(look) and not is_direction
+    step_look = surface_pixel_look(
+        sharp_look(look) if is_ink else look,
+        step,
+        float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS,
+        drift,
+    ).for_symmetry(field.symmetry)
     with progress(0.3, 0.9):
         if is_direction:
             pixels = direction_map(on, content, look.guiding_angle)
         elif is_ink:
-            pixels = thresholds(on, field, surface_look, look.guiding_angle, cache)
+            pixels = thresholds(on, field, step_look, look.guiding_angle, cache)
         else:
-            pixels = _colors(on, field, surface_look)
+            pixels = _colors(on, field, step_look)
     is_lit = is_ink and lights is not None
     if is_lit:
         with progress(0.9, 0.95):
-            pixels = lit_ink(on, pixels, lights, surface_look)
+            pixels = lit_ink(on, pixels, lights, look)
     # Directions are relative to their chart.
     with progress(0.95, 1.0):
         rgba = fill_margin(frame, field, pixels, margin, crosses_seams=not is_direction)
@@ -292,10 +302,10 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
 
 
-def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
+def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
     """Return (P, 4): the linear colors of the field at texels, and the opacity 1."""
     with progress(0.0, 0.3):
-        noise = texel_noise(on, look)
+        noise = texel_noise(on, **noise_args(look))
     with progress(0.3, 0.95):
         (images,) = lic_lengths(field, [look], noise)
     with progress(0.95, 0.97):
@@ -305,7 +315,7 @@ def _colors(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
     if colors_values(look):
         texels = on.texels
         values = values_in_triangles(on.instance, texels.triangle, texels.barycentric)
-        low, scale = value_scale(look, [value_range(on.instance.color_values)])
+        low, scale = value_scale(look.look, [value_range(on.instance.color_values)])
         field = replace(field, map_position=scaled_positions(values, low, scale))
     color = np.ones((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(color)):
@@ -322,6 +332,7 @@ class TextureSettings(NamedTuple):
     margin: int = DEFAULT_MARGIN
     is_udim: bool = False
     content: str = "look"
+    drift: Drift = NO_DRIFT
 
 
 class TextureImages(NamedTuple):

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ..compositor.even_lines import (
-    SPACING_GRAINS,
     WOBBLE_SHIFT,
     EvenLines,
     resolved_share,
 )
-from ..compositor.flow import unconvolved_noise
 from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_from_thresholds import ink_of_thresholds
@@ -21,13 +18,13 @@ from ..compositor.ink_thresholds import (
     cyclic_places,
     line_thresholds,
     ordered_thresholds,
-    sharp_look,
     threshold_pixels,
 )
 from ..compositor.inks import inks_of
-from ..compositor.lic import lic_lengths
+from ..compositor.lic import lic_lengths, noise_args, unconvolved_noise
 from ..compositor.lic_images import LicImages
 from ..compositor.look import Look, is_even
+from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
 from ..compositor.pixel_field import PixelField, all_members
 from ..compositor.shading import Light
@@ -49,7 +46,7 @@ from .texel_field import frames_at, texel_noise
 from .texels import TexelSurface
 
 #: Width of the strip in which two lines swap, in widths of a line.
-SWAP_GRAINS = 8.0
+SWAP_WIDTHS = 8.0
 
 #: Largest number of triangles on which lines are spaced, for each texel. It is reached only if texels on parts
 #: of the surface are much smaller than on average, for example if charts overlap.
@@ -63,7 +60,7 @@ LABEL = "drawing hatching"
 
 
 def thresholds(
-    on: TexelSurface, field: PixelField, look: Look, guiding_angle: float, cache: Cache | None
+    on: TexelSurface, field: PixelField, look: PixelLook, guiding_angle: float, cache: Cache | None
 ) -> np.ndarray:
     """Compute the thresholds of hatching at texels.
 
@@ -72,8 +69,8 @@ def thresholds(
     on : TexelSurface
     field : PixelField
         At the texels.
-    look : Look
-        With ink, in steps of streamlines.
+    look : PixelLook
+        Of a `sharp_look` with ink, in steps of streamlines.
     guiding_angle : float
         Direction of the lines that come first; see `line_order`.
     cache : Cache or None
@@ -84,9 +81,8 @@ def thresholds(
     (P, 4) float32 ndarray
         As `threshold_pixels` returns them.
     """
-    look = sharp_look(look)
     with progress(0.0, 0.1):
-        order = line_order(on.mesh, guiding_angle, SWAP_GRAINS * look.grain * on.step)
+        order = line_order(on.mesh, guiding_angle, SWAP_WIDTHS * look.line_width * on.step)
     wobble_angle = None
     if has_wobble(look):
         with progress(0.1, 0.13):
@@ -161,7 +157,7 @@ def lit_ink(
 def _lines(
     on: TexelSurface,
     field: PixelField,
-    look: Look,
+    look: PixelLook,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
 ) -> tuple[LicImages | None, LineModulation]:
@@ -171,13 +167,13 @@ def _lines(
     even_lines = noise = undirected = paper_grain = None
     if not is_spaced or is_broken or undefined:
         with progress(0.0, 0.3):
-            noise = texel_noise(on, look)
+            noise = texel_noise(on, **noise_args(look))
     if is_spaced:
         with progress(0.3, 0.6):
             even_lines = _even_lines(on, field, look, wobble_angle, cache)
     looks = [] if is_spaced else [look]
     if is_broken:
-        looks.append(replace(look, length=break_steps(look)))
+        looks.append(look.with_length(break_steps(look)))
     with progress(0.6 if is_spaced else 0.3, 0.8):
         lic = lic_lengths(field, looks, noise) if looks else []
     with progress(0.8, 0.9):
@@ -186,10 +182,10 @@ def _lines(
         texels_per_unit = np.sqrt(np.abs(on.charts.density[on.texels.triangle]))
         size = on.texels.frame.size
         # Spots have one size in texels: the median width of lines.
-        grain = look.grain * on.step * float(np.median(texels_per_unit)) * size
-        grain = min(grain, size / MIN_SPOTS)
+        spot = look.line_width * on.step * float(np.median(texels_per_unit)) * size
+        spot = min(spot, size / MIN_SPOTS)
         seen_noise = unconvolved_noise(noise, look)
-        undirected = undirected_texture(field, seen_noise, grain)
+        undirected = undirected_texture(field, seen_noise, spot)
     if has_paper_grain(look):
         with progress(0.9, 1.0):
             paper_grain = _paper_grain(on, field, look)
@@ -201,38 +197,36 @@ def _lines(
     )
 
 
-def _paper_grain(on: TexelSurface, field: PixelField, look: Look) -> np.ndarray:
+def _paper_grain(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:
     """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
-    args = surface_paper_grain_args(look)
-    channels = args.pop("channels")
-    noise = texel_noise(on, replace(look, **args), channels)
+    noise = texel_noise(on, **surface_paper_grain_args(look))
     noise -= np.float32(NOISE_MEAN)
     noise /= np.float32(look_streak_statistics(look).paper_grain_std)
     return noise.T[np.arange(field.line_count) % PAPER_GRAIN_CHANNELS]
 
 
-def _wobble_angle(on: TexelSurface, look: Look) -> np.ndarray:
+def _wobble_angle(on: TexelSurface, look: PixelLook) -> np.ndarray:
     """Return the (P,) float32 angles between lines and field at `Look.wobble` 1."""
     rest = rest_positions(on.instance.surface).astype(np.float32)
-    grain = look.grain * on.step / matrix_scale(on.instance.matrix)
+    line_width = look.line_width * on.step / matrix_scale(on.instance.matrix)
     angle = np.empty(len(on.texels), dtype=np.float32)
     for block in pixel_blocks(len(angle)):
         report(block.start / len(angle), "bending lines")
         position = on.interpolated(rest, block)
-        angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(grain))
+        angle[block] = solid_wobble_angle(np.ascontiguousarray(position.T), np.float32(line_width))
     return angle
 
 
 def _even_lines(
     on: TexelSurface,
     field: PixelField,
-    look: Look,
+    look: PixelLook,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
 ) -> EvenLines:
     """Evaluate evenly spaced lines at the texels."""
     instance, texels = on.instance, on.texels
-    spacing = SPACING_GRAINS * look.grain * on.step
+    spacing = look.line_distance * on.step
     max_triangles = min(MAX_TRIANGLES, TRIANGLES_PER_TEXEL * len(texels))
     with progress(0.0, 0.8):
         geometry = instance.surface, instance.matrix, instance.field, look.display
@@ -256,7 +250,7 @@ def _even_lines(
         for line, out in enumerate(streaks):
             along = part.to_screen(part.member_direction(members[line][block]), foreshorten=True)
             across = area[block] / np.maximum(np.abs(along), np.float32(1e-6))
-            period[line, block] = SPACING_GRAINS * look.grain * across
+            period[line, block] = look.line_distance * across
             family = (direction + line) % field.degree % field.line_count
             phase = lines.pattern.evaluate(leaf, in_leaf, family)
             if wobble_angle is not None:

@@ -13,9 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..compositor.flow import noise_channel_count
 from ..compositor.image_noise import BLUR_FACTOR, NOISE_MEAN
-from ..compositor.look import Look
 from ..compositor.pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps
 from ..compositor.surface_noise import instance_hashes, solid_noise
 from ..core.progress import progress, report
@@ -289,16 +287,19 @@ def _nearest_texels(
 # --- noise -------------------------------------------------------------------------------------------
 
 
-def texel_noise(on: TexelSurface, look: Look, channels: int | None = None) -> np.ndarray:
+def texel_noise(
+    on: TexelSurface, cell: float, seed: int, channels: int, density: float, high_pass: float
+) -> np.ndarray:
     """Make noise that is anchored to the surface, at its texels.
 
     Parameters
     ----------
     on : TexelSurface
-    look : Look
-        In steps of streamlines. Its `grain`, `density`, `high_pass` and `seed` are used.
-    channels : int, optional
-        K; by default the channels of the look (`noise_channel_count`).
+    cell, high_pass : float
+        Size of a cell of the noise, and the width above which variations are removed, in steps of
+        streamlines.
+    seed, channels, density
+        See `surface_noise`.
 
     Returns
     -------
@@ -308,13 +309,12 @@ def texel_noise(on: TexelSurface, look: Look, channels: int | None = None) -> np
     surface, charts, texels, step = on.instance.surface, on.charts, on.texels, on.step
     # Blender units of the world in one of object space.
     scale = matrix_scale(on.instance.matrix)
-    channels = noise_channel_count(look) if channels is None else channels
     rest = rest_positions(surface).astype(np.float32)
     triangle_vertex = surface.triangle_vertex
     gradient = (charts.gradient / texels.frame.size).astype(np.complex64)
     stretch = charts.stretch()[1] * (texels.frame.size * scale)
     coarse = np.divide(MIN_CELL_TEXELS, stretch, out=np.zeros(len(stretch)), where=stretch > 0)
-    cell_size = np.maximum(look.grain * step / scale, coarse).astype(np.float32)
+    cell_size = np.maximum(cell * step / scale, coarse).astype(np.float32)
     instance_hash = instance_hashes([surface.name])
     total = np.empty((channels, len(texels)), dtype=np.float32)
     for block in pixel_blocks(len(texels)):
@@ -331,9 +331,9 @@ def texel_noise(on: TexelSurface, look: Look, channels: int | None = None) -> np
             size,
         )
         block_hash = np.broadcast_to(instance_hash, len(triangle))
-        solid_noise(coordinates, size, block_hash, look.seed, look.density, out=total[:, block])
-    if look.high_pass:
-        sigma = BLUR_FACTOR * look.high_pass * step / scale
+        solid_noise(coordinates, size, block_hash, seed, density, out=total[:, block])
+    if high_pass:
+        sigma = BLUR_FACTOR * high_pass * step / scale
         _subtract_local_means(on, rest, total, sigma)
     noise = np.empty(total.shape[::-1], dtype=np.float32)
     for block in pixel_blocks(len(noise)):

@@ -14,6 +14,7 @@ from typing import Any
 import bpy
 
 from ..annotation.singularity_settings import shows_singularities
+from ..compositor.flow import NO_DRIFT, Drift
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
@@ -21,7 +22,7 @@ from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
 from ..scene.look_inputs import check_sources, read_request
-from ..scene.look_properties import look_at_frame, read_look
+from ..scene.look_properties import drift_in_scene, read_look
 from ..scene.read_view import read_lights
 from ..worker.helper import Helper
 from .flow_clock import FlowClock
@@ -282,13 +283,12 @@ class ViewportSession:
         view_input = self._read_view(context, depsgraph, look, overlay)
         if view_input is None:
             return
-        still_look = replace(view_input.look, flow_phase=0.0)
         shows_dots = shows_singularities(look)
         view = self.progressive.update(
             _pointers(context),
             _picture_key(view_input),
             view_input,
-            _picture_key(replace(view_input, look=still_look)),
+            _picture_key(replace(view_input, drift=NO_DRIFT)),
             [
                 partial(look_up_singularities, instance, self._marks_cache)
                 for instance in view_input.instances
@@ -305,9 +305,7 @@ class ViewportSession:
         opacity = OPACITY_IN_EDIT_MODE if context.mode.startswith("EDIT") else OPACITY
         renderer.composite(view.texture, view.items, view_input, opacity)
         if look.arrows:
-            still = replace(
-                view_input, look=replace(look, flow_phase=0.0), lights=(), reference=None
-            )
+            still = replace(view_input, look=look, lights=(), reference=None, drift=NO_DRIFT)
             draw_view_arrowheads(context, still, _picture_key(still), overlay, self._marks_cache)
         else:
             overlay.arrowheads = None
@@ -361,18 +359,18 @@ class ViewportSession:
         return ViewInput(
             instances=tuple(entry.instance for entry in visible),
             camera=camera,
-            look=self._drifted(look, context.scene),
+            look=look,
             lights=tuple(read_lights(depsgraph, camera.view)) if look.light == "scene" else (),
             reference=reference,
             clip_planes=clip_planes(context.region_data),
+            drift=self._drift(look, context.scene),
         )
 
-    def _drifted(self, look: Look, scene: bpy.types.Scene) -> Look:
-        """Return the look with its streaks where they are at the frame of a scene and of the clock."""
-        if not has_flow(look):
-            return look
-        self._has_shown_flow = True
-        return look_at_frame(scene, look, scene.frame_current_final + self.flow_clock.frames)
+    def _drift(self, look: Look, scene: bpy.types.Scene) -> Drift:
+        """Return how far streaks have drifted at the frame of a scene and of the clock."""
+        if has_flow(look):
+            self._has_shown_flow = True
+        return drift_in_scene(scene, look, scene.frame_current_final + self.flow_clock.frames)
 
     def _draw_text(self) -> None:
         """Draw the messages and labels of a view."""
@@ -430,6 +428,7 @@ def _picture_key(view_input: ViewInput) -> Hashable:
         camera.projection.tobytes(),
         (camera.width, camera.height),
         view_input.look,
+        view_input.drift,
         None if planes is None else planes.tobytes(),
         tuple(
             (light.kind, tuple(light.vector), tuple(light.color), light.strength)

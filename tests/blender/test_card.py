@@ -81,7 +81,7 @@ def test_parity_of_uneven_lines(rosy, card, surface_of):
         hue="families",
         anchor="surface",
         shading=0.9,
-        grain=2.5,
+        line_width=2.5,
         length=LENGTH,
         supersampling=2,
         breaks=0.6,

@@ -56,7 +56,7 @@ def test_what_makes_a_texture_out_of_date(scene, textured):
     bpy.context.view_layer.update()
     assert stale_reason(scene) == ""
     for owner, name, value, expected in (
-        (scene.rosy.look, "grain", 3.0, "look"),
+        (scene.rosy.look, "line_width", 3.0, "look"),
         (scene.rosy, "texture_size", 64, "64 x 64"),
         (scene.rosy, "texture_margin", 3, "UV map"),
     ):
@@ -164,7 +164,7 @@ def test_maps_of_directions(scene, textured, tmp_path):
         assert stale_reason(scene) == "the content was changed"
         (result,) = bake_texture(scene, [textured])
         assert result.image.colorspace_settings.name == "Non-Color"
-        scene.rosy.look.grain += 1
+        scene.rosy.look.line_width += 1
         assert stale_reason(scene) == ""
         scene.rosy.look.guiding_angle += 1
         assert stale_reason(scene) == "the look was changed"

@@ -153,7 +153,7 @@ def test_images_on_uv_maps_are_drawn(scene, wall):
     quarters = np.array([[0.1, 0.9], [0.6, 0.3]])
     wall.rosy.tone_image = add_image(values=np.kron(quarters, np.ones((8, 8))), as_float=True)
     bpy.context.view_layer.update()
-    look = Look(ink="hatch", tone="image", grain=2.0)
+    look = Look(ink="hatch", tone="image", line_width=2.0)
     rgba = pixels(bake(scene, look=look, size=(256, 256))[0].image)
     covered = np.argwhere(rgba[..., 3] == 1)
     low, high = covered.min(axis=0), covered.max(axis=0)
@@ -182,7 +182,7 @@ def test_missing_images_and_uv_maps(wall):
 
 # --- pictures -------------------------------------------------------------------------------------
 
-PICTURE = Look(ink="hatch", tone="picture", grain=2.0)
+PICTURE = Look(ink="hatch", tone="picture", line_width=2.0)
 
 
 def test_pictures_from_files(scene, wall, tmp_path):

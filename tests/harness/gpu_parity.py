@@ -103,6 +103,7 @@ def draw_pair(
     look: Any,
     lights: Sequence[Any] = (),
     reference: Any = None,
+    drift: Any = (0.0, 1.0),
 ) -> Pair:
     """Draw a picture on the card and with numpy.
 
@@ -119,11 +120,18 @@ def draw_pair(
     look : Look
     lights : sequence of Light
     reference : ReferenceRender, optional
+    drift : Drift
     """
+    drift = module_of(rosy.package, "compositor.flow").Drift(*drift)
     supersampling = look.supersampling
     width, height = camera.width // supersampling, camera.height // supersampling
     view = rosy.ViewInput(
-        tuple(instances), camera.resized(width, height), look, tuple(lights), reference
+        tuple(instances),
+        camera.resized(width, height),
+        look,
+        tuple(lights),
+        reference,
+        drift=drift,
     )
     items = card.upload(instances, look.display)
     texture = rosy.run(card.texture_steps(items, view))
@@ -137,7 +145,7 @@ def draw_pair(
     has_flow = module_of(rosy.package, "compositor.look").has_flow
     if has_flow(look) or supersampling > 1:
         with one_streamline_per_pixel(rosy.package):
-            numpy_picture = rosy.compose(gbuffer, look, lights, reference).rgba
+            numpy_picture = rosy.compose(gbuffer, look, lights, reference, drift=drift).rgba
     else:
         brute_look = replace(look, method="brute")
         numpy_picture = rosy.compose(gbuffer, brute_look, lights, reference).rgba

@@ -29,7 +29,7 @@ MODULES = (
         "hatching",
         "lic_images",
     ),
-    *("image_noise", "look_units", "pixel_field"),
+    *("image_noise", "pixel_field"),
 )
 
 #: Weights of the channels at positions of a streamline: from a position and the share of the kernel that drifts
@@ -51,7 +51,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
         results = []
         for look in looks:
             images = rosy.per_pixel_lic.brute_force(field, look, noise)
-            if _is_antialiased(rosy, look) and rosy.hatching.is_hatched(look):
+            if look.is_antialiased and rosy.hatching.is_hatched(look):
                 images = _smoothed(
                     rosy, rosy.covering.build_covering(field, look, noise), field, images
                 )
@@ -61,7 +61,7 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
     convolve_still = rosy.per_pixel_lic.convolve_members
 
     def convolve(field, look, *arguments):
-        if look.flow or _is_antialiased(rosy, look):
+        if look.flow or look.is_antialiased:
             return _members(rosy, field, look, *arguments)
         return convolve_still(field, look, *arguments)
 
@@ -70,11 +70,6 @@ def one_streamline_per_pixel(package: str = "rosy_addon") -> Iterator[None]:
         mock.patch.object(rosy.per_pixel_lic, "convolve_members", convolve),
     ):
         yield
-
-
-def _is_antialiased(rosy: SimpleNamespace, look: Any) -> bool:
-    """Whether a look is that of pixels with several samples."""
-    return isinstance(look, rosy.look_units.PixelLook) and look.antialiased
 
 
 def _smoothed(rosy: SimpleNamespace, covering: Any, field: Any, images: Any) -> Any:
@@ -113,10 +108,10 @@ def _members(
     count = len(field.pixel)
     limit = rosy.lic_images.magnitude_step_limits(field, look)
     length = np.full(count, look.length) if limit is None else limit
-    kind = rosy.filter_kernel.kernel_of(look)
-    reach = rosy.flow.streamline_reach(look)
+    kind = look.kernel
+    reach = look.streamline_reach()
     centered = noise.astype(np.float64) - rosy.image_noise.NOISE_MEAN
-    sample = _sampler(centered, neighbors, _is_antialiased(rosy, look))
+    sample = _sampler(centered, neighbors, look.is_antialiased)
     weights = _drifting_weights(rosy, look, length) if look.flow else None
     full_samples = rosy.filter_kernel.kernel_weights(
         *[length.astype(float)] * 3, kind
@@ -143,7 +138,7 @@ def _members(
         available, full = (start**2).sum(axis=1), (start**2).sum(axis=1)
         for side in (1, -1):
             direction_at = tracer(slice(0, count))
-            step_length = side * look.step
+            step_length = side
             for step, entry, offset in _traced(neighbors, direction_at, count, reach, step_length):
                 weight = weights_at(side * step)
                 energy = (weight**2).sum(axis=1)
@@ -158,7 +153,7 @@ def _members(
         else:
             samples[member] = weight_sum**2 / available
             mean = total / weight_sum[:, None]
-        if _is_antialiased(rosy, look) and not rosy.hatching.is_hatched(look):
+        if look.is_antialiased and not rosy.hatching.is_hatched(look):
             mean *= rosy.interpolated_contrast
         mean = (rosy.image_noise.NOISE_MEAN + mean).astype(np.float32)
         number = samples[member].astype(np.float32)
@@ -190,8 +185,8 @@ def _sampler(
 
 def _drifting_weights(rosy: SimpleNamespace, look: Any, length: np.ndarray) -> Weights:
     """Return the weights of a kernel that moves."""
-    kind, share = rosy.filter_kernel.kernel_of(look), length / look.length
-    shifts = rosy.flow.channel_shifts(look)
+    kind, share = look.kernel, length / look.length
+    shifts = rosy.flow.channel_shifts(look.flow_phase, look.flow_distance)
     channel_weights = rosy.flow.channel_weights(look.flow_phase)
 
     def weights(position: int, forward: np.ndarray) -> np.ndarray:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 from unittest import mock
 
@@ -10,11 +9,11 @@ import numpy as np
 
 import rosy_addon.compositor.compose as compose_module
 from rosy_addon.compositor.compose import colorize, compose, streak_tone
-from rosy_addon.compositor.filter_kernel import look_for_symmetry
-from rosy_addon.compositor.flow import with_cycle_distance
+from rosy_addon.compositor.flow import NO_DRIFT, Drift
 from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import PixelLook, pixel_look
 from rosy_addon.compositor.pixel_field import PixelField, mask_undefined
 from rosy_addon.compositor.strips import Strip
 from rosy_addon.core.cache import Cache
@@ -53,7 +52,7 @@ def degree_layers(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> l
     """Return the layers of a picture without ink, one per visible degree, in ascending order."""
     layers = []
 
-    def recorded(field: PixelField, look: Look, images: LicImages) -> np.ndarray:
+    def recorded(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:
         tone = streak_tone(field, look, images)
         layers.append(DegreeLayer(field.degree, field.pixel, images, tone))
         return tone
@@ -64,9 +63,12 @@ def degree_layers(gbuffer: GBuffer, look: Look, cache: Cache | None = None) -> l
     return layers
 
 
-def lic(field: PixelField, look: Look, noise: np.ndarray | None = None) -> LicImages:
+def lic(
+    field: PixelField, look: Look, noise: np.ndarray | None = None, drift: Drift = NO_DRIFT
+) -> LicImages:
     """Average noise, by default that of the look, along the streamlines of each member."""
-    (images,) = lic_lengths(field, [look], look_noise(field, look) if noise is None else noise)
+    pixels = pixel_look(look, drift=drift)
+    (images,) = lic_lengths(field, [pixels], look_noise(field, pixels) if noise is None else noise)
     return images
 
 
@@ -109,6 +111,7 @@ def compose_planar(
     look: Look,
     magnitude: np.ndarray | float = 1.0,
     noise: np.ndarray | None = None,
+    drift: Drift = NO_DRIFT,
 ) -> PlanarPicture:
     """Draw a field in the plane, without mesh, camera, light and supersampling.
 
@@ -120,13 +123,15 @@ def compose_planar(
         Lengths are in pixels.
     noise : (H, W) or (H, W, 3) ndarray, optional
         Values from 0 to 1. By default the noise of the look in image space.
+    drift : Drift
     """
     pixels = planar_pixel_field(angles, degree, magnitude)
     if noise is not None:
         noise = np.asarray(noise, dtype=np.float32).reshape(len(pixels.pixel), -1)
-    look = look_for_symmetry(with_cycle_distance(replace(look, supersampling=1)), pixels.symmetry)
-    images = lic(pixels, look, noise)
-    tone = streak_tone(pixels, look, images)
+    drawn = pixel_look(look, drift=drift).for_symmetry(pixels.symmetry)
+    noise = look_noise(pixels, drawn) if noise is None else noise
+    (images,) = lic_lengths(pixels, [drawn], noise)
+    tone = streak_tone(pixels, drawn, images)
     rgba = np.ones((*np.shape(angles), 4), dtype=np.float32)
-    rgba[..., :3] = colorize(pixels, images, tone, look).reshape(*rgba.shape[:2], -1)
+    rgba[..., :3] = colorize(pixels, images, tone, drawn).reshape(*rgba.shape[:2], -1)
     return PlanarPicture(rgba, DegreeLayer(degree, pixels.pixel, images, tone))

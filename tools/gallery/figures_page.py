@@ -61,8 +61,8 @@ def _render_with_key() -> Image.Image:
 
     from rosy_addon.jobs.bake import bake
     from rosy_addon.scene.look_properties import apply_look
-    from rosy_addon.scene.meshes import mesh_surface
     from rosy_addon.scene.mesh_fields import write_mesh_field
+    from rosy_addon.scene.meshes import mesh_surface
     from rosy_addon.ui.properties import ensure_registered
 
     from .in_blender import add, add_suzanne

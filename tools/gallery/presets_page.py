@@ -16,11 +16,10 @@ from PIL import Image
 
 from rosy_addon.field.frames import normalize
 from rosy_addon.field.generate import generate
-from rosy_addon.field.surface import Surface
 from rosy_addon.field.surface import Surface, build_surface
+from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.gbuffer import MeshInstance
-from rosy_addon.field.up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 
 from .page import IMAGES, ROOT
 from .shapes import grid_surface, suzanne

@@ -6,13 +6,13 @@
 
 uniform sampler2D normals, field_values, depth_slopes, noise, wobble_angles;
 uniform float guiding_angle, min_normal_cosine, wobble_strength;
-uniform int degree, line_count, sheet_count, foreshorten;
+uniform int degree, line_count, sheet_count;
 uniform ivec2 box_origin;
 uniform vec2 lens_shift;
 uniform vec4 clip_to_camera;
 layout(rg32f) uniform writeonly image2D cells;
 layout(rgba16f) uniform writeonly image2DArray directions;
-#pragma constant(degree, line_count, sheet_count, harmonic_count, first_harmonic, foreshorten)
+#pragma constant(degree, line_count, sheet_count, harmonic_count, first_harmonic)
 
 // Whether the surface continues from a pixel to a neighbor, as in `pixel_neighbors`.
 bool is_continuous(ivec2 pixel, ivec2 offset, vec4 value, vec4 normal, vec4 slope)
@@ -80,7 +80,7 @@ void main()
     float member_angle = angle + guiding_angle + TAU * float(line) / float(sheet_count);
     vec2 member = member_direction(vec2(cos(member_angle), sin(member_angle)), wobble, pixel);
     vec2 direction = screen_x * member.x + screen_y * member.y;
-    direction = foreshorten != 0 ? direction : unit_or_zero(direction);
+    direction = unit_or_zero(direction);
     imageStore(directions, ivec3(pixel, line), vec4(direction, 0.0, 0.0));
   }
 }

@@ -3,7 +3,7 @@
 
 uniform sampler2D cells, tones;
 uniform sampler2DArray angle_gradients, noise_gradients;
-uniform float grain, step_length;
+uniform float line_width;
 uniform int line_count, sheet_count, flow_mode, kernel, noise_channels, is_antialiased;
 uniform int break_steps;
 uniform vec4 flow_weights;
@@ -179,7 +179,7 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
     vec4 sample_ = texelFetch(angle_gradients, ivec3(pixel, line), 0);
     vec2 velocity = sample_.xy + dot(sample_.zw, offset) * vec2(-sample_.y, sample_.x);
     velocity *= opposite ? -direction_sign : direction_sign;
-    offset += step_length * (step_index == 0 ? velocity : 1.5 * velocity - 0.5 * previous_velocity);
+    offset += step_index == 0 ? velocity : 1.5 * velocity - 0.5 * previous_velocity;
     previous_velocity = velocity;
     // At most to an adjacent pixel, however sharply the direction turns.
     vec2 pixel_step = clamp(round(offset), -1.0, 1.0);
@@ -236,7 +236,7 @@ Half traced_half(ivec2 pixel, int sheet, float direction_sign, vec4 cell, float 
 vec3 normalized_mean(Sums sums, float full_count, Drift drift)
 {
   float sample_count = effective_samples(sums, drift);
-  float cell_count = sample_count * step_length / grain;
+  float cell_count = sample_count / line_width;
   vec3 mean;
   if (flow_mode != FLOW_NONE) {
     float factor = sqrt(samples_at_rest(drift.half_steps) / sums.full_square_sum);

@@ -3,7 +3,7 @@
 #include "triangle_record.glsl"
 
 uniform sampler2D feature_curvature;
-uniform float pixel_size, cell_size, min_cell_scale, feature_grains, max_bend, amplitude, density;
+uniform float pixel_size, cell_size, min_cell_scale, feature_cells, max_bend, amplitude, density;
 uniform int density_threshold, noise_channels, seed, instance_hash;
 uniform ivec2 box_origin;
 uniform vec2 lens_shift;
@@ -51,7 +51,7 @@ void main()
     vec3 corner_curvature = texelFetch(feature_curvature, texel, 0).xyz;
     vec3 weights = center_edges / (edge_sum == 0.0 ? 1.0 : edge_sum);
     // As `surface_noise.feature_scale`.
-    scale /= clamp(dot(corner_curvature, weights) * size * feature_grains, 1.0, max_bend);
+    scale /= clamp(dot(corner_curvature, weights) * size * feature_cells, 1.0, max_bend);
   }
   float level = log2(max(size * scale, 1e-30));
   float first_octave = floor(level - (0.5 * float(OCTAVES) - 1.0));

@@ -9,7 +9,7 @@ from shapes import plane
 
 import rosy_addon as rf
 from rosy_addon.api.films import Film
-from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.flow import drift_at
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.representation import face_representation
 from rosy_addon.projection.face_values import face_values
@@ -56,12 +56,12 @@ def test_pictures_between_fields(square):
 def test_streaks_drift_and_loops_close(square):
     look = Look(length=8, flow=1.0)
     fields = series(square, 3)
-    looks = [view.look for view in views_of(fields, look, between=1)]
-    assert looks == [flow_at(look, number) for number in range(5)]
-    looks = [view.look for view in views_of(fields, look, between=1, loop=True)]
-    assert looks == [flow_at(look, number, 6) for number in range(6)]
-    assert len({each.flow_phase for each in looks}) == 6
-    assert flow_at(look, 6, 6) == looks[0]
+    drifts = [view.drift for view in views_of(fields, look, between=1)]
+    assert drifts == [drift_at(look, number) for number in range(5)]
+    drifts = [view.drift for view in views_of(fields, look, between=1, loop=True)]
+    assert drifts == [drift_at(look, number, 6) for number in range(6)]
+    assert len({each.phase for each in drifts}) == 6
+    assert drift_at(look, 6, 6) == drifts[0]
 
 
 def test_noise_moves_with_the_mesh(square):

@@ -94,7 +94,7 @@ def test_hatching_for_one_light():
     """The ink of a texture has the tone of the light; without a light it has thresholds of all tones."""
     square = rf.Surface(*SQUARE, name="square", uv=np.array(SQUARE[0])[:, :2])
     field = rf.along_axis(square, (1, 0.4, 0), 4)
-    settings = {"ink": "hatch", "grain": 3, "shading": 1, "ink_color": "#000000"}
+    settings = {"ink": "hatch", "line_width": 3, "shading": 1, "ink_color": "#000000"}
     thresholds = rf.texture(square, field, size=512, margin=0, **settings).tiles[1001]
     red, green = (np.asarray(thresholds)[..., channel].ravel() / 255 for channel in (0, 1))
     np.testing.assert_allclose(np.quantile(red, [0.2, 0.5, 0.8]), [0.2, 0.5, 0.8], atol=0.03)

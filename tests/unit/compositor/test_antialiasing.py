@@ -13,7 +13,7 @@ from shapes import icosphere, torus
 from rosy_addon.compositor import outline
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import supersampled_look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.field.generate import axis_field, generate
 from rosy_addon.preset_files.store import load_preset
@@ -28,7 +28,7 @@ CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fo
 LOOKS = {
     "default": Look(),
     "color noise": Look(hue="noise"),
-    "tapered, on the surface": Look(taper=True, anchor="surface", grain=2.5),
+    "tapered, on the surface": Look(fade="ends", anchor="surface", line_width=2.5),
     "short": Look(length=12),
 }
 
@@ -95,12 +95,12 @@ def test_outlines_are_those_of_samples(width, max_samples, monkeypatch):
     monkeypatch.setattr(outline, "MAX_OUTLINE_SAMPLES", max_samples)
     instance, look = torus_instance(), Look(outline=width)
     pixels, samples = project([instance], CAMERA, samples=2), project([instance], CAMERA.scaled(2))
-    coverage = outline_coverage(pixels, replace(supersampled_look(look), antialiased=True))
+    coverage = outline_coverage(pixels, pixel_look(look, is_antialiased=True))
     actual = np.zeros(SIZE * SIZE)
     actual[pixels.pixel] = coverage * pixels.coverage.own
     shown = coverage[pixels.coverage.entry] * pixels.coverage.share
     np.add.at(actual, pixels.coverage.pixel, shown)
-    sample_look = supersampled_look(replace(look, supersampling=2))
+    sample_look = pixel_look(look).in_samples(2)
     expected = np.zeros(4 * SIZE * SIZE)
     expected[samples.pixel] = outline_coverage(samples, sample_look)
     expected = expected.reshape(SIZE, 2, SIZE, 2).mean(axis=(1, 3)).ravel()

@@ -21,7 +21,7 @@ from rosy_addon.compositor.even_lines import (
 )
 from rosy_addon.compositor.hatching import LineModulation
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import instance_line_spacing, supersampled_look
+from rosy_addon.compositor.look_units import instance_line_spacing, pixel_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
 from rosy_addon.core.cache import Cache
 from rosy_addon.core.color import from_hex, to_linear
@@ -39,7 +39,8 @@ LOOK = Look(
     anchor="surface",
     light="scene",
     shading=0.5,
-    grain=3.0,
+    line_width=3.0,
+    line_distance=6.0,
     crispness=1.0,
     ink_color="#000000",
     layers=1,
@@ -66,8 +67,8 @@ def picture(instance, camera, look=LOOK):
 
 def lines_at_pixels(instance, camera, look=LOOK, cache=None):
     gbuffer = project([instance], camera)
-    field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle, False)
-    return even_lines(gbuffer, field, look, cache=cache), gbuffer
+    field = surface_pixel_field(gbuffer, instance.field.degree, look.crease_angle)
+    return even_lines(gbuffer, field, pixel_look(look, camera, [instance]), cache=cache), gbuffer
 
 
 # --- lines in pictures -------------------------------------------------------------------------------
@@ -75,32 +76,32 @@ def lines_at_pixels(instance, camera, look=LOOK, cache=None):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("supersampling", "grain"), mainly([(1, 2.0), (2, 8.0)], product([1, 2], [2.0, 3.5, 8.0]))
+    ("supersampling", "distance"), mainly([(1, 4.0), (2, 16.0)], product([1, 2], [4.0, 7.0, 16.0]))
 )
-def test_the_distance_between_lines_is_twice_the_line_width(grain, supersampling):
+def test_the_distance_between_lines(distance, supersampling):
     """Distances in pixels are rounded to steps of 1 / 8 octave."""
-    look = replace(LOOK, grain=grain, supersampling=supersampling)
+    look = replace(LOOK, line_distance=distance, supersampling=supersampling)
     rgba = picture(wall_instance(), camera_above(), look)
     columns = rgba[..., 0] - rgba[..., 0].mean()
     spectrum = (np.abs(np.fft.rfft(columns * np.hanning(SIZE)[:, None], 2**16, axis=0)) ** 2).sum(1)
-    distance = 2**16 / np.argmax(spectrum)
-    assert abs(np.log2(distance / (2 * grain))) <= 0.5 / 8 + 0.01
+    drawn = 2**16 / np.argmax(spectrum)
+    assert abs(np.log2(drawn / distance)) <= 0.5 / 8 + 0.01
     # Lines are along the rows.
     assert rgba[..., 0].std(axis=1).max() < 0.01
 
 
 def test_distances_in_blender_units_are_exact():
-    look = replace(LOOK, unit="world", unit_size=0.037, grain=2.5)
+    look = replace(LOOK, unit_size=0.037, line_distance=5.0)
     lines, _ = lines_at_pixels(wall_instance(), camera_above(8.0), look)
     pixels_per_unit = SIZE / 8
-    np.testing.assert_allclose(lines.period, 2 * 2.5 * 0.037 * pixels_per_unit, rtol=1e-4)
+    np.testing.assert_allclose(lines.period, 5.0 * 0.037 * pixels_per_unit, rtol=1e-4)
     assert lines.growth is None
 
 
 def test_spacings_in_pixels_come_in_steps():
-    instance, look = wall_instance(), supersampled_look(LOOK)
+    instance, look = wall_instance(), pixel_look(LOOK)
     spacings = {
-        instance_line_spacing(look, 2.0, camera_above(scale), instance)
+        instance_line_spacing(look, camera_above(scale), instance)
         for scale in np.linspace(8, 16, 200)
     }
     steps = np.diff(np.log2(sorted(spacings)))
@@ -115,7 +116,7 @@ def test_lines_at_a_larger_distance_replace_crowded_ones():
     eye = (0, -5 * np.sqrt(1 - cosine**2), 5 * cosine)
     view = look_at(eye, (0, 0, 0), (0, 0, 1))
     camera = orthographic_camera(view, SIZE, SIZE, scale=2.0)
-    rgba = picture(wall_instance(), camera, replace(LOOK, grain=4.0))
+    rgba = picture(wall_instance(), camera, replace(LOOK, line_distance=8.0))
     columns = rgba[..., 0] - rgba[..., 0].mean()
     assert columns.std() > 0.2
     spectrum = (np.abs(np.fft.rfft(columns * np.hanning(SIZE)[:, None], 2**16, axis=0)) ** 2).sum(1)
@@ -130,9 +131,9 @@ def test_members_get_the_lines_along_them(degree, side):
     instance = wall_instance(degree, 0.4)
     camera = camera_above(eye=(0, 0, 5 * side))
     gbuffer = project([instance], camera)
-    field = surface_pixel_field(gbuffer, degree, 0.7, False)
-    look = replace(LOOK, grain=8.0, guiding_angle=0.3)
-    lines = even_lines(gbuffer, field, look)
+    field = surface_pixel_field(gbuffer, degree, 0.7)
+    look = replace(LOOK, line_distance=16.0, guiding_angle=0.3)
+    lines = even_lines(gbuffer, field, pixel_look(look))
     members = all_members(field, look.guiding_angle)
     for member, streak in zip(members, lines.streaks, strict=False):
         image = streak.reshape(SIZE, SIZE)
@@ -169,7 +170,7 @@ def test_settings_that_do_not_apply_do_not_change_the_picture(effect):
     if effect != "plain":
         look = replace(look, **{effect: 6.0 if effect == "overshoot" else 0.5})
     expected = picture(instance, camera, look)
-    others = {"length": 7, "taper": True}
+    others = {"length": 7, "fade": "ends"}
     applied = {name for name in others if settings_of(Look)[name].applies(look)}
     assert applied == (set(others) if effect in ("breaks", "wobble") else set())
     for name, setting in settings_of(Look).items():
@@ -277,7 +278,7 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
     view = look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1))
     camera = perspective_camera(view, SIZE, SIZE, fov=1.0)
-    look = replace(LOOK, grain=2.0)
+    look = replace(LOOK, line_distance=4.0)
     lines, gbuffer = lines_at_pixels(instance, camera, look)
     assert lines.growth is not None and lines.growth.max() > 0.99
     # Without doubling, the nearest lines would be about 9 times as far apart as asked for.
@@ -288,7 +289,7 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
     assert lines.period[0, near].min() > 3.6 and lines.period[0, near].max() < 8.4
     coverage = lines.coverage(0, np.full(len(depth), 0.4, np.float32), look)
     assert coverage[near].mean() == pytest.approx(0.4, abs=0.05)
-    world = replace(look, unit="world", unit_size=0.02)
+    world = replace(look, unit_size=0.02)
     assert lines_at_pixels(instance, camera, world)[0].growth is None
 
 

@@ -11,27 +11,29 @@ from harness.planar import compose_planar
 from scipy import ndimage
 
 from rosy_addon.compositor.drifting_averages import DriftingAverages, MovingKernel
-from rosy_addon.compositor.filter_kernel import kernel_of, sample_weights
+from rosy_addon.compositor.filter_kernel import sample_weights
 from rosy_addon.compositor.flow import (
+    NO_DRIFT,
+    Drift,
     channel_shifts,
     channel_weights,
-    flow_at,
+    drift_at,
     forward_share,
-    streamline_reach,
 )
 from rosy_addon.compositor.look import Look, has_flow
+from rosy_addon.compositor.look_units import pixel_look
 
 SIZE = 320
 
 #: Pixels at the border that are not compared: streamlines end there.
 MARGIN = 64
 
-KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
+KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
-def member(angle, degree, look):
+def member(angle, degree, look, drift=NO_DRIFT):
     """Return the image of the first member of a uniform field, around 0."""
-    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look).layer
+    layer = compose_planar(np.full((SIZE, SIZE), angle), degree, look, drift=drift).layer
     return layer.images.members[0, :, 0].reshape(SIZE, SIZE) - 0.5
 
 
@@ -56,10 +58,12 @@ def best_shift(first, second, direction, expected, reach=3.0):
 @pytest.mark.parametrize("kernel", KERNELS)
 @pytest.mark.parametrize("is_short", [False, True])
 def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
-    look = flow_at(Look(flow=1.0, length=12, **KERNELS[kernel]), 4.3)
+    user_look = Look(flow=1.0, length=12, **KERNELS[kernel])
+    look = pixel_look(user_look, drift=drift_at(user_look, 4.3))
+    shifts = channel_shifts(look.flow_phase, look.flow_distance)
     moving = MovingKernel(look, levels=13 if is_short else 1)
     steps, count = 40, 5
-    reach = streamline_reach(look)
+    reach = look.streamline_reach()
     rng = np.random.default_rng(1)
     noise = rng.normal(size=(3, 2 * steps + 1, count))
     # E(-1) and the prefix sum up to -1 are 0, by the definition of the sums.
@@ -84,10 +88,10 @@ def test_averages_are_those_of_kernels_moved_upstream(kernel, is_short):
     for column in range(count):
         for direction, part in ((1, forward[column]), (-1, 1 - forward[column])):
             for channel in range(3):
-                center = axial[column] - direction * share * channel_shifts(look)[channel]
+                center = axial[column] - direction * share * shifts[channel]
                 whole = np.floor(center)
                 low, high = (
-                    sample_weights(direction * (offsets - at), kernel_length, kernel_of(look))
+                    sample_weights(direction * (offsets - at), kernel_length, look.kernel)
                     for at in (whole, whole + 1)
                 )
                 weights = low + (center - whole) * (high - low)
@@ -107,26 +111,27 @@ def test_channels_have_a_constant_contrast(phase):
 
 
 def test_frames_of_a_loop_are_whole_cycles():
-    look = Look(flow=1.3, flow_phase=0.2)
-    first, last = flow_at(look, 0, 50), flow_at(look, 50, 50)
-    assert last.flow_phase == pytest.approx(first.flow_phase)
-    assert first.flow_distance <= look.length
-    cycles = 1.3 * 50 / first.flow_distance
+    look = Look(flow=1.3)
+    first, second, last = (drift_at(look, frame, 50) for frame in (0, 1, 50))
+    assert last.phase % 1 == pytest.approx(first.phase) and first.phase == 0
+    distance = pixel_look(look, drift=first).flow_distance
+    assert distance <= look.length
+    cycles = 1.3 * 50 / distance
     assert cycles == pytest.approx(round(cycles))
-    second = flow_at(look, 1, 50)
-    assert (second.flow_phase - first.flow_phase) * first.flow_distance == pytest.approx(1.3)
+    assert second.phase * distance == pytest.approx(1.3)
 
 
-def test_looks_without_flow_stay_as_they_are():
+def test_looks_without_flow_do_not_drift():
     for look in (Look(), Look(flow=1.0, method="brute"), Look(flow=1.0, hue="noise")):
-        assert not has_flow(look) and flow_at(look, 7) is look
+        assert not has_flow(look) and drift_at(look, 7) == NO_DRIFT
+        assert pixel_look(look, drift=Drift(0.3)).lic_key() == pixel_look(look).lic_key()
 
 
 @pytest.mark.parametrize("degree", [1, 3])
 def test_streaks_drift_along_directions(degree):
     look = Look(flow=1.0, length=20)
     # The first member is the one nearest to the guiding angle.
-    first, second = (member(0.0, degree, flow_at(look, frame)) for frame in (5, 11))
+    first, second = (member(0.0, degree, look, drift_at(look, frame)) for frame in (5, 11))
     directions = [(1.0, 0.0), (0.0, 1.0)]
     along, across = (
         best_shift(first, second, direction, expected, reach)
@@ -140,13 +145,13 @@ def test_streaks_drift_along_directions(degree):
 
 def test_lines_drift_toward_the_guiding_angle():
     look = Look(flow=1.0, length=20, guiding_angle=np.pi)
-    first, second = (member(0.0, 2, flow_at(look, frame)) for frame in (5, 11))
+    first, second = (member(0.0, 2, look, drift_at(look, frame)) for frame in (5, 11))
     assert best_shift(first, second, (1, 0), -6) == pytest.approx(-6, rel=0.05)
 
 
 def test_lines_across_the_guiding_angle_drift_both_ways():
     look = Look(flow=1.0, length=20)
-    first, second = (member(np.pi / 2, 2, flow_at(look, frame)) for frame in (5, 11))
+    first, second = (member(np.pi / 2, 2, look, drift_at(look, frame)) for frame in (5, 11))
     up, down = (correlation(ndimage.shift(first, (shift, 0)), second) for shift in (6, -6))
     assert abs(up - down) < 0.1
     assert forward_share(np.array([0.0, 1.0, -1.0])).tolist() == [0.5, 1.0, 0.0]
@@ -159,14 +164,16 @@ def test_contrast_is_that_of_still_streaks(degree):
     still = np.std([inner(member(0.3, degree, replace(look, seed=seed))) for seed in range(3)])
     for frame in (0, 3, 9):
         moving = [
-            inner(member(0.3, degree, flow_at(replace(look, flow=1.0, seed=seed), frame)))
-            for seed in range(3)
+            inner(member(0.3, degree, drifting, drift_at(drifting, frame)))
+            for drifting in (replace(look, flow=1.0, seed=seed) for seed in range(3))
         ]
         assert np.std(moving) == pytest.approx(still, rel=0.06)
 
 
 def test_a_loop_closes():
     look, count = Look(flow=1.0, length=20), 24
-    frames = [member(0.4, 1, flow_at(look, frame, count)) for frame in (0, 1, 12, 13, count - 1)]
+    frames = [
+        member(0.4, 1, look, drift_at(look, frame, count)) for frame in (0, 1, 12, 13, count - 1)
+    ]
     neighbors = [correlation(frames[0], frames[1]), correlation(frames[2], frames[3])]
     assert correlation(frames[-1], frames[0]) > min(neighbors) - 0.01

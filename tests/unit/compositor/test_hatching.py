@@ -27,6 +27,7 @@ from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.inks import LUMINANCE_WEIGHTS, inks_of
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.outline import outline_coverage
 from rosy_addon.compositor.paper_grain import picture_paper_grain
 from rosy_addon.compositor.shading import diffuse
@@ -55,7 +56,13 @@ PRESETS = {name: load_preset(name).look for name in preset_keys()}
 HATCHED = [name for name, look in PRESETS.items() if look.ink != "soft"]
 
 INK = Look(
-    taper=True, ink="hatch", anchor="surface", light="lamp", shading=1.0, grain=2.5, supersampling=2
+    fade="ends",
+    ink="hatch",
+    anchor="surface",
+    light="lamp",
+    shading=1.0,
+    line_width=2.5,
+    supersampling=2,
 )
 
 
@@ -174,8 +181,8 @@ def test_presets_reproduce_a_ramp(name):
 @pytest.mark.parametrize("crispness", [0.0, 0.5, 1.0])
 def test_thresholds_decrease_and_half_coverage_is_near_the_mean(crispness):
     """Higher coverages have lower thresholds, and half coverage is near the mean."""
-    look = Look(length=40, grain=2.0, density=0.5, high_pass=16.0, crispness=crispness)
-    threshold, deviation, *_ = look_streak_statistics(look)
+    look = Look(length=40, line_width=2.0, density=0.5, high_pass=16.0, crispness=crispness)
+    threshold, deviation, *_ = look_streak_statistics(pixel_look(look))
     assert (np.diff(threshold) < 0).all() and deviation > 0
     middle = threshold[len(threshold) // 2]
     assert abs(middle) < 0.1  # the distribution of streaks of dense noise is nearly symmetric
@@ -190,7 +197,7 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
     look = Look(ink="hatch", layers=layers, guiding_angle=0.3)
     for tone in (0.02, 0.3, 0.7, 0.98):
         transmittance = np.full((1, angles.size), tone, dtype=np.float32)
-        shares = np.array(line_shares(field, look, transmittance))
+        shares = np.array(line_shares(field, pixel_look(look), transmittance))
         np.testing.assert_allclose(shares.sum(axis=0), 1, atol=1e-5)
         # Members jump where two are equally near the guiding angle, but the sorted shares do not.
         ordered = np.sort(shares, axis=0)
@@ -206,10 +213,12 @@ def test_shares_of_families_sum_to_one_and_are_continuous(degree, layers):
 def test_crowded_even_lines_are_drawn_last():
     """Where a surface turns away across the first lines, the ink of light tones is in the others."""
     field = planar_pixel_field(np.zeros((1, 3)), 4)
-    look = Look(ink="even", grain=2.5, layers=2, layering=0.5)
+    look = Look(ink="even", line_distance=5.0, layers=2, layering=0.5)
     period = np.array([[5.0, 1.5, 1.5], [5.0, 5.0, 1.5]], dtype=np.float32)
     lines = EvenLines(np.zeros((2, 3), dtype=np.float32), period, None)
-    first, second = line_shares(field, look, np.full((1, 3), 0.9, dtype=np.float32), lines)
+    first, second = line_shares(
+        field, pixel_look(look), np.full((1, 3), 0.9, dtype=np.float32), lines
+    )
     np.testing.assert_allclose(first + second, 1, atol=1e-6)
     assert first[0] > 0.95 and second[1] > 0.95
     assert abs(first[2] - first[0]) < 1e-6
@@ -272,16 +281,16 @@ UNEVEN_LINES = {
 
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     """(H, W) coverage by lines of a constant field in the plane, for a constant tone."""
-    look = replace(look, anchor="picture", paper_color="#ffffff00")
+    look = pixel_look(replace(look, anchor="picture", paper_color="#ffffff00"))
     field = planar_pixel_field(np.full((side, side), angle), degree)
     noise = look_noise(field, look)
     break_images = paper_grain = None
     if look.breaks or look.wobble:
-        break_look = replace(look, length=break_steps(look))
+        break_look = look.with_length(break_steps(look))
         (break_images,) = fast_lic(field, [break_look], noise)
     if look.paper_grain:
         paper_grain = picture_paper_grain(
-            field.pixel, field.width, look.grain, look.seed, 1, field.line_count
+            field.pixel, field.width, look.line_width, look.seed, 1, field.line_count
         )
     (images,) = fast_lic(field, [look], noise)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
@@ -301,7 +310,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
 )
 def test_uneven_lines_have_the_same_coverage(kind, crispness):
     """The mean coverage is that of even lines, from dark to light tones."""
-    look = Look(ink="hatch", grain=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
+    look = Look(ink="hatch", line_width=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
     for tone in (0.1, 0.3, 0.5, 0.7, 0.9):
         assert plane_coverage(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
 
@@ -319,7 +328,7 @@ def mean_run_length(ink):
 
 
 def test_lines_break_in_light_tones_first():
-    look = Look(ink="hatch", grain=2.0, length=60, crispness=1.0)
+    look = Look(ink="hatch", line_width=2.0, length=60, crispness=1.0)
     broken = replace(look, breaks=1.0)
     shorter = [
         mean_run_length(plane_coverage(broken, tone, angle=0.0))
@@ -331,23 +340,23 @@ def test_lines_break_in_light_tones_first():
 
 
 def test_paper_grain_breaks_lines():
-    look = Look(ink="hatch", grain=2.0, length=60, crispness=0.8)
+    look = Look(ink="hatch", line_width=2.0, length=60, crispness=0.8)
     plain, rough = (plane_coverage(replace(look, paper_grain=fraction), 0.6) for fraction in (0, 1))
     assert mean_run_length(rough) < 0.6 * mean_run_length(plain)
 
 
-@pytest.mark.parametrize("grain", [1.5, 3.0, 8.0])
-def test_statistics_of_paper_grain(grain):
+@pytest.mark.parametrize("line_width", [1.5, 3.0, 8.0])
+def test_statistics_of_paper_grain(line_width):
     """Mean 0, standard deviation 1, no low frequencies, independent of other lines and streaks."""
     side = 512
     pixel = np.arange(side * side, dtype=np.int32)
-    first_grain, second_grain = picture_paper_grain(pixel, side, grain, 0, line_count=2).reshape(
-        2, side, side
-    )
+    first_grain, second_grain = picture_paper_grain(
+        pixel, side, line_width, 0, line_count=2
+    ).reshape(2, side, side)
     assert abs(np.corrcoef(first_grain.ravel(), second_grain.ravel())[0, 1]) < 0.03
     assert abs(first_grain.mean()) < 0.02 and first_grain.std() == pytest.approx(1, abs=0.03)
     assert gaussian_filter(first_grain, 16).std() < 0.12
-    streaks = image_noise(pixel, side, grain, 0, 1)
+    streaks = image_noise(pixel, side, line_width, 0, 1)
     assert abs(np.corrcoef(first_grain.ravel(), streaks[:, 0])[0, 1]) < 0.02
 
 
@@ -373,7 +382,7 @@ def test_paper_grain_depends_only_on_the_pixel():
 def test_statistics_of_the_wobble(anchor, distance):
     """Mean 0, standard deviation `WOBBLE_STD`, small differences of neighbors, at any distance."""
     gbuffer = project([make_instance(tube())], make_camera(distance=distance, zoom=distance / 4))
-    actual = wobble_angle(gbuffer, replace(INK, anchor=anchor, grain=1.5))
+    actual = wobble_angle(gbuffer, pixel_look(replace(INK, anchor=anchor, line_width=1.5)))
     assert abs(actual.mean()) < 0.25 * WOBBLE_STD
     assert 0.75 < actual.std() / WOBBLE_STD < 1.25
     right = np.flatnonzero((np.diff(gbuffer.pixel) == 1) & (np.diff(gbuffer.triangle) == 0))
@@ -435,7 +444,7 @@ def test_lone_pixels_of_undefined_faces_have_ink_or_not():
     gbuffer = project([instance], camera)
     assert len(gbuffer.pixel) == 1
     with np.errstate(all="raise"):
-        rgba = compose(gbuffer, Look(ink="hatch", grain=10.0, length=4)).rgba
+        rgba = compose(gbuffer, Look(ink="hatch", line_width=10.0, length=4)).rgba
     assert np.isfinite(rgba).all()
 
 
@@ -508,13 +517,13 @@ def test_inks_swap_ranks_without_a_seam(degree):
     """As the field rotates relative to the guiding angle, ink indices change without a jump."""
     field = planar_pixel_field(np.linspace(-1, 1, 40001)[None], degree)
     look = replace(INK, hue="families", guiding_angle=0.3)
-    ink_indices = np.sort(np.array(line_ink_indices(field, look)), axis=0)
+    ink_indices = np.sort(np.array(line_ink_indices(field, pixel_look(look))), axis=0)
     assert np.abs(np.diff(ink_indices, axis=1)).max() < 0.03
     assert (
         np.abs(ink_indices - np.arange(field.line_count)[:, None]).max(axis=1) <= 0.5 + 1e-3
     ).all()
-    assert line_ink_indices(field, replace(look, hue="one")) is None
-    assert line_ink_indices(field, replace(look, hue="magnitude")) is None
+    assert line_ink_indices(field, pixel_look(replace(look, hue="one"))) is None
+    assert line_ink_indices(field, pixel_look(replace(look, hue="magnitude"))) is None
 
 
 def test_families_keep_their_inks_at_any_guiding_angle():
@@ -523,7 +532,10 @@ def test_families_keep_their_inks_at_any_guiding_angle():
     field = replace(field, channels={("family", 2): np.exp(2j * np.linspace(-1, 1, 101))})
     for guide in (0.0, 0.6, -1.2):
         look = replace(INK, hue="families", guiding_angle=guide)
-        actual, families = line_ink_indices(field, look), line_families(field, look)
+        actual, families = (
+            line_ink_indices(field, pixel_look(look)),
+            line_families(field, pixel_look(look)),
+        )
         np.testing.assert_array_equal(actual, families)
         assert {0, 1} == set(np.unique(actual))
 
@@ -684,12 +696,12 @@ def test_presets_stay_on_the_surface(name, motion):
     look = replace(PRESETS[name], light="scene", shading=0.35)
     if look.ink == "even" and motion == "zoomed":
         # At distances in pixels, a zoom needs other lines.
-        look = replace(look, unit="world", unit_size=0.006)
+        look = replace(look, unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
-@pytest.mark.parametrize("grain", [2.5, *long(4.0)])
-def test_lines_keep_their_width_through_a_zoom(grain):
+@pytest.mark.parametrize("width", [2.5, *long(4.0)])
+def test_lines_keep_their_width_through_a_zoom(width):
     """Lines on a wall, at zooms from 1 to 16."""
     points = np.array([[-9, 0, -9], [9, 0, -9], [9, 0, 9], [-9, 0, 9]], dtype=float)
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
@@ -699,7 +711,7 @@ def test_lines_keep_their_width_through_a_zoom(grain):
         camera = orthographic_camera(
             look_at((0.3, -5, 0.2), (0.3, 0, 0.2)), SIZE, SIZE, scale=8 / zoom
         )
-        rgba = render(instance, camera, replace(INK, light="scene", shading=0.4, grain=grain))
+        rgba = render(instance, camera, replace(INK, light="scene", shading=0.4, line_width=width))
         widths.append(line_width(rgba[..., 0]))
     assert max(widths) / min(widths) < 1.15
 
@@ -710,7 +722,7 @@ def test_lines_in_blender_units_scale_with_the_zoom():
     wall = build_surface(points, [0, 1, 2, 3], [0, 4], name="wall")
     instance = MeshInstance(wall, np.eye(4), axis_field(wall, 2, (1.0, 0, 0)))
     look = replace(INK, light="scene", shading=0.4)
-    world_look = replace(look, unit="world", unit_size=4 / SIZE)
+    world_look = replace(look, unit_size=4 / SIZE)
     widths = []
     for zoom in (1.0, 1.6, 4.0):
         camera = orthographic_camera(
@@ -733,7 +745,7 @@ def test_lines_in_blender_units_scale_with_the_distance():
         matrix[:3, 3] = left, distance, 0
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 2, (1.0, 0, 0))))
     camera = perspective_camera(look_at((0, 0, 0), (0, 1, 0)), SIZE, SIZE, fov=2 * np.arctan(0.5))
-    look = replace(INK, light="scene", shading=0.5, unit="world", unit_size=0.04)
+    look = replace(INK, light="scene", shading=0.5, unit_size=0.04)
     picture = compose(project(walls, supersampled(camera, 2)), look).rgba[..., 0]
     near, far = picture[:, 8 : SIZE // 2 - 8], picture[:, SIZE // 2 + 8 : -8]
     assert line_width(near) / line_width(far) == pytest.approx(2, rel=0.2)
@@ -744,7 +756,7 @@ def test_lines_in_blender_units_scale_with_the_distance():
     "motion", ["zoomed", *long(*(name for name in MOTIONS if name != "zoomed"))]
 )
 def test_lines_in_blender_units_stay_on_the_surface(motion):
-    look = replace(INK, light="scene", shading=0.35, unit="world", unit_size=0.006)
+    look = replace(INK, light="scene", shading=0.35, unit_size=0.006)
     assert warped_correlation(*MOTIONS[motion](), look) >= 0.9
 
 
@@ -842,7 +854,7 @@ def test_the_width_of_outlines(width):
     """The outline of a ball has the area of a ring of that width along the border."""
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
     gbuffer = project([make_instance(ball())], camera)
-    covered = outline_coverage(gbuffer, Look(outline=width))
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=width)))
     radius = SIZE / 2.4
     ring = np.pi * (radius**2 - (radius - width) ** 2)
     assert covered.sum() == pytest.approx(ring, rel=0.06 if width > 1 else 0.15)
@@ -862,7 +874,7 @@ def test_outlines_are_drawn_on_the_nearer_surface():
         walls.append(MeshInstance(wall, matrix, axis_field(wall, 4, (1.0, 0, 0.2))))
     camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=4.0)
     gbuffer = project(walls, camera)
-    covered = outline_coverage(gbuffer, Look(outline=3.0))
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=3.0)))
     first, second = gbuffer.instance_id == 0, gbuffer.instance_id == 1
     x, y = gbuffer.position[:, 0] * 60, gbuffer.position[:, 1] * 60
     to_border = 60 - np.maximum(np.abs(x), np.abs(y))
@@ -879,10 +891,12 @@ def test_lines_of_creases_are_half_on_each_side():
     gbuffer = project([MeshInstance(box, np.eye(4), axis_field(box, 4, (0, 0, 1.0)))], camera)
     x = (gbuffer.position @ np.eye(3)[0]) * 120
     middle = np.abs(x) < 20
-    covered = outline_coverage(gbuffer, Look(outline=4.0))
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=4.0)))
     inner = middle & (np.abs(gbuffer.position[:, 1] * 120) < 40)
     assert (covered[inner] == (np.abs(x[inner]) < 2)).all()
-    assert not outline_coverage(gbuffer, Look(outline=4.0, cross_creases=True))[inner].any()
+    assert not outline_coverage(gbuffer, pixel_look(Look(outline=4.0, crease_angle=np.pi)))[
+        inner
+    ].any()
 
 
 def test_outlines_are_drawn_in_ink():

@@ -16,7 +16,7 @@ from bench import cases
 from rosy_addon.compositor import stages
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.filter_kernel import full_sample_count
-from rosy_addon.compositor.flow import flow_at
+from rosy_addon.compositor.flow import NO_DRIFT, Drift, cycle_distance, drift_at
 from rosy_addon.compositor.ibfv import decay_of_samples
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
@@ -31,8 +31,13 @@ LOOK = Look(method="ibfv")
 MARGIN = 40
 
 
-def draw(field: PixelField, look: Look = LOOK, noise: np.ndarray | None = None) -> LicImages:
-    return lic(field, look, noise)
+def draw(
+    field: PixelField,
+    look: Look = LOOK,
+    noise: np.ndarray | None = None,
+    drift: Drift = NO_DRIFT,
+) -> LicImages:
+    return lic(field, look, noise, drift)
 
 
 def uniform(angle: float, degree: int, size: int = 192) -> PixelField:
@@ -85,16 +90,16 @@ def test_streaks_follow_circles(degree):
     assert np.degrees(abs(angle_to(image, np.exp(1j * nearest)))) < 0.7
 
 
-DRIFTING = {"flow": 2.0, "flow_phase": 0.3}
+DRIFTING = {"flow": 2.0}
 
 
 @pytest.mark.parametrize(
     ("degree", "settings"),
     [
         (4, {}),
-        (1, {"taper": True}),
+        (1, {"fade": "ends"}),
         (4, DRIFTING),
-        *long((1, {}), (4, {"taper": True}), (1, DRIFTING)),
+        *long((1, {}), (4, {"fade": "ends"}), (1, DRIFTING)),
     ],
     ids=str,
 )
@@ -102,7 +107,7 @@ def test_the_contrast_is_that_of_sheets(degree, settings):
     stds = []
     for method in ("ibfv", "sheets"):
         look = Look(method=method, **settings)
-        images = [draw(uniform(angle, degree), look) for angle in (0.1, 0.4, 0.7)]
+        images = [draw(uniform(angle, degree), look, drift=Drift(0.3)) for angle in (0.1, 0.4, 0.7)]
         stds.append(np.std([inside(frame(i.members[0], uniform(0, 1))) for i in images]))
     assert stds[0] == pytest.approx(stds[1], rel=0.06)
 
@@ -135,7 +140,7 @@ def test_the_kernel_is_exponential():
     look = replace(LOOK, length=10)
     field = planar_pixel_field(np.zeros(noise.shape), 1)
     image = frame(draw(field, look, noise.reshape(-1, 1).astype(np.float32)).members[0], field)
-    decay = float(decay_of_samples(np.array(full_sample_count(look)), False))
+    decay = float(decay_of_samples(np.array(full_sample_count(look.length, "box")), False))
     # The noise of the first pixels is sharpened.
     streak = image[32, 63:93] - 0.5
     np.testing.assert_allclose(streak / streak[0], decay ** np.arange(30), rtol=0.02)
@@ -241,7 +246,14 @@ def test_streaks_cross_the_seams_of_charts(degree):
 
 # --- drift ----------------------------------------------------------------------------------------
 
-FLOW = replace(LOOK, flow=1.5, flow_distance=60.0)
+FLOW = replace(LOOK, flow=1.5)
+
+#: A cycle of 60 pixels, for which frames are drawn.
+CYCLE = 60 / cycle_distance(FLOW.length, FLOW.method)
+
+
+def drift_of(frame):
+    return Drift(frame * FLOW.flow / 60 % 1, CYCLE)
 
 
 @pytest.mark.parametrize(("degree", "backward"), [(1, 0), (2, 0), (3, 0), (1, 1)])
@@ -252,9 +264,9 @@ def test_streaks_drift_by_the_flow(degree, backward):
     field = planar_pixel_field(np.full((64, 200), np.pi * backward), degree)
     frames = []
     for number in (5, 7):
-        image = frame(draw(field, flow_at(FLOW, number), noise.reshape(-1, 3)).members[0], field)
+        image = frame(draw(field, FLOW, noise.reshape(-1, 3), drift_of(number)).members[0], field)
         frames.append((image[32, ::-1] if backward else image[32]) - 0.5)
-    decay = float(decay_of_samples(np.array(full_sample_count(FLOW)), False))
+    decay = float(decay_of_samples(np.array(full_sample_count(FLOW.length, "box")), False))
     source = 200 - 101 if backward else 100
     before, after = (
         row[source + 3 + shift :][:40] for row, shift in zip(frames, (0, 3), strict=True)
@@ -268,8 +280,11 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
     noise = np.full((64, 200, 3), 0.5, dtype=np.float32)
     noise[32, 100] += (1.0, -0.5, 0.3)
     field = planar_pixel_field(np.zeros((64, 200)), 2)
-    look = replace(FLOW, guiding_angle=np.pi / 2, flow_phase=0.3)
-    row = frame(draw(field, look, noise.reshape(-1, 3)).members[0], field)[32] - 0.5
+    look = replace(FLOW, guiding_angle=np.pi / 2)
+    row = (
+        frame(draw(field, look, noise.reshape(-1, 3), Drift(0.3, CYCLE)).members[0], field)[32]
+        - 0.5
+    )
     np.testing.assert_allclose(row[101:180], row[99:20:-1], atol=1e-4)
     assert np.abs(row[110]) > 0.1 * np.abs(row).max()
 
@@ -277,7 +292,7 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
 def test_the_contrast_is_the_same_in_all_frames():
     field = uniform(0.3, 1)
     stds = [
-        inside(frame(draw(field, flow_at(FLOW, n)).members[0], field)).std()
+        inside(frame(draw(field, FLOW, drift=drift_of(n)).members[0], field)).std()
         for n in range(0, 40, 5)
     ]
     assert np.ptp(stds) < 0.1 * np.mean(stds)
@@ -287,7 +302,7 @@ def test_the_contrast_is_the_same_in_all_frames():
 def test_a_loop_closes(degree):
     field = uniform(0.3, degree)
     frames = [
-        draw(field, flow_at(FLOW, number, loop_frames=12)).members.astype(float)
+        draw(field, FLOW, drift=drift_at(FLOW, number, 12)).members.astype(float)
         for number in (0, 1, 11, 12)
     ]
     np.testing.assert_array_equal(frames[0], frames[3])
@@ -303,11 +318,13 @@ def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):
     carry = stages.streak_waves
     monkeypatch.setattr(stages, "streak_waves", lambda *args: calls.append(1) or carry(*args))
     cache = Cache()
-    sequence = [compose(gbuffer, flow_at(FLOW, number), cache=cache).rgba for number in range(4)]
+    sequence = [
+        compose(gbuffer, FLOW, cache=cache, drift=drift_of(number)).rgba for number in range(4)
+    ]
     assert len(calls) == 1
     for number in (3, 1):
         np.testing.assert_array_equal(
-            compose(gbuffer, flow_at(FLOW, number)).rgba, sequence[number]
+            compose(gbuffer, FLOW, drift=drift_of(number)).rgba, sequence[number]
         )
     assert np.abs(sequence[3] - sequence[0]).mean() > 0.01
 
@@ -338,9 +355,9 @@ def test_undefined_pixels_are_gray():
         {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
         {"anchor": "surface", "flow": 1.0},
         {"hue": "magnitude", "magnitude_length": True},
-        {"foreshorten": True, "oriented": True},
+        {"fade": "tail"},
         {"ink": "even", "breaks": 0.5, "flow": 1.0},
-        {"length": 1, "step": 0.3},
+        {"length": 1},
     ],
     ids=str,
 )

@@ -23,6 +23,7 @@ from rosy_addon.compositor.ink_thresholds import (
 )
 from rosy_addon.compositor.lic import lic_lengths, look_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import PixelLook, pixel_look
 from rosy_addon.compositor.paper_grain import picture_paper_grain
 from rosy_addon.compositor.streak_statistics import break_steps
 from rosy_addon.compositor.undirected import undirected_texture
@@ -34,22 +35,22 @@ from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
 SIZE = 400
-INK = Look(ink="hatch", length=30, grain=2.0, density=0.3, high_pass=8.0)
+INK = Look(ink="hatch", length=30, line_width=2.0, density=0.3, high_pass=8.0)
 
 
-def drawn_lines(look: Look, degree: int = 4, undefined: slice = slice(0)):
+def drawn_lines(look: PixelLook, degree: int = 4, undefined: slice = slice(0)):
     """A planar field, the images of its lines, and what makes them uneven."""
     row, column = np.indices((SIZE, SIZE)) / SIZE
     angles = 0.5 * np.sin(4 * row) + 0.5 * column
     angles[undefined] = np.nan
     field = planar_pixel_field(angles, degree)
     noise = look_noise(field, look)
-    looks = [look, replace(look, length=break_steps(look))]
+    looks = [look, look.with_length(break_steps(look))]
     images, breaks = lic_lengths(field, looks, noise)
     grain = None
     if look.paper_grain:
-        grain = picture_paper_grain(field.pixel, SIZE, look.grain, 1, 1, field.line_count)
-    undirected = undirected_texture(field, noise, look.grain)
+        grain = picture_paper_grain(field.pixel, SIZE, look.line_width, 1, 1, field.line_count)
+    undirected = undirected_texture(field, noise, look.line_width)
     has_breaks = look.breaks > 0 or look.wobble > 0
     return (
         field,
@@ -61,7 +62,7 @@ def drawn_lines(look: Look, degree: int = 4, undefined: slice = slice(0)):
 @pytest.mark.parametrize("breaks, wobble, grain", [(0, 0, 0), (0.7, 0, 0.4), (0, 0.4, 0)])
 def test_thresholds_draw_the_lines_of_a_picture(breaks, wobble, grain):
     """They are evenly distributed, and comparing them with a coverage draws `line_coverage`."""
-    look = sharp_look(replace(INK, breaks=breaks, wobble=wobble, paper_grain=grain))
+    look = pixel_look(sharp_look(replace(INK, breaks=breaks, wobble=wobble, paper_grain=grain)))
     _, images, modulation = drawn_lines(look, undefined=slice(0, 80))
     thresholds = line_thresholds(1, images, look, modulation)
     expected = np.linspace(0.1, 0.9, 9)

@@ -14,6 +14,7 @@ from scipy import ndimage
 from rosy_addon.compositor.contrast import blend_gain, expected_std
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.core.errors import RosyError
 
 #: These tests draw many pictures and measure them.
@@ -41,12 +42,12 @@ def correlation(a, b):
     return np.corrcoef(np.ravel(a), np.ravel(b))[0, 1]
 
 
-def make_noise(size, grain=1.5, seed=0):
-    return image_noise(np.arange(size * size, dtype=np.int32), size, grain, seed, 1)[:, 0]
+def make_noise(size, line_width=1.5, seed=0):
+    return image_noise(np.arange(size * size, dtype=np.int32), size, line_width, seed, 1)[:, 0]
 
 
 #: Settings that choose a kernel.
-KERNELS = {"box": {}, "taper": {"taper": True}, "ramp": {"oriented": True}}
+KERNELS = {"box": {}, "taper": {"fade": "ends"}, "ramp": {"fade": "tail"}}
 
 
 def kernel_window(length, kernel):
@@ -56,7 +57,7 @@ def kernel_window(length, kernel):
     return 1 - distance / (length + 1)
 
 
-def runge_kutta_lic(angle, noise, size, length, step, kernel):
+def runge_kutta_lic(angle, noise, size, length, kernel):
     """One-member LIC in double precision, by the classic Runge-Kutta method of order 4."""
     x, y = pixel_centers(size)
     start = x + 1j * y
@@ -76,7 +77,7 @@ def runge_kutta_lic(angle, noise, size, length, step, kernel):
     for sign in (1, -1):
         p, alive = start.copy(), np.ones(start.shape, dtype=bool)
         for weight in kernel_window(length, kernel)[::sign][length + 1 :]:
-            h = sign * step
+            h = sign
             k1 = direction(p)
             k2 = direction(p + h / 2 * k1)
             k3 = direction(p + h / 2 * k2)
@@ -96,7 +97,7 @@ def crop_margin(image, margin=50):
 def test_one_direction_agrees_with_a_runge_kutta_integrator(kernel):
     x, y = pixel_centers(SIZE)
     noise = make_noise(SIZE).reshape(SIZE, SIZE).astype(np.float64)
-    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, PLAIN.step, kernel)
+    expected = runge_kutta_lic(swirl_angle, noise, SIZE, PLAIN.length, kernel)
     look = plain(method="members", **KERNELS[kernel])
     actual = tone(swirl_angle(x, y, SIZE), 1, look, noise=noise)
     assert correlation(crop_margin(actual), crop_margin(expected)) > 0.99
@@ -127,7 +128,7 @@ def test_the_decomposition_agrees_with_brute_force(degree, kernel):
 
 
 #: Settings of the noise, and of kernels.
-NOISES = ({}, {"oriented": True}, {"high_pass": 16.0, "density": 0.1}, {"taper": True})
+NOISES = ({}, {"fade": "tail"}, {"high_pass": 16.0, "density": 0.1}, {"fade": "ends"})
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -136,7 +137,7 @@ def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     size = 64
     angles = pair_angle(*pixel_centers(size), size, degree)
     rotation = np.random.default_rng(1).integers(0, degree, angles.shape) * 2 * np.pi / degree
-    look = plain(method=method, length=10, oriented=True)
+    look = plain(method=method, length=10, fade="tail")
     # Where rounding moves a position across the border of a pixel, one sample of 21 differs.
     difference = np.abs(tone(angles, degree, look) - tone(angles + rotation, degree, look))
     assert np.mean(difference > 1e-5) < 0.002
@@ -146,7 +147,7 @@ def test_pictures_do_not_depend_on_the_stored_member(degree, method):
     ("method", "degree", "noise"),
     [
         ("members", 7, {}),
-        ("sheets", 7, {"oriented": True}),
+        ("sheets", 7, {"fade": "tail"}),
         *long(*product(["members", "sheets"], [2, 3, 4, 5, 6, 7], NOISES)),
     ],
 )
@@ -162,12 +163,12 @@ def test_corrected_contrast_is_that_of_one_member(method, degree, noise):
 
 def test_the_blend_gain_of_seven_lines_includes_correlations():
     # Equation 6 assumes independent images; the correction for correlations is about a tenth.
-    gain = blend_gain(7, np.array([81.0]), PLAIN)[0]
+    gain = blend_gain(7, np.array([81.0]), pixel_look(PLAIN))[0]
     assert 0.87 < gain / np.sqrt(7) < 0.94
 
 
 @pytest.mark.parametrize(
-    ("kernel", "grain", "length", "high_pass"),
+    ("kernel", "line_width", "length", "high_pass"),
     mainly(
         [  # each pair of values of two settings occurs
             ("box", 1.0, 20, 0.0),
@@ -183,14 +184,14 @@ def test_the_blend_gain_of_seven_lines_includes_correlations():
         product(["box", "taper", "ramp"], [1.0, 1.5, 3.0], [20, 80], [0.0, 8.0, 24.0]),
     ),
 )
-def test_the_standard_deviation_of_one_member_matches_theory(kernel, grain, length, high_pass):
+def test_the_standard_deviation_of_one_member_matches_theory(kernel, line_width, length, high_pass):
     size = 512
-    look = plain(grain=grain, length=length, high_pass=high_pass, **KERNELS[kernel])
+    look = plain(line_width=line_width, length=length, high_pass=high_pass, **KERNELS[kernel])
     stds = []
     for angle in (0.1, 0.9, 1.7, 2.6):
         image = tone(np.full((size, size), angle), 1, look)
         stds.append(crop_margin(image, length + 5).std())
-    assert np.mean(stds) == pytest.approx(expected_std(look), rel=0.05)
+    assert np.mean(stds) == pytest.approx(expected_std(pixel_look(look)), rel=0.05)
 
 
 def along_field_autocorrelation(image, angles, chosen, lag):
@@ -340,7 +341,6 @@ def test_the_spectrum_peaks_at_the_members(degree):
     "settings",
     [
         {"length": 0},
-        {"step": 2.0},
         {"method": "magic"},
         {"gain": "much"},
         {"view_plane": 1},

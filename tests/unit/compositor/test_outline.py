@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from scipy.ndimage import maximum_filter
 from shapes import cube, cylinder, from_triangles, icosphere, torus
 
 from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
 from rosy_addon.compositor.outline import (
     FULL_MARK_LENGTH,
     MIN_MARK_LENGTH,
@@ -39,7 +41,9 @@ def instance_of(surface: Surface, matrix=None) -> MeshInstance:
 
 def outline_of(instance, camera, **settings):
     gbuffer = project([instance], camera)
-    coverage = outline_coverage(gbuffer, Look(outline=settings.pop("outline", WIDTH), **settings))
+    supersampling = settings.pop("supersampling", 1)
+    look = pixel_look(Look(outline=settings.pop("outline", WIDTH), **settings))
+    coverage = outline_coverage(gbuffer, replace(look, supersampling=supersampling))
     return to_image(gbuffer, coverage)
 
 
@@ -203,7 +207,7 @@ def test_parts_that_intersect_have_a_line_between_them():
     near = 0.4 * np.sign(eye[:2])
     for end in ((-near[0], near[1]), (near[0], -near[1])):
         assert line_is_covered(coverage, camera, (*near, 0.1), (*end, 0.1))
-    crossing = outline_of(instance_of(boxes), camera, cross_creases=True)
+    crossing = outline_of(instance_of(boxes), camera, crease_angle=np.pi)
     assert not line_is_covered(crossing, camera, (*near, 0.1), (-near[0], near[1], 0.1))
 
 

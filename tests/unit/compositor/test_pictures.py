@@ -23,7 +23,7 @@ from rosy_addon.projection.project import project
 #: These tests draw many pictures and measure them.
 pytestmark = pytest.mark.slow
 
-PLAIN = Look(gain=1.0, grain=1.5, density=0.5, high_pass=0.0, shading=0.0)
+PLAIN = Look(gain=1.0, line_width=1.5, density=0.5, high_pass=0.0, shading=0.0)
 
 
 def plain(**settings):
@@ -137,7 +137,7 @@ def test_silhouettes_end_streamlines():
     surface = torus(96, 48)
     field = axis_field(surface, 1, (0, 0, 1))
     gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
-    pixel_field = surface_pixel_field(gbuffer, 1, 0.7, False)
+    pixel_field = surface_pixel_field(gbuffer, 1, 0.7)
     linked = neighbor_table(pixel_field)[:, :-1].T
     valid = linked < len(gbuffer.pixel)
     gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])

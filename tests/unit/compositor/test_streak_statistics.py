@@ -7,17 +7,19 @@ from dataclasses import replace
 import pytest
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import supersampled_look
-from rosy_addon.compositor.streak_statistics import MAX_SAMPLE_GRAIN, look_streak_statistics
+from rosy_addon.compositor.look_units import pixel_look
+from rosy_addon.compositor.streak_statistics import MAX_SAMPLE_WIDTH, look_streak_statistics
 
 
 @pytest.mark.parametrize("factor", [0.5, 8.0, 200.0])
 def test_statistics_do_not_depend_on_the_scale(factor):
-    def stds(grain):
-        look = supersampled_look(Look(density=0.1, crispness=0.5))
+    def stds(line_width):
+        look = pixel_look(Look(density=0.1, crispness=0.5))
         statistics = look_streak_statistics(
-            replace(look, length=round(10 * grain), grain=grain, high_pass=8 * grain)
+            replace(
+                look, length=round(10 * line_width), line_width=line_width, high_pass=8 * line_width
+            )
         )
         return statistics.std, statistics.disc_std, statistics.break_std
 
-    assert stds(factor * MAX_SAMPLE_GRAIN) == pytest.approx(stds(MAX_SAMPLE_GRAIN), rel=0.05)
+    assert stds(factor * MAX_SAMPLE_WIDTH) == pytest.approx(stds(MAX_SAMPLE_WIDTH), rel=0.05)

@@ -47,12 +47,12 @@ LOOKS = {
     "color noise, by families": Look(length=14, hue="noise"),
     "cross-hatch": replace(load_preset("cross-hatch").look, length=14, overshoot=4.0),
     "pencil": replace(load_preset("pencil").look, length=14, overshoot=4.0),
-    "wide grain": Look(length=14, grain=4.0, high_pass=40.0, ink="hatch", outline=3.0),
+    "wide grain": Look(length=14, line_width=4.0, high_pass=40.0, ink="hatch", outline=3.0),
     "wide paper grain": Look(
-        length=6, grain=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
+        length=6, line_width=10.0, anchor="surface", high_pass=0.0, ink="hatch", paper_grain=0.8
     ),
     "magnitude": Look(length=14, hue="magnitude", magnitude_length=True, color_range=(0.0, 1.0)),
-    "flow": Look(length=10, flow=1.0, flow_phase=0.2),
+    "flow": Look(length=10, flow=1.0),
 }
 #: Those that need each kind of rows around a strip.
 COMMON = "color noise, by families", "cross-hatch", "wide paper grain", "flow"

@@ -30,7 +30,7 @@ from rosy_addon.projection.camera import orthographic_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
 
-WEAVE = Look(shading=0.0, grain=1.5, length=30)
+WEAVE = Look(shading=0.0, line_width=1.5, length=30)
 
 
 def rotate(vectors, normal, angle):

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 from lenses import shifted
 from shapes import cube, cylinder, from_triangles, icosphere, plane, torus
 
+from rosy_addon.compositor.flow import NO_DRIFT, Drift
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.pixel_field import surface_pixel_field
 from rosy_addon.compositor.shading import Light
@@ -257,7 +258,7 @@ def test_kinds_agree_with_the_pixel_field_of_numpy():
         sign_changing_tensors(surface),
     ):
         gbuffer = rooms().project([MeshInstance(surface, np.eye(4), field)], camera)
-        pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7, False)
+        pixel_field = surface_pixel_field(gbuffer, field.degree, 0.7)
         (kind,) = field_kinds([field]).values()
         assert (kind.line_count, kind.sheets_per_turn) == (
             pixel_field.line_count,
@@ -486,10 +487,18 @@ def view(size=SIZE, azimuth=0.4, perspective=True, distance=4.0, supersampling=1
 
 
 def assert_parity(
-    card, instances, camera, look=LOOK, lights=(), agreement=0.998, likeness=0.98, reference=None
+    card,
+    instances,
+    camera,
+    look=LOOK,
+    lights=(),
+    agreement=0.998,
+    likeness=0.98,
+    reference=None,
+    drift=NO_DRIFT,
 ):
     """Compare the picture of the card with numpy's, and return both."""
-    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference)
+    pair = draw_pair(ROSY, card, instances, camera, look, lights, reference, drift)
     assert np.isfinite(pair.card).all()
     both = (pair.card[..., 3] == 1) & (pair.numpy[..., 3] == 1)
     assert both.sum() > 500
@@ -547,29 +556,26 @@ LOOKS = {
         "degree": 2,
     },
     "families, of a field without families": {"hue": "families"},
-    "oriented, three directions": {"oriented": True, "degree": 3, "density": 0.03},
-    "oriented, of lines without a direction": {"oriented": True},
-    "foreshortened": {"foreshorten": True},
-    "foreshortened, three directions": {"foreshorten": True, "degree": 3},
+    "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.03},
+    "oriented, of lines without a direction": {"fade": "tail"},
     "supersampled": {"supersampling": 2},
     "supersampled color noise": {"supersampling": 2, "hue": "noise", "degree": 3},
     "guided": {"guiding_angle": 0.7},
     "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
     "flat": {"display": "flat"},
-    "flat, across creases": {"display": "flat", "cross_creases": True},
+    "flat, across creases": {"display": "flat", "crease_angle": 3.1416},
     "shaded": {"shading": 0.7},
-    "short steps": {"step": 0.4, "length": 60},
     "white noise": {"density": 0.5, "high_pass": 0.0, "gain": 1.0},
-    "coarse noise": {"grain": 5.0, "seed": 7},
+    "coarse noise": {"line_width": 5.0, "seed": 7},
     "long": {"length": 200},
     "on the surface": {"anchor": "surface"},
     "on the surface, color noise": {"anchor": "surface", "hue": "noise", "high_pass": 0.0},
     "on the surface, supersampled": {"anchor": "surface", "supersampling": 2, "seed": 3},
-    "hatched": {"ink": "hatch", "shading": 1.0, "grain": 3.0},
+    "hatched": {"ink": "hatch", "shading": 1.0, "line_width": 3.0},
     "hatched, oriented": {
         "ink": "hatch",
         "shading": 1.0,
-        "oriented": True,
+        "fade": "tail",
         "degree": 5,
         "breaks": 0.4,
     },
@@ -592,7 +598,7 @@ LOOKS = {
         "ink": "hatch",
         "breaks": 1.0,
         "shading": 1.0,
-        "grain": 2.5,
+        "line_width": 2.5,
         "length": 60,
     },
     "hatched, breaks and length by magnitude": {
@@ -603,13 +609,13 @@ LOOKS = {
         "magnitude_length": True,
         "degree": 3,
     },
-    "hatched, wobbling": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "grain": 2.5},
+    "hatched, wobbling": {"ink": "hatch", "wobble": 1.0, "shading": 0.9, "line_width": 2.5},
     "hatched, wobbling with the surface": {
         "ink": "hatch",
         "wobble": 1.0,
         "anchor": "surface",
         "shading": 0.9,
-        "grain": 2.5,
+        "line_width": 2.5,
         "supersampling": 2,
         "degree": 3,
     },
@@ -618,7 +624,7 @@ LOOKS = {
         "ink": "hatch",
         "paper_grain": 0.6,
         "supersampling": 2,
-        "grain": 4.0,
+        "line_width": 4.0,
         "crispness": 0.3,
         "seed": 5,
         "shading": 0.9,
@@ -653,15 +659,13 @@ LOOKS = {
         "paper_color": "#101020",
         "shading": 0.9,
     },
-    "in Blender units": {"anchor": "surface", "unit": "world", "unit_size": 0.007},
+    "in Blender units": {"anchor": "surface", "unit_size": 0.007},
     "in Blender units, anchored to the picture": {
-        "unit": "world",
         "unit_size": 0.03,
         "supersampling": 2,
     },
     "hatched in Blender units, uneven": {
         "anchor": "surface",
-        "unit": "world",
         "unit_size": 0.012,
         "ink": "hatch",
         "wobble": 0.7,
@@ -708,14 +712,14 @@ LOOKS = {
         "guiding_angle": 0.5,
         "supersampling": 2,
     },
-    "fine on small features": {"anchor": "surface", "detail": 0.7, "grain": 2.5, "degree": 4},
+    "fine on small features": {"anchor": "surface", "detail": 0.7, "line_width": 2.5, "degree": 4},
     "hatched, six directions": {"ink": "hatch", "degree": 6, "layering": 0.1, "shading": 1.0},
-    "even lines": {"ink": "even", "shading": 0.9, "grain": 3.0},
+    "even lines": {"ink": "even", "shading": 0.9, "line_distance": 6.0},
     "even lines, supersampled": {
         "ink": "even",
         "shading": 0.9,
         "light": "lamp",
-        "grain": 2.8,
+        "line_distance": 5.6,
         "supersampling": 2,
         "degree": 6,
         "layers": 2,
@@ -724,7 +728,7 @@ LOOKS = {
     "even lines of an odd degree, soft": {
         "ink": "even",
         "shading": 0.8,
-        "grain": 4.0,
+        "line_distance": 8.0,
         "degree": 3,
         "crispness": 0.3,
         "hue": "families",
@@ -732,7 +736,6 @@ LOOKS = {
     "even lines in Blender units, uneven": {
         "ink": "even",
         "anchor": "surface",
-        "unit": "world",
         "unit_size": 0.012,
         "shading": 0.9,
         "wobble": 0.7,
@@ -745,23 +748,25 @@ LOOKS = {
 }
 
 #: Streaks that drift, at a phase at which no kernel is where it is at rest.
-DRIFTING = {"flow": 2.0, "flow_phase": 0.2}
+DRIFTING = {"flow": 2.0, "drift": Drift(0.2)}
 DRIFTING_LOOKS = {
     "drifting": DRIFTING,
-    "drifting, oriented": DRIFTING | {"oriented": True, "degree": 1, "density": 0.03},
+    "drifting, oriented": DRIFTING | {"fade": "tail", "degree": 1, "density": 0.03},
     "drifting, two directions, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
-    "drifting, three directions": DRIFTING | {"taper": True, "degree": 3, "flow_distance": 13.0},
+    "drifting, three directions": DRIFTING
+    | {"fade": "ends", "degree": 3, "drift": Drift(0.2, 0.4)},
     "drifting on the surface": DRIFTING | {"anchor": "surface"},
     "drifting, magnitude as both": DRIFTING | {"hue": "magnitude", "magnitude_length": True},
     "drifting, short streaks": DRIFTING
-    | {"length": 9, "flow_distance": 40.0, "step": 0.6, "supersampling": 2},
+    | {"length": 9, "drift": Drift(0.2, 4.4), "supersampling": 2},
     "drifting, hatched, with breaks": DRIFTING
-    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "grain": 2.5, "length": 60},
+    | {"ink": "hatch", "breaks": 1.0, "shading": 1.0, "line_width": 2.5, "length": 60},
     "drifting, hatched, breaks and length by magnitude": DRIFTING
     | {"ink": "hatch", "breaks": 0.8, "shading": 0.9, "magnitude_length": True, "degree": 3}
     | {"overshoot": 15.0},
     "drifting breaks of even lines": DRIFTING
-    | {"ink": "even", "breaks": 0.7, "shading": 0.9, "grain": 3.0, "degree": 2},
+    | {"ink": "even", "breaks": 0.7, "shading": 0.9, "degree": 2}
+    | {"line_width": 3.0, "line_distance": 6.0},
     "color noise, which does not drift": DRIFTING | {"hue": "noise"},
 }
 ALL_LOOKS = LOOKS | DRIFTING_LOOKS
@@ -786,15 +791,16 @@ RARE_LOOKS = {
 )
 def test_looks(card, name):
     look_settings = {"degree": 4, **ALL_LOOKS[name]}
-    degree = look_settings.pop("degree")
+    degree, drift = look_settings.pop("degree"), look_settings.pop("drift", NO_DRIFT)
     look = LOOK.with_settings(look_settings)
-    assert_parity(card, [ball(degree)], view(supersampling=look.supersampling), look)
+    camera = view(supersampling=look.supersampling)
+    assert_parity(card, [ball(degree)], camera, look, drift=drift)
 
 
 @pytest.mark.parametrize("side", [3, *long(2)])
 def test_subpixels(card, side):
     """Borders have the color of their covered part."""
-    look = replace(LOOK, supersampling=side, grain=3.0)
+    look = replace(LOOK, supersampling=side, line_width=3.0)
     pair = assert_parity(card, [ball(2)], view(supersampling=side), look)
     border = (pair.numpy[..., 3] > 0) & (pair.numpy[..., 3] < 1) & (pair.card[..., 3] > 0)
     assert border.sum() > 100
@@ -822,7 +828,9 @@ def test_samples_of_neighbors(card, ink):
     """Samples at edges have the colors of the surfaces that they show, and their outlines."""
     plate = MeshInstance(boxes(), placed(1.5 * np.eye(3)), axis_field(boxes(), 2, AXIS))
     small = MeshInstance(BALL, placed(0.5 * np.eye(3), (0.4, -0.8, 0.3)), field_of(BALL, 2))
-    look = replace(LOOK, ink=ink, shading=1.0, supersampling=2, grain=3.0, outline=1.0, breaks=0.5)
+    look = replace(
+        LOOK, ink=ink, shading=1.0, supersampling=2, line_width=3.0, outline=1.0, breaks=0.5
+    )
     pair = assert_parity(card, [plate, small], view(supersampling=2), look)
     assert pair.likeness > 0.999
     assert (pair.card[..., 3] != pair.numpy[..., 3]).sum() < 5
@@ -886,7 +894,7 @@ TONED = {
     "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
     "tone curve": {"tone_levels": (0.2, 0.7, 1.8)},
     "inverted": {"tone_levels": (1.0, 0.0, 1.0)},
-    "hatched": {"ink": "hatch", "grain": 3.0},
+    "hatched": {"ink": "hatch", "line_width": 3.0},
 }
 
 
@@ -958,13 +966,13 @@ def test_tones_with_free_directions(card):
 
 COLORED = {
     "soft": {},
-    "hatched": {"ink": "hatch", "grain": 3.0, "outline": 2.0},
+    "hatched": {"ink": "hatch", "line_width": 3.0, "outline": 2.0},
     "light ink": {"ink": "hatch", "ink_color": "#f0f0e0", "paper_color": "#101018", "layers": 1},
     "inks that are nearly paper": {
         "ink": "hatch",
         "shading": 0.95,
         "light": "lamp",
-        "grain": 3.0,
+        "line_width": 3.0,
         "color_range": (-1.0, 1.0),
         "color_map": "gray",
     },
@@ -1041,7 +1049,7 @@ def test_creases_of_a_cube(card, crossing, degree, display):
     )
     field = axis_field(surface, degree, (0.9, 0.4, 0.1))
     instance = MeshInstance(surface, placed(2 * np.eye(3), (-1, -1, -1)), field)
-    look = replace(LOOK, cross_creases=crossing, display=display)
+    look = replace(LOOK, crease_angle=np.pi if crossing else 0.7, display=display)
     for perspective in (True, False):
         assert_parity(card, [instance], view(perspective=perspective, distance=8.0), look)
         outlined = replace(look, ink="hatch", outline=3.0)
@@ -1162,8 +1170,9 @@ def test_free_directions(card, name, hue):
 @pytest.mark.parametrize("name", ["two", "three", "two lines"])
 def test_streaks_of_free_directions_drift(card, name):
     """Along the directions; those of lines toward the guiding angle."""
-    look = replace(LOOK, hue="families", guiding_angle=0.6, **DRIFTING)
-    assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
+    look = replace(LOOK, hue="families", guiding_angle=0.6, flow=DRIFTING["flow"])
+    instance = MeshInstance(BALL, np.eye(4), FREE[name](BALL))
+    assert_parity(card, [instance], view(), look, drift=DRIFTING["drift"])
 
 
 @pytest.mark.parametrize("degree", [3, 4, *long(2, 5, 6)])
@@ -1182,7 +1191,7 @@ def test_families_of_rosys(card, degree):
 def test_free_directions_with_uneven_lines(card, name):
     """Each family has its ink, and all lines wobble together, whatever the angles between them."""
     look = replace(
-        LOOK, ink="hatch", shading=0.9, grain=2.5, hue="families", wobble=1.0, breaks=0.5
+        LOOK, ink="hatch", shading=0.9, line_width=2.5, hue="families", wobble=1.0, breaks=0.5
     )
     assert_parity(card, [MeshInstance(BALL, np.eye(4), FREE[name](BALL))], view(), look)
 
@@ -1190,7 +1199,7 @@ def test_free_directions_with_uneven_lines(card, name):
 @pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])
 @pytest.mark.parametrize("hue", ["one", "families"])
 def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
-    look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, grain=3.0)
+    look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, line_width=3.0)
     pair = draw_pair(ROSY, card, [ball(4)], view(), look)
     card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
     assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
@@ -1272,10 +1281,10 @@ UNDEFINED_LOOKS = {
     "magnitude": {"hue": "magnitude", "magnitude_length": True},
     "hatched": {"ink": "hatch", "shading": 1.0},
     "hatched, in color": {"ink": "hatch", "shading": 1.0, "hue": "families"},
-    "hatched, even lines": {"ink": "even", "shading": 1.0, "grain": 2.2},
-    "hatched, all effects": LOOKS["hatched, all effects"] | {"grain": 2.2},
+    "hatched, even lines": {"ink": "even", "shading": 1.0, "line_distance": 4.4},
+    "hatched, all effects": LOOKS["hatched, all effects"] | {"line_width": 2.2},
     "drifting": DRIFTING,
-    "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "taper": True},
+    "drifting, hatched": DRIFTING | {"ink": "hatch", "shading": 1.0, "fade": "ends"},
 }
 
 
@@ -1285,15 +1294,16 @@ UNDEFINED_LOOKS = {
 )
 @pytest.mark.parametrize("degree", [3, *long(4)])
 def test_where_the_field_is_undefined(card, degree, name):
-    look = replace(
-        LOOK, **{key: value for key, value in UNDEFINED_LOOKS[name].items() if key != "degree"}
-    )
+    settings = dict(UNDEFINED_LOOKS[name])
+    drift = settings.pop("drift", NO_DRIFT)
+    settings.pop("degree", None)
+    look = replace(LOOK, **settings)
     field = smooth_field(BALL, degree)
     center = BALL.vertices[BALL.corner_vertex.reshape(-1, 3)].mean(axis=1)
     vectors = np.where((center[:, :1] > 0.2) | (center[:, 2:] > 0.6), 0.0, field.vectors)
     field = RosyField(degree, vectors, family_count=2 if degree == 4 else 3)
     camera = view(supersampling=look.supersampling)
-    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], camera, look)
+    assert_parity(card, [MeshInstance(BALL, np.eye(4), field)], camera, look, drift=drift)
 
 
 def test_a_field_that_is_undefined_everywhere(card):
@@ -1345,7 +1355,7 @@ def test_the_back_of_an_open_surface(card, degree, distortion):
     assert_parity(card, [MeshInstance(tube, placed(distortion), field)], camera)
 
 
-EVEN_LINES = replace(LOOK, ink="even", shading=0.9, grain=3.0)
+EVEN_LINES = replace(LOOK, ink="even", shading=0.9, line_width=3.0, line_distance=6.0)
 
 
 def partly_undefined():
@@ -1389,7 +1399,7 @@ def test_even_lines_grow_in_perspective(card):
     surface = plane(2, 2, 40.0)
     instance = MeshInstance(surface, np.eye(4), axis_field(surface, 2, (0, 1, 0)))
     camera = perspective_camera(look_at((0, -18.5, 1.0), (0, 0, 0), (0, 0, 1)), *SIZE, fov=1.0)
-    assert_parity(card, [instance], camera, replace(EVEN_LINES, grain=2.0))
+    assert_parity(card, [instance], camera, replace(EVEN_LINES, line_distance=4.0))
 
 
 def test_even_lines_stay_on_the_card(device):
@@ -1496,7 +1506,7 @@ def test_clip_planes(card):
 
 
 @pytest.mark.parametrize(
-    "degree, settings", [(4, {"singularity_dots": "all"}), (3, {"arrows": 30.0, "arrow_size": 8.0})]
+    "degree, settings", [(4, {"singularity_dots": "all"}), (3, {"arrows": 32.0})]
 )
 def test_singularities_and_arrowheads_are_drawn_over_the_picture(card, degree, settings):
     """At the same pixels as numpy's."""

@@ -449,9 +449,9 @@ def test_shipped_previews_show_their_looks(name):
     "look",
     [
         Look(method="brute", length=8000),
-        Look(method="members", length=8000, step=0.05, hue="noise"),
-        *long(Look(grain=256.0, high_pass=1024.0, length=8000, supersampling=4)),
-        Look(anchor="surface", ink="hatch", paper_color="#ffffff00", layers=12, grain=0.5),
+        Look(method="members", length=8000, hue="noise"),
+        *long(Look(line_width=256.0, high_pass=1024.0, length=8000, supersampling=4)),
+        Look(anchor="surface", ink="hatch", paper_color="#ffffff00", layers=12, line_width=0.5),
         Look(light="scene", display="flat", hue="magnitude", magnitude_length=True),
     ],
     ids=["brute", "members", "large", "ink", "others"],

@@ -15,7 +15,6 @@ from rosy_addon.projection.project import project
 
 pytestmark = pytest.mark.filterwarnings("error")
 
-NO_CREASE = np.pi
 OFFSETS = [(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)]
 
 
@@ -58,8 +57,8 @@ def neighbor_pairs(gbuffer, masks):
     return np.concatenate(pairs), np.concatenate(linked)
 
 
-def unlinked_fraction(gbuffer, crease_angle=NO_CREASE, cross=True):
-    _, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, crease_angle, cross))
+def unlinked_fraction(gbuffer, crease_angle=None):
+    _, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, crease_angle))
     return 1 - linked.mean()
 
 
@@ -72,7 +71,7 @@ def test_a_tilted_plane_is_continuous(perspective, tilt, roll):
     camera = camera_above(perspective=perspective, eye=eye)
     gbuffer = project_surfaces([plane(7, 5)], camera)
     assert len(gbuffer.pixel) > 200
-    assert unlinked_fraction(gbuffer, 0.01, False) == 0
+    assert unlinked_fraction(gbuffer, 0.01) == 0
 
 
 @pytest.mark.parametrize("perspective", [False, True])
@@ -82,7 +81,7 @@ def test_spheres_are_continuous(perspective, radius):
     camera = camera_above(200, 200 / radius, perspective)
     gbuffer = project_surfaces([icosphere(5)], camera)
     assert unlinked_fraction(gbuffer) == 0
-    assert unlinked_fraction(gbuffer, 1.3, False) < 0.002
+    assert unlinked_fraction(gbuffer, 1.3) < 0.002
 
 
 @pytest.mark.slow
@@ -105,7 +104,7 @@ def test_the_near_side_of_a_torus_is_separate_from_the_far_side(perspective):
     camera = camera_above(300, 3.2, perspective, eye=(0, -5.6, 2.2), up=(0, 0, 1))
     surface = torus(200, 100)
     gbuffer = project_surfaces([surface], camera)
-    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, NO_CREASE, True))
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, None))
     first, second = pairs.T
     jump = np.abs(gbuffer.position[first, 2] - gbuffer.position[second, 2])
     far = jump > 0.5
@@ -133,7 +132,7 @@ def test_parallel_sheets_are_separate(perspective, tilt, same_instance):
         gbuffer = project_surfaces([low, high], camera, [np.zeros(3), gap])
         upper = gbuffer.instance_id == 1
     assert 100 < upper.sum() < len(upper) - 100
-    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, NO_CREASE, True))
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, None))
     across = upper[pairs[:, 0]] != upper[pairs[:, 1]]
     assert across.sum() > 100
     assert not linked[across].any()
@@ -146,7 +145,7 @@ def test_the_rim_of_a_bowl_is_a_silhouette():
     triangles = ball.corner_vertex.reshape(-1, 3)
     bowl = from_triangles(ball.vertices, triangles[ball.face_center[:, 2] < 0.2])
     gbuffer = project_surfaces([bowl], camera_above(200, 2.4, eye=(0, -5, 2.5), up=(0, 0, 1)))
-    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, NO_CREASE, True))
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, None))
     front = gbuffer.front_facing
     assert 0.1 < front.mean() < 0.9
     across_rim = front[pairs[:, 0]] != front[pairs[:, 1]]
@@ -163,13 +162,13 @@ def test_creases_separate_pixels_unless_crossed(perspective):
     gbuffer = project_surfaces(
         [cube], camera_above(200, 4, perspective, eye=(2, -4, 3.5), up=(0, 0, 1))
     )
-    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, 0.7, False))
+    pairs, linked = neighbor_pairs(gbuffer, neighbor_masks(gbuffer, 0.7))
     across = gbuffer.face[pairs[:, 0]] != gbuffer.face[pairs[:, 1]]
     assert across.sum() > 300
     assert not linked[across].any()
     assert linked[~across].all()
-    assert unlinked_fraction(gbuffer, 0.7, True) == 0
-    assert unlinked_fraction(gbuffer, 1.6, False) == 0
+    assert unlinked_fraction(gbuffer) == 0
+    assert unlinked_fraction(gbuffer, 1.6) == 0
 
 
 def test_inconsistently_oriented_faces_are_continuous():
@@ -179,14 +178,14 @@ def test_inconsistently_oriented_faces_are_continuous():
     quads[::2] = quads[::2, ::-1]
     gbuffer = project_surfaces([from_quads(sheet.vertices, quads)], camera_above(eye=(1, -5, 2)))
     assert 0.2 < gbuffer.front_facing.mean() < 0.8
-    assert unlinked_fraction(gbuffer, 0.7, False) == 0
+    assert unlinked_fraction(gbuffer) == 0
 
 
 def test_links_are_symmetric_and_include_the_pixel_itself():
     gbuffer = project_surfaces(
         [torus(30, 20), icosphere(1)], camera_above(97, 3.0, True), [(0, 0, 0), (0, 0.8, 0.3)]
     )
-    masks = neighbor_masks(gbuffer, 0.4, False)
+    masks = neighbor_masks(gbuffer, 0.4)
     assert masks.dtype == np.uint16
     assert (masks >> 4 & 1).all()
     assert (masks < 512).all()
@@ -199,7 +198,7 @@ def test_links_are_symmetric_and_include_the_pixel_itself():
 def test_links_do_not_leave_the_frame():
     gbuffer = project_surfaces([plane(1, 1, 50.0)], camera_above(11))
     assert len(gbuffer.pixel) == 121
-    masks = neighbor_masks(gbuffer, 0.7, False).reshape(11, 11)
+    masks = neighbor_masks(gbuffer, 0.7).reshape(11, 11)
     assert (masks[1:-1, 1:-1] == 511).all()
     assert (masks[:, 0] & 0b001001001 == 0).all()
     assert (masks[:, -1] & 0b100100100 == 0).all()

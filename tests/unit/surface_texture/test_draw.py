@@ -19,8 +19,8 @@ from rosy_addon.surface_texture import hatching
 from rosy_addon.surface_texture.draw import SURFACE_PIXELS, draw_texture
 
 #: Lines that are wide enough for a small texture to show them well.
-WIDE = Look(length=20, grain=10.0, high_pass=40.0)
-WIDER = Look(length=40, grain=20.0, high_pass=80.0)
+WIDE = Look(length=20, line_width=10.0, line_distance=20.0, high_pass=40.0)
+WIDER = Look(length=40, line_width=20.0, line_distance=40.0, high_pass=80.0)
 
 
 def texture_colors(instance, uv, look, size, points, **options):
@@ -56,7 +56,7 @@ def test_colors_of_all_kinds_do_not_depend_on_the_charts():
     for changes in (
         {"hue": "noise"},
         {"hue": "magnitude", "magnitude_length": True},
-        {"taper": True},
+        {"fade": "ends"},
         {"method": "ibfv"},
     ):
         look = WIDER.with_settings(changes)
@@ -114,7 +114,7 @@ PIXEL = float(np.sqrt(4 * np.pi**2 * 0.4)) / SURFACE_PIXELS
     ("look", "size", "offset"),
     [
         (WIDER, 1024, (0, 0)),
-        (WIDER.with_settings({"unit": "world", "unit_size": PIXEL}), 512, (0, 0)),
+        (WIDER.with_settings({"unit_size": PIXEL}), 512, (0, 0)),
         (WIDER, 512, (3, -2)),
         (WIDER, 512, (0.5, 0.8)),
     ],
@@ -178,7 +178,7 @@ def test_lines_are_spaced_on_no_more_triangles_than_texels_can_show(monkeypatch)
     grid = plane(1, 200)
     surface = build_surface(grid.vertices * (1, 0.1, 1), grid.corner_vertex, grid.face_start)
     uv = np.tile([(0.0, 0.0), (1, 0), (1, 1), (0, 1)], (surface.face_count, 1))
-    look = Look(grain=1.0).with_settings({"ink": "even"})
+    look = Look(line_distance=2.0).with_settings({"ink": "even"})
     draw_texture(instance_of(surface, 2), uv, look, 16)
     assert counts[0] < 2 * hatching.TRIANGLES_PER_TEXEL * 16**2
 

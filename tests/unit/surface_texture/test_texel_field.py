@@ -10,7 +10,7 @@ from uv_maps import patches_uv
 
 from rosy_addon.compositor.covering import build_covering
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.look_units import look_on_surface
+from rosy_addon.compositor.look_units import surface_pixel_look
 from rosy_addon.compositor.streamline_batch import StreamlineBatch
 from rosy_addon.line_drawing.surface_particles import SurfaceParticles, advance
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh, nearest_member
@@ -37,7 +37,7 @@ def test_streamlines_cross_seams_as_on_the_mesh(degree):
     texels = rasterize_charts(charts, texture_frame(charts, 1024, "torus"), "torus")
     step = step_length(mesh, charts, texels)
     field = texel_field(TexelSurface(instance, mesh, charts, texels, step), np.pi)
-    look = look_on_surface(Look(), step, step)
+    look = surface_pixel_look(Look(), step, step)
     covering = build_covering(field, look, np.full((len(texels), 1), 0.1, dtype=np.float32))
     start = np.unique(field.seam_steps.source)
     start = start[field.representation[start] != 0][:: max(len(start) // 4000, 1)]

@@ -1,0 +1,264 @@
+"""Tracing of streamlines on a covering, many at once, in both directions from their seeds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .covering import ALL_NEIGHBORS, SINK_CELL, Covering, unpack_neighbor_mask
+
+#: Steps between compactions, which remove streamlines that have ended.
+COMPACT_INTERVAL = 8
+
+#: Steps after which streamlines that return to a state end. Shorter ones may return.
+MIN_LOOP_STEPS = 256
+
+#: Steps within which a streamline that is at a state again may not have left it.
+MIN_RETURN_STEPS = 4
+
+#: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
+PLASTIC_NUMBER = 1.3247179572447460
+
+#: Columns by which the offsets of the seeds of a sheet are shifted against those of the sheet before.
+SHEET_SHIFT = 17
+
+#: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
+MAX_SEAM_OFFSET = np.float32(1.5)
+
+
+class TracedLanes:
+    """Halves of streamlines that are traced together, a step at a time.
+
+    There are n forward halves, then n backward halves. The arrays hold those that had not ended at the
+    last compaction. The others are in the cell `SINK_CELL`, which they do not leave.
+
+    Parameters
+    ----------
+    covering : Covering
+    seeds : (n,) intp ndarray
+        Indices of lines.
+    max_steps : int
+        Steps in each direction.
+
+    Attributes
+    ----------
+    count : int
+        2 n.
+    index : slice or (m,) intp ndarray
+        The lanes that the arrays hold.
+    position : (m,) complex64 ndarray
+        From the centers of the cells, in pixels.
+    total : (m, K) complex64 ndarray
+        Sum of the noise so far, to which the caller adds.
+    """
+
+    #: The arrays with an entry for each lane.
+    _LANE_ARRAYS = (
+        *("position", "total", "_counts", "_cell", "_sheet", "_packed_phase", "_target_phase"),
+        "_previous_direction",
+    )
+
+    def __init__(self, covering: Covering, seeds: np.ndarray, max_steps: int) -> None:
+        self._covering, self.count = covering, 2 * len(seeds)
+        scalar_type = np.float64 if covering.noise_channels == 1 else np.complex128
+        self._state_table = covering.state_table.view(scalar_type)[:, 0]
+        # A streamline makes at most one full turn in four steps.
+        max_winding = max_steps // 4 + 2
+        self._sheet_offset, backward_offset = covering.sheet_offsets(max_winding)
+        sheet, cell = np.divmod(seeds, covering.cell_count)
+        first_sheet = max_winding * covering.sheets_per_turn
+        self._cell = np.concatenate([cell, cell])
+        self._sheet = np.concatenate([sheet, sheet + backward_offset]) + first_sheet
+        self._packed_phase = covering.packed_phase.take(self._cell)
+        #: Phase of the direction. Steps keep it, and the sheet of the next cell is the nearest one.
+        self._target_phase = self._packed_phase + self._sheet.astype(np.float32)
+        offset = _r2_offsets(covering, seeds)
+        self.position = np.concatenate([offset, offset])
+        self._previous_direction: np.ndarray | None = None
+        self.total = np.zeros((self.count, covering.noise_channels), dtype=np.complex64)
+        self.index: slice | np.ndarray = slice(self.count)
+        self._counts = np.full(self.count, max_steps)
+        self._all_counts = self._counts.copy()
+        self._loops = _LoopFinder()
+
+    @property
+    def have_ended(self) -> bool:
+        """Whether all lanes had ended at the last compaction."""
+        return not len(self._cell)
+
+    def step_counts(self) -> np.ndarray:
+        """Return the (2 n,) steps that the lanes have made before they ended."""
+        self._all_counts[self.index] = self._counts
+        return self._all_counts
+
+    def look_up(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the states of the lanes, their directions, and (m, K) noise there.
+
+        The imaginary part of the noise is its derivative to the left.
+        """
+        state = self._sheet_offset.take(self._sheet, mode="clip")
+        state += self._cell
+        record = self._state_table.take(state, mode="clip").view(np.int16).astype(np.float32)
+        record = record.view(np.complex64).reshape(len(self._cell), -1)
+        return state, record[:, 0].copy(), record[:, 1:]
+
+    def advance(
+        self, step: int, state: np.ndarray, direction: np.ndarray, step_scale: np.float32
+    ) -> None:
+        """Step along the directions to the next cells. Lanes end at the border, and in loops.
+
+        Parameters
+        ----------
+        step : int
+            Number of this step.
+        state, direction : (m,) ndarray
+            From `look_up`. The directions are changed.
+        step_scale : float32
+            3/2 pixel, in the unit of the directions.
+        """
+        displacement = self._move(direction, step_scale)
+        column, row = displacement.view(np.float32).reshape(-1, 2).T
+        mask = unpack_neighbor_mask(self._packed_phase)
+        ended, crossing, seam = self._step_cells(mask, column, row)
+        self._counts[ended] = step
+        looping = self._loops.find(step, state, self._cell)
+        self._counts[looping] = step
+        self._cell[looping] = SINK_CELL
+        if len(crossing):
+            self._cross_seams(crossing, seam)
+        self._choose_sheets()
+
+    def _move(self, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
+        """Move positions by a step; return the (m,) complex64 pixels to the cells in which they are then.
+
+        The method is that of Adams and Bashforth with two steps, 3/2 d - 1/2 d_previous.
+        """
+        previous = self._previous_direction
+        displacement = direction.copy() if previous is None else previous
+        axes = displacement.view(np.float32)
+        axes *= np.float32(-1 / 3)
+        displacement += direction
+        axes *= step_scale
+        self.position += displacement
+        self._previous_direction = direction
+        # At most to a neighbor, even where the direction turns sharply.
+        np.rint(self.position.view(np.float32), out=axes)
+        np.maximum(axes, np.float32(-1), out=axes)
+        np.minimum(axes, np.float32(1), out=axes)
+        self.position -= displacement
+        return displacement
+
+    def _step_cells(
+        self, mask: np.ndarray, column: np.ndarray, row: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Step to the cells -1 to 1 columns and rows away, or to the sink.
+
+        Returns
+        -------
+        ended, crossing : (n,) intp ndarray
+            Indices of the streamlines that end, and of those that cross a seam.
+        seam : (n,) intp ndarray
+            The numbers of these steps across seams.
+        """
+        covering, cell = self._covering, self._cell
+        crossing = seam = np.empty(0, dtype=np.intp)
+        blocked = np.flatnonzero(mask != ALL_NEIGHBORS)
+        bit = (column[blocked] + 3 * row[blocked] + 4).astype(np.uint32)
+        is_blocked = mask[blocked] >> bit & 1 == 0
+        blocked, bit = blocked[is_blocked], bit[is_blocked]
+        is_tracing = cell[blocked] != SINK_CELL
+        ended, seams = blocked[is_tracing], covering.seams
+        if seams is not None and len(ended):
+            is_crossing, seam = seams.find(cell[ended], bit[is_tracing])
+            crossing, ended = ended[is_crossing], ended[~is_crossing]
+        cell_offset = row * np.float32(covering.width)
+        cell_offset += column
+        cell += cell_offset.astype(np.intp)
+        cell[blocked] = SINK_CELL
+        if len(crossing):
+            cell[crossing] = seams.target_cell.take(seam)
+        return ended, crossing, seam
+
+    def _cross_seams(self, crossing: np.ndarray, seam: np.ndarray) -> None:
+        """Continue the lanes `crossing` in the frames behind their seams."""
+        seams, steps = self._covering.seams, self._covering.seams.steps
+        reached = steps.displaced(seam, self.position[crossing]) + steps.offset.take(seam)
+        axes = reached.view(np.float32)
+        np.clip(axes, -MAX_SEAM_OFFSET, MAX_SEAM_OFFSET, out=axes)
+        self.position[crossing] = reached
+        direction = self._previous_direction
+        direction[crossing] = steps.displaced(seam, direction[crossing])
+        self._target_phase[crossing] += seams.sheet_shift.take(seam)
+
+    def _choose_sheets(self) -> None:
+        """Take the sheets of the new cells whose directions are nearest to those before."""
+        self._packed_phase = self._covering.packed_phase.take(self._cell, mode="clip")
+        self._target_phase -= self._packed_phase
+        np.rint(self._target_phase, out=self._target_phase)
+        self._sheet = self._target_phase.astype(np.intp)
+        self._target_phase += self._packed_phase
+
+    def compact(self) -> None:
+        """Remove the lanes that have ended from the arrays, if these are more than a tenth."""
+        remaining = np.flatnonzero(self._cell)
+        if len(remaining) >= 0.9 * len(self._cell):
+            return
+        self._all_counts[self.index] = self._counts
+        is_first = isinstance(self.index, slice)
+        self.index = remaining if is_first else self.index[remaining]
+        for name in self._LANE_ARRAYS:
+            setattr(self, name, getattr(self, name)[remaining])
+        self._loops.keep(remaining)
+
+
+class _LoopFinder:
+    """Finds streamlines that return to a state, in a number of steps like that of the loop.
+
+    Each state is compared with one state of the past, which is replaced at steps that are powers of
+    two (Brent, An improved Monte Carlo factorization algorithm, 1980).
+    """
+
+    def __init__(self) -> None:
+        self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
+
+    def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
+        """Indices of the streamlines that have returned to a state, and not ended otherwise."""
+        if step in (MIN_LOOP_STEPS, 2 * self._past_step):
+            self._past_step, self._past_state = step, state
+        elif step >= self._past_step + MIN_RETURN_STEPS:
+            return np.flatnonzero((state == self._past_state) & (next_cell != SINK_CELL))
+        return np.empty(0, dtype=np.intp)
+
+    def keep(self, remaining: np.ndarray) -> None:
+        """Forget the streamlines that have ended; those with these indices remain."""
+        if len(self._past_state):
+            self._past_state = self._past_state[remaining]
+
+
+def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """(n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
+    lateral = position.imag * direction.real
+    lateral -= position.real * direction.imag
+    return lateral
+
+
+def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
+    """(n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
+    square = direction.real * direction.real + direction.imag * direction.imag
+    along = position.real * direction.real + position.imag * direction.imag
+    return along / np.minimum(-step_scale * square, np.float32(-1))
+
+
+def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
+    """(n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
+
+    If all streamlines started at the centers, they would step to the next row of pixels at the same
+    time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. They
+    depend on nothing but the place of a seed, so that streamlines stay where they are if a field changes
+    a little.
+    """
+    sheet, cell = np.divmod(seeds, covering.cell_count)
+    row, column = np.divmod(cell, covering.width)
+    row, column = row + 0.5, column + 0.5 + SHEET_SHIFT * sheet
+    near, far = 1 / PLASTIC_NUMBER, 1 / PLASTIC_NUMBER**2
+    position = (near * column + far * row) % 1 + 1j * ((far * column + near * row) % 1)
+    return (position - (0.5 + 0.5j)).astype(np.complex64)

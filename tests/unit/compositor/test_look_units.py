@@ -1,0 +1,47 @@
+"""Looks in pixels of a frame: lengths, Blender units and samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import torus
+
+from rosy_addon.compositor.flow import Drift
+from rosy_addon.compositor.look import Look
+from rosy_addon.compositor.look_units import pixel_look
+from rosy_addon.core.settings import pixel_lengths, settings_of
+from rosy_addon.field.generate import generate
+from rosy_addon.projection.camera import look_at, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+
+LOOK = Look(flow=1.0, arrows=20.0, overshoot=3.0, outline=2.0, unit_size=0.1)
+
+
+@pytest.mark.parametrize("side", [2, 3])
+def test_samples_have_the_same_lengths_in_the_picture(side):
+    pixels = pixel_look(LOOK, drift=Drift(0.3, 0.5))
+    samples = pixels.in_samples(side)
+    for setting in pixel_lengths(Look):
+        assert getattr(samples, setting.name) == side * getattr(pixels, setting.name)
+    assert samples.flow_distance == side * pixels.flow_distance == side * 0.5 * LOOK.length
+    assert samples.pixel_size * side == pytest.approx(pixels.pixel_size)
+    assert samples.flow_phase == pixels.flow_phase == 0.3
+
+
+def test_lengths_in_blender_units_do_not_depend_on_the_distance():
+    surface = torus(12, 6)
+    instance = MeshInstance(surface, np.eye(4), generate(surface, "axis", 4))
+    for scale in (2.0, 8.0):
+        camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 200, 200, scale=scale)
+        drawn = pixel_look(LOOK, camera, [instance])
+        # A pixel is rounded to a 32nd of an octave.
+        assert drawn.line_width * scale / 200 == pytest.approx(1.5 * 0.1, rel=0.011)
+        assert drawn.line_width * drawn.pixel_size == pytest.approx(1.5 * 0.1)
+
+
+def test_other_settings_are_those_of_the_look():
+    drawn = pixel_look(Look(crispness=0.2, layers=5))
+    assert (drawn.crispness, drawn.layers) == (0.2, 5)
+    assert drawn.settings().keys() == settings_of(Look).keys()
+    with pytest.raises(AttributeError, match="brightness"):
+        _ = drawn.brightness

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from rosy.rosy_addon import memory
 from rosy.rosy_addon.compositor.look import Look
+from rosy.rosy_addon.core import memory
 from rosy.rosy_addon.core.errors import RosyError
 from rosy.rosy_addon.field.generate import generate
 from rosy.rosy_addon.field.rosy_field import RosyField

@@ -126,7 +126,9 @@ def _preset(rng: Generator) -> str:
 def _setting(rng: Generator) -> str:
     settings = list(settings_of(Look).values())
     setting = settings[rng.integers(len(settings))]
-    return f"{setting.name}={setting_value(rng, setting)}"
+    value = setting_value(rng, setting)
+    text = ",".join(map(repr, value)) if isinstance(value, tuple) else str(value)
+    return f"{setting.name}={text}"
 
 
 def _colors(rng: Generator) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
 from numpy.random import Generator
 
 from rosy_addon.compositor.look import Look
-from rosy_addon.core.settings import Choice, Color, Number, Setting, Switch, settings_of
+from rosy_addon.core.settings import Choice, Color, Number, Numbers, Setting, Switch, settings_of
 
 _OTHER_VALUES = (None, [], {}, [1], "", "nan", True, -1, 10**400, 1e308, "\x1b[31m", "\u202e", 0.1)
 
@@ -46,8 +47,17 @@ def setting_value(rng: Generator, setting: Setting) -> Any:
             return bool(rng.random() < 0.5)
         case Choice(options=options):
             return list(options)[rng.integers(len(options))]
-        case Color():
-            return f"#{rng.integers(1 << 24):06x}"
+        case Color(has_alpha=has_alpha):
+            alpha = f"{rng.integers(1 << 8):02x}" if has_alpha and rng.random() < 0.5 else ""
+            return f"#{rng.integers(1 << 24):06x}{alpha}"
+        case Numbers(parts=parts, default=default):
+            kind = rng.random()
+            if kind < 0.3:
+                return tuple(float(ends[rng.integers(2)]) for ends in parts.values())
+            if kind < 0.5:
+                return default
+            near = rng.normal(0, 2, len(parts))
+            return tuple(np.clip(near, *zip(*parts.values(), strict=True)).tolist())
         case Number(low=low, high=high, default=default):
             exact = int if isinstance(default, int) else float
             kind = rng.random()

@@ -275,7 +275,7 @@ def _set_settings(rng: Generator, group: bpy.types.PropertyGroup, settings: dict
         if rng.random() < rate and hasattr(group, setting.name):
             value = setting_value(rng, setting)
             if isinstance(value, str) and value.startswith("#"):
-                value = rng.random(3).tolist()
+                value = rng.random(len(getattr(group, setting.name))).tolist()
             setattr(group, setting.name, value)
 
 

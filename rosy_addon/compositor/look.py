@@ -7,10 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..annotation.singularity_settings import (
-    singularity_dots_choice,
-    singularity_size_number,
-)
+from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
 from ..core.errors import RosyError
 from ..core.settings import (
     Numbers,
@@ -88,10 +85,6 @@ def _is_lit(look: Any) -> bool:
 def has_tone_inks(look: Any) -> bool:
     """Return whether the color of the ink depends on the tone."""
     return is_hatched(look) and look.hue == "tone"
-
-
-#: Where the settings of singularities are shown, and the stage that they affect.
-_SINGULARITIES: dict[str, Any] = {"panel": "singularities", "stage": Stage.SHADING}
 
 
 def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
@@ -473,8 +466,8 @@ class Look:
         is_pixel_length=True,
         **_ink(),
     )
-    singularity_dots: str = singularity_dots_choice(**_SINGULARITIES)
-    singularity_size: float = singularity_size_number(**_SINGULARITIES)
+    singularity_dots: str = singularity_dots_choice(**_shading("singularities"))
+    singularity_size: float = singularity_size_number(panel="singularities", stage=Stage.SHADING)
     supersampling: int = number(
         1,
         1,

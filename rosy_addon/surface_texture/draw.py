@@ -70,18 +70,8 @@ MIN_STEP = 0.25
 
 #: The settings of a look that a texture is drawn with. All others have no effect on it.
 TEXTURE_SETTINGS = (
-    *(
-        "ink",
-        "display",
-        "unit_size",
-        "length",
-        "fade",
-        "flow",
-        "line_width",
-        "line_distance",
-        "density",
-    ),
-    *("high_pass", "hue", "seed", "gain", "crease_angle"),
+    *("ink", "display", "unit_size", "length", "fade", "flow", "line_width", "line_distance"),
+    *("density", "high_pass", "hue", "seed", "gain", "crease_angle"),
     *("magnitude_length", "color_range", "color_map"),
     *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )

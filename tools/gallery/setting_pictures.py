@@ -72,7 +72,7 @@ _ENGRAVED = {"scene": "head", "preset": "engraving"}
 _PEN = {"scene": "ball", "preset": "pen-and-ink"}
 _HATCHED = {"scene": "ball", "preset": "cross-hatch"}
 _SHADED = {"light": "lamp", "shading": 0.9}
-_SPARSE = {"density": 0.03, "length": 24, "grain": 2.0}
+_SPARSE = {"density": 0.03, "length": 24, "line_width": 2.0}
 
 #: The settings of a look, and how each is shown.
 SETTINGS: dict[str, Shown] = {
@@ -80,36 +80,30 @@ SETTINGS: dict[str, Shown] = {
     "weights": shown("cosine", "binary", "none", scene="vortices", method="members", gain=5.0),
     "view_plane": shown(True, False, scene="slope", method="members", gain=4.0),
     "display": shown("smooth", "flat", scene="coarse_ball"),
-    "unit": shown("pixels", "world", scene="slope", unit_size=0.01, grain=2.0),
-    "unit_size": shown(0.005, 0.01, 0.02, scene="slope", unit="world", grain=2.0),
+    "unit_size": shown(0.0, 0.005, 0.01, 0.02, scene="slope", line_width=2.0),
     "length": shown(10, 40, 160, scene="vortices"),
-    "taper": shown(False, True, scene="vortices", **_SPARSE),
-    "oriented": shown(False, True, scene="wind", **_SPARSE),
+    "fade": shown("none", "ends", "tail", scene="wind", **_SPARSE),
     "arrows": shown(0.0, 24.0, 48.0, scene="wind"),
-    "arrow_size": shown(6.0, 12.0, 20.0, scene="wind", arrows=40.0),
     "flow": shown(0.0, 1.0, scene="wind"),
-    "flow_distance": shown(10.0, 40.0, 160.0, scene="wind", flow=1.0, flow_phase=0.25),
-    "flow_phase": shown(0.0, 0.2, 0.4, 0.6, scene="wind", flow=1.0, density=0.03),
-    "step": shown(1.0, 0.25, scene="vortices"),
-    "grain": shown(1.0, 1.5, 4.0, scene="vortices"),
+    "line_width": shown(1.0, 1.5, 4.0, scene="vortices"),
+    "line_distance": shown(2.5, 5.0, 10.0, **_ENGRAVED),
     "density": shown(0.02, 0.1, 0.5, scene="vortices"),
     "high_pass": shown(0.0, 16.0, 4.0, scene="vortices"),
     "detail": shown(0.0, 0.5, 0.9, preset="pen-and-ink"),
-    "anchor": shown("picture", "surface", scene="ring", grain=3.0),
+    "anchor": shown("picture", "surface", scene="ring", line_width=3.0),
     "hue": shown(
         *("one", "noise", "families", "magnitude", "values"),
         {"hue": "families", "ink": "hatch", **_SHADED},
         {"hue": "tone", "ink": "even", **_SHADED},
         scene="numbers",
-        grain=2.5,
+        line_width=2.5,
+        line_distance=5.0,
     ),
     "seed": shown(0, 1, scene="vortices"),
     "gain": shown(1.0, 2.5, 6.0, scene="vortices"),
     "guiding_angle": shown(0.0, 0.8, 1.57, **_ENGRAVED, layers=1),
-    "foreshorten": shown(False, True, scene="ring", grain=2.0),
-    "cross_creases": shown(False, True, scene="box", length=80, grain=2.0),
-    "crease_angle": shown(0.7, 1.2, 3.1416, scene="box", length=80, grain=2.0),
-    "magnitude_length": shown(False, True, scene="gusts", density=0.03, grain=2.0),
+    "crease_angle": shown(0.7, 1.2, 3.1416, scene="box", length=80, line_width=2.0),
+    "magnitude_length": shown(False, True, scene="gusts", density=0.03, line_width=2.0),
     "color_range": shown((0.0, 0.0), (0.0, 0.5), (1.0, 0.0), scene="bumps", hue="magnitude"),
     "color_map": shown("viridis", "magma", "gray", scene="bumps", hue="magnitude"),
     "shading": shown(0.0, 0.7, 1.0),
@@ -127,11 +121,11 @@ SETTINGS: dict[str, Shown] = {
     "crispness": shown(0.0, 0.5, 1.0, **_HATCHED),
     "layers": shown(1, 2, 3, scene="ring_of_six", preset="cross-hatch"),
     "layering": shown(0.0, 0.3, 0.8, **_HATCHED),
-    "breaks": shown(0.0, 0.5, 1.0, **_PEN, wobble=0.0, grain=3.5),
+    "breaks": shown(0.0, 0.5, 1.0, **_PEN, wobble=0.0, line_width=3.5),
     "overshoot": shown(
         0.0, 8.0, 20.0, scene="table", preset="pen-and-ink", light="scene", shadows=True
     ),
-    "wobble": shown(0.0, 0.5, 1.0, **_PEN, breaks=0.0, grain=3.5),
+    "wobble": shown(0.0, 0.5, 1.0, **_PEN, breaks=0.0, line_width=3.5),
     "paper_grain": shown(0.0, 0.4, 1.0, scene="head", preset="pencil"),
     "outline": shown(0.0, 1.5, 4.0, preset="cross-hatch"),
     "singularity_dots": shown("visible", "visible_indices", "all", "all_indices", scene="ball"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapes import torus
@@ -37,6 +39,18 @@ def test_lengths_in_blender_units_do_not_depend_on_the_distance():
         # A pixel is rounded to a 32nd of an octave.
         assert drawn.line_width * scale / 200 == pytest.approx(1.5 * 0.1, rel=0.011)
         assert drawn.line_width * drawn.pixel_size == pytest.approx(1.5 * 0.1)
+
+
+def test_keys_of_lic_images_know_the_magnitudes_that_set_lengths():
+    look = Look(magnitude_length=True)
+    free, bounded, other = (
+        pixel_look(replace(look, color_range=ends)).lic_key()
+        for ends in ((0.0, 0.0), (0.0, 1.0), (0.5, 1.0))
+    )
+    assert len({free, bounded, other}) == 3
+    colored = replace(look, magnitude_length=False, hue="magnitude", color_range=(0.0, 1.0))
+    assert pixel_look(colored).lic_key() == pixel_look(Look()).lic_key()
+    assert pixel_look(Look(hue="noise")).lic_key() != pixel_look(Look()).lic_key()
 
 
 def test_other_settings_are_those_of_the_look():

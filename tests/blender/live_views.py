@@ -105,7 +105,7 @@ def bake_of_view(region=None, region_3d=None, method="brute"):
     camera = rosy("rosy_addon.scene.cameras").camera_of_view(region, region_3d)
     scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
     look = replace(rosy("rosy_addon.scene.look_properties").read_look(scene.rosy), method=method)
-    (drawn,) = rosy("rosy_addon.scene.read_view").read_views(scene, depsgraph, [camera], look).views
+    (drawn,), _ = rosy("rosy_addon.scene.read_view").read_views(scene, depsgraph, [camera], look)
     picture = rosy("rosy_addon.rendering.draw").draw_picture(drawn).rgba.copy()
     picture[..., :3] = rosy("rosy_addon.core.color").to_display(picture[..., :3])
     return picture

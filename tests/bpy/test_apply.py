@@ -14,14 +14,7 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import (
-    add_camera,
-    contents,
-    depsgraph,
-    each_step,
-    link,
-    pixels,
-)
+from scenes import add_camera, contents, depsgraph, each_step, link, pixels
 
 
 def material_of(obj):

@@ -12,9 +12,7 @@ from rosy.rosy_addon.jobs.comb_field import CombStroke
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.jobs.render_turntable import render_turntable
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
-from rosy.rosy_addon.scene.computed_attributes import (
-    store_difference,
-)
+from rosy.rosy_addon.scene.computed_attributes import store_difference
 from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.worker.helper import Helper
 from rosy.rosy_addon.worker.job import run

@@ -128,6 +128,7 @@ def test_places_are_even_and_on_the_side_that_the_camera_sees(shape, is_exact):
     assert np.quantile(nearest, 0.99) < 1.25 * 25.0 and nearest.max() < 2.5 * 25.0
 
 
+@pytest.mark.slow
 def test_nothing_is_drawn_where_a_surface_is_hidden_or_outside():
     ball, wall = icosphere(4), rectangle()
     turned = np.array([[1, 0, 0, 0.6], [0, 0, -1, -1.5], [0, 1, 0, 0], [0, 0, 0, 1.0]])
@@ -163,6 +164,7 @@ def test_undefined_faces_have_no_arrowheads():
     )
 
 
+@pytest.mark.slow
 def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
     instance = instance_of(torus(96, 48), 1)
     marks = [
@@ -249,6 +251,7 @@ def changed_by_arrows(view):
     return (rendered(view) != rendered(plain)).any(axis=2)
 
 
+@pytest.mark.slow
 def test_processes_and_supersampling_draw_the_same_arrowheads():
     looks = [Look(length=8, arrows=40.0, supersampling=samples) for samples in (1, 2)]
     views = [ViewInput((instance_of(globe(48, 96), 3),), CAMERA, look) for look in looks]

@@ -76,23 +76,10 @@ def test_streaks_have_the_directions_of_the_members(degree, angle):
         assert np.degrees(abs(error)) < 0.7
 
 
-@pytest.mark.parametrize("degree", [1, 4])
-def test_streaks_follow_circles(degree):
-    """The mean error would be several degrees if steps were tangents."""
-    size = 256
-    x, y = pixel_centers(size)
-    angle = np.arctan2(y - size / 2, x - size / 2 - 200) + np.pi / 2
-    field = planar_pixel_field(angle, degree)
-    image = frame(draw(field).members[0], field)
-    # The line of the first image is nearest to the guiding angle.
-    turn = 2 * np.pi / degree
-    nearest = angle - turn * np.rint(angle / turn)
-    assert np.degrees(abs(angle_to(image, np.exp(1j * nearest)))) < 0.7
-
-
 DRIFTING = {"flow": 2.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("degree", "settings"),
     [
@@ -289,15 +276,6 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
     assert np.abs(row[110]) > 0.1 * np.abs(row).max()
 
 
-def test_the_contrast_is_the_same_in_all_frames():
-    field = uniform(0.3, 1)
-    stds = [
-        inside(frame(draw(field, FLOW, drift=drift_of(n)).members[0], field)).std()
-        for n in range(0, 40, 5)
-    ]
-    assert np.ptp(stds) < 0.1 * np.mean(stds)
-
-
 @pytest.mark.parametrize("degree", [1, 4])
 def test_a_loop_closes(degree):
     field = uniform(0.3, degree)
@@ -330,40 +308,3 @@ def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):
 
 
 # --- fields and looks of all kinds ----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
-def test_pictures_of_any_size(shape):
-    images = draw(planar_pixel_field(np.full(shape, 0.7), 3))
-    assert np.isfinite(images.members).all()
-    assert images.effective_samples.min() >= 0.99
-
-
-def test_undefined_pixels_are_gray():
-    angle = np.full((60, 60), 0.4)
-    angle[20:40, 20:40] = np.nan
-    images = draw(planar_pixel_field(angle, 4))
-    assert np.isfinite(images.members).all()
-    hole = images.members[0].reshape(60, 60)[25:35, 25:35]
-    assert np.abs(hole - 0.5).max() < 0.1
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"hue": "noise"},
-        {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
-        {"anchor": "surface", "flow": 1.0},
-        {"hue": "magnitude", "magnitude_length": True},
-        {"fade": "tail"},
-        {"ink": "even", "breaks": 0.5, "flow": 1.0},
-        {"length": 1},
-    ],
-    ids=str,
-)
-def test_looks(settings):
-    for degree in (3, 4):
-        gbuffer = project([cases.instance(2000, degree)], cases.camera(64))
-        picture = compose(gbuffer, LOOK.with_settings(settings))
-        assert np.isfinite(picture.rgba).all()
-        assert picture.rgba[..., :3][picture.rgba[..., 3] > 0].std() > 0.01

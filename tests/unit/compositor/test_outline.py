@@ -76,6 +76,47 @@ def combined(*parts: tuple[np.ndarray, np.ndarray]) -> Surface:
     return build_surface(np.concatenate(points), corners, start, sharp_angle=0.5)
 
 
+# --- closed forms --------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1.0, 2.0, 3.5, 6.0])
+def test_the_width_of_outlines(width):
+    """The outline of a ball has the area of a ring of that width along the border.
+
+    A border of pixels is off by up to half a pixel, which is most for the thinnest ring.
+    """
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), SIZE, SIZE, scale=2.4)
+    gbuffer = project([instance_of(icosphere(5))], camera)
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=width)))
+    radius = SIZE / 2.4
+    ring = np.pi * (radius**2 - (radius - width) ** 2)
+    assert covered.sum() == pytest.approx(ring, rel=0.15 / width)
+    from_middle = np.hypot(gbuffer.position[:, 0], gbuffer.position[:, 1]) * radius
+    assert (covered[from_middle < radius - width - 2] == 0).all()
+    assert (covered[from_middle > radius - width + 2] == 1).all()
+
+
+def test_outlines_are_drawn_on_the_nearer_surface():
+    """Two walls, one in front of the other: the far one has no line where it is occluded."""
+    points = np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]], dtype=float)
+    walls = []
+    for index, (left, distance) in enumerate(((0.0, 0.0), (0.7, 1.0))):
+        wall = build_surface(points, [0, 1, 2, 3], [0, 4], name=f"wall {index}")
+        matrix = np.eye(4)
+        matrix[:3, 3] = left, distance, 0.3 * index
+        walls.append(MeshInstance(wall, matrix, axis_field(wall, 4, (1.0, 0, 0.2))))
+    camera = orthographic_camera(look_at((0, -5, 0), (0, 0, 0)), 240, 240, scale=4.0)
+    gbuffer = project(walls, camera)
+    covered = outline_coverage(gbuffer, pixel_look(Look(outline=3.0)))
+    first, second = gbuffer.instance_id == 0, gbuffer.instance_id == 1
+    x, y = gbuffer.position[:, 0] * 60, gbuffer.position[:, 1] * 60
+    to_border = 60 - np.maximum(np.abs(x), np.abs(y))
+    assert (covered[first] == (to_border[first] < 3)).all()
+    hidden_by = second & (np.maximum(np.abs(x), np.abs(y)) < 65) & (x > -14) & (y > -38)
+    assert hidden_by.sum() > 300 and (covered[hidden_by] == 0).all()
+
+
 # --- specks --------------------------------------------------------------------------------------
 
 

@@ -156,7 +156,10 @@ LONG = {
 }
 
 
-@pytest.mark.parametrize("name", LONG)
+STROKES = pytest.param("strokes", marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("name", [name if name != "strokes" else STROKES for name in LONG])
 def test_progress_never_goes_back(name):
     function, arguments, last = LONG[name]
     fractions = [fraction for fraction, _ in reported(function, *arguments)]
@@ -165,7 +168,7 @@ def test_progress_never_goes_back(name):
     assert 0 <= fractions[0] < 0.1 and last <= fractions[-1] <= 1 + 1e-9
 
 
-@pytest.mark.parametrize("name", ["form", "picture", "strokes"])
+@pytest.mark.parametrize("name", ["form", "picture", STROKES])
 def test_a_listener_ends_the_work(name):
     """And what is left does not change what is done next."""
     function, arguments, _ = LONG[name]

@@ -69,6 +69,7 @@ def test_field_runs_along_strokes(degree, is_exact, limit):
     assert angles(combing, combing.vectors, along[nearest])[chosen].max() < limit
 
 
+@pytest.mark.slow
 def test_strokes_do_not_depend_on_the_rate_of_their_points():
     results = []
     for batch in (1, 7, 1000):

@@ -37,6 +37,7 @@ TORUS = torus()
 POINTS = surface_points(TORUS, 20_000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", mainly([1, 4], [1, 2, 3, 4, 6]))
 def test_texture_does_not_depend_on_the_charts(degree):
     """64 square charts, turned and mirrored at random, show the picture of a single one."""

@@ -82,6 +82,7 @@ def test_lines_swap_only_between_singularities(degree):
     assert share.min() < 0.9
 
 
+@pytest.mark.slow
 def test_the_order_does_not_depend_on_the_size_of_triangles_or_of_the_mesh():
     """A cube of twelve triangles has one first line on each face, at any scale."""
     for scale in (1e-6, 1.0, 1e6):

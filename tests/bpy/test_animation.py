@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -258,27 +257,6 @@ def wait_for(process):
     out, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
     return out
-
-
-def test_killed_processes_can_be_continued(file, tmp_path):
-    wait_for(start(file, tmp_path / "whole", "--frames", "1-8"))
-    whole = frames_of(tmp_path / "whole")
-    assert len(whole) == 8
-    folder, generator = tmp_path / "broken", random.Random(1)
-    for _ in range(2):
-        process = start(file, folder, "--frames", "1-8")
-        initial_count = len(frames_of(folder)) if folder.exists() else 0
-        deadline = time.monotonic() + 60
-        while process.poll() is None and time.monotonic() < deadline:
-            if folder.exists() and len(frames_of(folder)) > initial_count:
-                break
-            time.sleep(0.01)
-        time.sleep(generator.random() * 0.05)
-        process.send_signal(signal.SIGKILL)
-        process.communicate()
-    output = wait_for(start(file, folder, "--frames", "1-8"))
-    assert frames_of(folder) == whole
-    assert "of Scene up to date" in output
 
 
 def test_processes_share_the_frames(file, tmp_path):

@@ -22,6 +22,7 @@ from planar_fields import pair_angle, pixel_centers
 from shapes import icosphere, torus
 
 from rosy_addon.compositor.compose import compose
+from rosy_addon.compositor.flow import Drift
 from rosy_addon.compositor.look import Look
 from rosy_addon.field.generate import generate
 from rosy_addon.image_io.png import to_srgb_uint8
@@ -37,17 +38,22 @@ def draw() -> dict[str, np.ndarray]:
     pictures = {"plane": compose_planar(pair_angle(*pixel_centers(96), 96, 4), 4, look)}
     shapes = {
         "torus": (torus(), "curvature", 4, look),
-        "sphere": (icosphere(3), "axis", 6, Look(method="brute", noise="color")),
-        "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0, flow_phase=0.3)),
+        "sphere": (icosphere(3), "axis", 6, Look(method="brute", hue="noise")),
+        "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0)),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
-        "magnitude": (icosphere(3), "axis", 3, Look(magnitude="both", supersampling=2)),
+        "magnitude": (
+            icosphere(3),
+            "axis",
+            3,
+            Look(hue="magnitude", magnitude_length=True, supersampling=2),
+        ),
     }
     for name, (surface, kind, degree, shape_look) in shapes.items():
         size = 160 * shape_look.supersampling
         camera = orbit_camera(surface.vertices, -25, 30, size, size)
         instance = MeshInstance(surface, np.eye(4), generate(surface, kind, degree))
-        pictures[name] = compose(project([instance], camera), shape_look)
+        pictures[name] = compose(project([instance], camera), shape_look, drift=Drift(0.3))
     return {name: to_srgb_uint8(picture.rgba) for name, picture in pictures.items()}
 
 

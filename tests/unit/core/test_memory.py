@@ -40,13 +40,6 @@ def limit_memory(monkeypatch, free: float) -> None:
 # --- what is free ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("count", "text"), [(8.5e8, "850 MB"), (9.06e9, "9.1 GB"), (2.1e10, "21 GB")]
-)
-def test_bytes_as_text(count, text):
-    assert memory.format_bytes(count) == text
-
-
 def test_limits_of_control_groups(tmp_path):
     """Of the group and of the one around it; files that are only cached are free."""
     (tmp_path / "proc/self").mkdir(parents=True)

@@ -10,19 +10,11 @@ from conftest import long
 from harness.stroke_tracing import visible_strokes
 from shapes import icosphere, instance_of, moved, plane, torus
 
-from rosy_addon.line_drawing.mesh_in_view import (
-    HIDDEN_MARGIN,
-    seen_triangles,
-    triangles_near,
-)
+from rosy_addon.line_drawing.mesh_in_view import HIDDEN_MARGIN, seen_triangles, triangles_near
 from rosy_addon.line_drawing.pipeline import draw_instances
 from rosy_addon.line_drawing.style import StrokeStyle
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.line_drawing.visibility import (
-    in_frame,
-    project_to_pixels,
-    rasterize_depth,
-)
+from rosy_addon.line_drawing.visibility import in_frame, project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 
 

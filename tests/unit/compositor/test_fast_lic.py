@@ -95,20 +95,6 @@ def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, seco
         assert match[sheet, chosen] > match[sheet].max() - 2e-4
 
 
-def test_the_directions_of_states_are_the_members_and_their_opposites():
-    angle, degree = 0.3, 5
-    covering = build_covering(
-        uniform_field(angle, degree, 4), pixel_look(LOOK), np.ones((16, 1), dtype=np.float32)
-    )
-    states = (
-        covering.state_table.reshape(2 * covering.line_count, -1, 4)[:, covering.cell_of_pixel, :2]
-        / 32767.0
-    )
-    expected = np.exp(1j * (angle + 2 * np.pi * np.arange(10) / 10))
-    actual = states[..., 0] + 1j * states[..., 1]
-    np.testing.assert_allclose(actual, np.broadcast_to(expected[:, None], actual.shape), atol=1e-4)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kernel", "degree"),

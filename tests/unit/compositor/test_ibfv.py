@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from conftest import long, mainly
+from conftest import mainly
 from harness.planar import lic, planar_pixel_field
 from planar_fields import pixel_centers
 from scipy import ndimage
@@ -74,29 +74,6 @@ def test_streaks_have_the_directions_of_the_members(degree, angle):
         member = np.exp(1j * (first + turn * line))
         error = np.mean([angle_to(frame(image[line], field), member) for image in images])
         assert np.degrees(abs(error)) < 0.7
-
-
-DRIFTING = {"flow": 2.0}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("degree", "settings"),
-    [
-        (4, {}),
-        (1, {"fade": "ends"}),
-        (4, DRIFTING),
-        *long((1, {}), (4, {"fade": "ends"}), (1, DRIFTING)),
-    ],
-    ids=str,
-)
-def test_the_contrast_is_that_of_sheets(degree, settings):
-    stds = []
-    for method in ("ibfv", "sheets"):
-        look = Look(method=method, **settings)
-        images = [draw(uniform(angle, degree), look, drift=Drift(0.3)) for angle in (0.1, 0.4, 0.7)]
-        stds.append(np.std([inside(frame(i.members[0], uniform(0, 1))) for i in images]))
-    assert stds[0] == pytest.approx(stds[1], rel=0.06)
 
 
 def test_the_contrast_is_the_same_where_streaks_end():

@@ -226,22 +226,6 @@ def test_streamlines_end_at_undefined_pixels(method):
     )
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_magnitude_drives_the_length_of_streaks(method):
-    size = 256
-    angles = np.zeros((size, size))
-    rho = np.where(np.arange(size)[:, None] < size // 2, 1.0, 0.2) * np.ones((size, size))
-    look = plain(method=method, magnitude_length=True, color_range=(0.0, 1.0))
-    image = tone(angles, 1, look, magnitude=rho)
-
-    def along(rows, lag):
-        return correlation(image[rows, :-lag], image[rows, lag:])
-
-    assert along(slice(0, 120), 20) > 0.55
-    assert along(slice(136, 256), 20) < 0.2
-    assert along(slice(136, 256), 3) > 0.5
-
-
 @pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
 def test_the_spectrum_peaks_at_the_members(degree):
     """To 1 degree, with no other direction."""

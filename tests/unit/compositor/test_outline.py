@@ -255,31 +255,6 @@ def test_parts_that_intersect_have_a_line_between_them():
 # --- motion --------------------------------------------------------------------------------------
 
 
-def test_creases_near_the_limit_do_not_flicker():
-    """A ridge whose angle wavers around the crease angle, seen from angles that change a little.
-
-    From frame to frame, the ink changes by no more than that of a silhouette would.
-    """
-    count = 60
-    x = np.linspace(-1, 1, count)
-    angle = 0.7 + 0.03 * np.sin(20 * x)
-    ridge = np.stack([x, 0 * x, 0 * x], axis=1)
-    sides = [np.stack([x, sign + 0 * x, -np.tan(angle / 2)], axis=1) for sign in (-1.0, 1.0)]
-    points = np.concatenate([sides[0], ridge, sides[1]])
-    first = np.arange(count - 1)
-    rows = [np.stack([first + row * count, first + row * count + 1], axis=1) for row in range(3)]
-    quads = np.concatenate([np.c_[rows[k], rows[k + 1][:, ::-1]] for k in range(2)])
-    surface = build_surface(points, quads.ravel(), np.arange(0, quads.size + 1, 4), sharp_angle=0.4)
-    instance = instance_of(surface)
-    inks = []
-    for step in range(12):
-        camera = orbit_camera(points, 20.0 + 0.15 * step, 50.0, 200, 200)
-        coverage = outline_of(instance, camera)
-        assert line_is_covered(coverage, camera, (-0.95, 0, 0), (0.95, 0, 0))
-        inks.append(coverage.sum())
-    assert np.abs(np.diff(inks)).max() < 0.02 * np.mean(inks)
-
-
 @pytest.mark.parametrize("block_side", [1, 2])
 def test_marks_grow_without_a_jump(block_side):
     """The width of the line of a mark increases with its length, from 0 to the full width."""

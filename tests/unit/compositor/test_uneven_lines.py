@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from conftest import mainly
 from harness.planar import planar_pixel_field
 from hatched import INK, make_camera, make_instance, tube
 from scipy.ndimage import gaussian_filter
@@ -25,13 +23,6 @@ from rosy_addon.projection.project import project
 
 #: These tests draw many pictures and measure them.
 pytestmark = pytest.mark.slow
-
-UNEVEN_LINES = {
-    "broken": {"breaks": 1.0},
-    "wobble": {"wobble": 1.0},
-    "paper grain": {"paper_grain": 1.0},
-    "all three": {"breaks": 0.6, "wobble": 0.6, "paper_grain": 0.6},
-}
 
 
 def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
@@ -54,20 +45,6 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
     )
     # Streamlines end at the frame.
     return alpha.reshape(side, side)[40:-40, 40:-40]
-
-
-@pytest.mark.parametrize(
-    ("crispness", "kind"),
-    mainly(
-        [(0.1, "broken"), (0.9, "wobble"), (0.1, "paper grain"), (0.9, "all three")],
-        product([0.1, 0.9], UNEVEN_LINES),
-    ),
-)
-def test_uneven_lines_have_the_same_coverage(kind, crispness):
-    """The mean coverage is that of even lines, from dark to light tones."""
-    look = Look(ink="hatch", line_width=2.0, length=30, crispness=crispness, **UNEVEN_LINES[kind])
-    for tone in (0.1, 0.3, 0.5, 0.7, 0.9):
-        assert plane_coverage(look, tone).mean() == pytest.approx(1 - tone, abs=0.03)
 
 
 def mean_run_length(ink):

@@ -59,27 +59,6 @@ def test_parts_are_scaled_within_parts():
     assert fractions == [0.0, 0.5, 0.75, 0.75, 0.875, 1.0]
 
 
-def test_a_part_without_an_end_takes_no_time():
-    def work():
-        with progress(0.25):
-            steps(0.0, 0.5, 1.0)
-
-    assert [fraction for fraction, _ in reported(work)] == [0.25] * 3
-
-
-def test_the_outermost_label_replaces_those_within():
-    def work():
-        report(0.0, "first")
-        with progress(0.0, 1.0, "outer"):
-            report(0.0, "second")
-            with progress(0.0, 1.0, "inner"):
-                report(0.0, "third")
-        with progress(0.0, 1.0):
-            report(0.0, "fourth")
-
-    assert [label for _, label in reported(work)] == ["first", "outer", "outer", "fourth"]
-
-
 def test_nobody_need_listen():
     with progress(0.0, 1.0):
         report(0.5, "unheard")

@@ -73,7 +73,7 @@ component = st.just(0.0) | st.floats(1e-29, 1e29) | st.floats(-1e29, -1e-29)
 @given(
     st.integers(1, 12),
     st.lists(st.tuples(component, component), min_size=6, max_size=6),
-    st.sampled_from([".rosy", ".rawfield"]),
+    st.sampled_from([".rosy", ".rawfield", ".txt", ".npy"]),
 )
 def test_written_fields_are_read_back_exactly(tmp_path, degree, vectors, ending):
     vectors = np.concatenate([np.array(vectors), np.zeros((6, 1))], axis=1)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import long, mainly
-from shapes import cube, from_quads, instance_of, plane, torus
+from harness.streaks import correlation
+from shapes import cube, instance_of, plane, torus
 from uv_maps import colors_at, patches_uv, surface_points, torus_uv
 
 from rosy_addon.compositor.look import Look
@@ -27,10 +28,6 @@ def texture_colors(instance, uv, look, size, points, **options):
     """The (n,) colors of a texture at points of the surface."""
     texture = draw_texture(instance, uv, look, size, **options)
     return colors_at(texture.rgba, instance.surface, uv, points)
-
-
-def correlation(first, second):
-    return np.corrcoef(first, second)[0, 1]
 
 
 TORUS = torus()
@@ -214,13 +211,3 @@ def test_textures_are_refused_before_they_are_drawn(error_of, monkeypatch):
     message = error_of(draw_texture, instance_of(surface, 4), torus_uv(8, 12), Look(), 16384)
     assert message.startswith("a texture of 16384 x 16384 texels needs about ")
     assert message.endswith(" of memory, 1.0 GB are free: choose a smaller size")
-
-
-def test_single_triangles_and_quads():
-    """The smallest meshes have textures, too."""
-    square = from_quads(
-        np.array([(0.0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]), np.array([[0, 1, 2, 3]])
-    )
-    uv = np.array([(0.0, 0.0), (1, 0), (1, 1), (0, 1)])
-    texture = draw_texture(instance_of(square, 2), uv, WIDE, 64)
-    assert texture.rgba[..., 0].std() > 0.02

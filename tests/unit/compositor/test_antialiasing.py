@@ -24,7 +24,7 @@ from rosy_addon.projection.project import project
 from rosy_addon.rendering.draw import draw_picture
 from rosy_addon.rendering.view_input import ViewInput
 
-SIZE = 240
+SIZE = 160
 CAMERA = perspective_camera(look_at((0.3, -3.2, 1.4), (0, 0, 0)), SIZE, SIZE, fov=0.8)
 LOOKS = {
     "default": Look(),

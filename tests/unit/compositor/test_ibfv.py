@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from conftest import mainly
 from harness.planar import lic, planar_pixel_field
 from planar_fields import pixel_centers
-from scipy import ndimage
 
 from bench import cases
 from rosy_addon.compositor import stages
@@ -27,8 +24,6 @@ from rosy_addon.projection.project import project
 
 LOOK = Look(method="ibfv")
 
-#: Pixels at the border of pictures whose streaks end early.
-MARGIN = 40
 
 
 def draw(
@@ -46,34 +41,6 @@ def uniform(angle: float, degree: int, size: int = 192) -> PixelField:
 
 def frame(values: np.ndarray, field: PixelField) -> np.ndarray:
     return values.reshape(field.height, field.width)
-
-
-def inside(image: np.ndarray, margin: int = MARGIN) -> np.ndarray:
-    return image[margin:-margin, margin:-margin]
-
-
-def angle_to(image: np.ndarray, direction: np.ndarray | complex) -> float:
-    """Return the mean angle from a direction to the streaks of an image, by the structure tensor."""
-    slope = ndimage.gaussian_filter(image, 1, order=(0, 1)) + 1j * (
-        ndimage.gaussian_filter(image, 1, order=(1, 0))
-    )
-    relative = inside(slope * np.conj(direction))
-    return float(0.5 * np.angle(-(relative**2).sum()))
-
-
-@pytest.mark.parametrize(
-    ("angle", "degree"),
-    mainly([(0.21, 1), (0.55, 3), (0.21, 4)], product([0.21, 0.55], [1, 2, 3, 4, 6])),
-)
-def test_streaks_have_the_directions_of_the_members(degree, angle):
-    field = uniform(angle, degree)
-    images = [draw(field, replace(LOOK, seed=seed)).members for seed in range(2)]
-    turn = 2 * np.pi / degree
-    first = angle - turn * np.rint(angle / turn)  # nearest to the guiding angle
-    for line in range(field.line_count):
-        member = np.exp(1j * (first + turn * line))
-        error = np.mean([angle_to(frame(image[line], field), member) for image in images])
-        assert np.degrees(abs(error)) < 0.7
 
 
 def test_the_contrast_is_the_same_where_streaks_end():

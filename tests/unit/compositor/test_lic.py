@@ -226,10 +226,13 @@ def test_streamlines_end_at_undefined_pixels(method):
     )
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 6])
-def test_the_spectrum_peaks_at_the_members(degree):
+@pytest.mark.parametrize(
+    ("method", "degree"), [*product(["sheets"], [1, 2, 3, 4, 6]), ("ibfv", 1), ("ibfv", 4)]
+)
+def test_the_spectrum_peaks_at_the_members(method, degree):
     """To 1 degree, with no other direction."""
-    spectrum = orientation_spectrum(tone(np.full((512, 512), 0.3), degree))
+    image = tone(np.full((512, 512), 0.3), degree, plain(method=method))
+    spectrum = orientation_spectrum(image)
     members = np.degrees(0.3 + 2 * np.pi * np.arange(degree) / degree) % 180
     expected = sorted(set(np.round(members, 6)))
     np.testing.assert_allclose(peaks(spectrum), expected, atol=1)

@@ -11,7 +11,6 @@ from shapes import icosphere, plane, torus
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import neighbor_table, surface_pixel_field
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.core.color import map_colors, to_display, to_linear
 from rosy_addon.field.frames import normalize
@@ -116,20 +115,6 @@ def test_breaking_points_are_visible_on_a_tilted_surface_without_the_view_plane(
         for on in (True, False)
     ]
     assert error[0] < error[1]
-
-
-def test_silhouettes_end_streamlines():
-    """The near and the far side of a torus are not linked at the silhouette between them."""
-    surface = torus(96, 48)
-    field = axis_field(surface, 1, (0, 0, 1))
-    gbuffer = project_surface(surface, field, 200, (0, -4, 1.2), 3.2, (0, 0, 1))
-    pixel_field = surface_pixel_field(gbuffer, 1, 0.7)
-    linked = neighbor_table(pixel_field)[:, :-1].T
-    valid = linked < len(gbuffer.pixel)
-    gap = np.abs(gbuffer.position[np.where(valid, linked, 0), 2] - gbuffer.position[:, None, 2])
-    # The tube is 0.8 wide. At the two cusps where a silhouette ends, a pixel can span half of it.
-    assert gap[valid].max() < 0.55
-    assert np.mean(gap[valid] > 0.3) < 0.001
 
 
 def test_headlight_is_lamberts_law():

@@ -128,7 +128,7 @@ LONG = {
     "picture": (picture, (Look(),), 0.9),
     "strokes": (
         draw_instances,
-        ([INSTANCE], CAMERA, StrokeStyle(arrows=30.0, overshoot=4.0, outline=True)),
+        ([INSTANCE], CAMERA, StrokeStyle(spacing=20.0, arrows=30.0, overshoot=4.0, outline=True)),
         0.9,
     ),
     "texture": (texture, (Look(length=20),), 0.9),

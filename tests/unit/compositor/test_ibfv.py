@@ -25,7 +25,6 @@ from rosy_addon.projection.project import project
 LOOK = Look(method="ibfv")
 
 
-
 def draw(
     field: PixelField,
     look: Look = LOOK,

@@ -159,6 +159,7 @@ def test_a_listener_ends_the_work(name):
     assert len(reported(function, *arguments)) <= count
 
 
+@pytest.mark.slow
 def test_listening_does_not_change_pixels():
     view = ViewInput((INSTANCE,), CAMERA, load_preset("pen-and-ink").look, (SUN,))
     alone = draw_picture(view).rgba

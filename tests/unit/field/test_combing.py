@@ -54,6 +54,7 @@ def on_torus(u: np.ndarray) -> np.ndarray:
     return np.stack([ring * np.cos(u), ring * np.sin(u), MINOR * np.sin(v)], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("degree", "is_exact", "limit"), [(1, False, 3.0), (4, True, 0.1), (6, False, 3.0)]
 )

@@ -91,6 +91,7 @@ def test_hatching_does_not_depend_on_the_charts(settings, lights):
     assert correlation(*colors) > 0.85
 
 
+@pytest.mark.slow
 def test_stretched_charts_show_the_same_lines():
     """A map that is four times as fine along u shows the texture of an even one."""
     surface = plane(16, 16)
@@ -107,6 +108,7 @@ def test_stretched_charts_show_the_same_lines():
 PIXEL = float(np.sqrt(4 * np.pi**2 * 0.4)) / SURFACE_PIXELS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("look", "size", "offset"),
     [
@@ -138,6 +140,7 @@ def test_udim_tiles_are_pictures_of_their_own():
         assert correlation(colors_at(tiles[tile], TORUS, moved, points), single[chosen]) > 0.95
 
 
+@pytest.mark.slow
 def test_margin_continues_the_surface():
     """Beside a seam, the margin has the colors of the other chart: no filter sees an edge."""
     instance, uv = instance_of(TORUS, 1), torus_uv()

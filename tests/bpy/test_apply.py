@@ -14,14 +14,7 @@ from rosy.rosy_addon.scene import pictures as pictures_room
 from rosy.rosy_addon.scene.bake_records import has_pictures, list_bakes, remove_bakes
 from rosy.rosy_addon.scene.cameras import scene_cameras
 from rosy.rosy_addon.scene.pictures import show_bake
-from scenes import (
-    add_camera,
-    contents,
-    depsgraph,
-    each_step,
-    link,
-    pixels,
-)
+from scenes import add_camera, contents, depsgraph, each_step, link, pixels
 
 
 def material_of(obj):
@@ -32,19 +25,6 @@ def material_of(obj):
     evaluated.to_mesh_clear()
     (material,) = materials
     return material.original if material else None
-
-
-def test_the_image_holds_the_picture(scene, camera, monkey):
-    (baked,) = bake(scene)
-    image, rgba = baked.image, baked.picture.rgba
-    assert (image.name, tuple(image.size)) == ("RoSy Camera", (128, 128))
-    assert image.packed_file is not None
-    covered = rgba[..., 3] > 0
-    stored = pixels(image)
-    np.testing.assert_allclose(
-        stored[covered][:, :3], to_display(rgba[covered][:, :3]), atol=0.5 / 255 + 1e-6
-    )
-    np.testing.assert_array_equal(stored[..., 3] > 0, covered)
 
 
 def test_bakes_survive_saving(scene, camera, monkey, tmp_path):
@@ -59,23 +39,26 @@ def test_bakes_survive_saving(scene, camera, monkey, tmp_path):
     assert material_of(bpy.data.objects["Suzanne"]).name == "RoSy Camera"
 
 
+@pytest.mark.parametrize("store", ["PACKED", "SAVED"])
 @pytest.mark.parametrize(("image_format", "suffix"), [("BYTE", ".png"), ("FLOAT", ".exr")])
-def test_saved_to_a_folder(scene, camera, monkey, tmp_path, image_format, suffix):
-    scene.rosy.store, scene.rosy.directory = "SAVED", str(tmp_path / "pictures")
+def test_the_image_holds_the_picture(scene, camera, monkey, tmp_path, store, image_format, suffix):
+    scene.rosy.store, scene.rosy.directory = store, str(tmp_path)
     scene.rosy.image_format = image_format
     (baked,) = bake(scene)
-    (path,) = (tmp_path / "pictures").iterdir()
-    assert path.suffix == suffix
-    assert baked.image.packed_file is None
-    covered = baked.picture.rgba[..., 3] > 0
-    stored = pixels(baked.image)[covered][:, :3]
-    expected = baked.picture.rgba[covered][:, :3]
+    image, rgba = baked.image, baked.picture.rgba
+    assert (image.name, tuple(image.size)) == ("RoSy Camera", (128, 128))
+    assert (image.packed_file is None) == (store == "SAVED")
+    files = [path.suffix for path in tmp_path.iterdir()]
+    assert files == ([suffix] if store == "SAVED" else [])
+    covered = rgba[..., 3] > 0
+    np.testing.assert_array_equal(pixels(image)[..., 3] > 0, covered)
+    stored, expected = pixels(image)[covered][:, :3], rgba[covered][:, :3]
     if image_format == "BYTE":
         np.testing.assert_allclose(stored, to_display(expected), atol=0.5 / 255 + 1e-6)
     else:
         np.testing.assert_allclose(stored, expected, atol=1e-3)
     bake(scene)
-    assert len(list((tmp_path / "pictures").iterdir())) == 1
+    assert len(list(tmp_path.iterdir())) == len(files)
 
 
 def test_a_relative_folder_is_that_of_the_working_directory(
@@ -174,7 +157,7 @@ def test_an_error_while_applying_leaves_nothing(scene, camera, monkey, monkeypat
 
 
 def test_several_cameras(scene, camera, monkey):
-    second = add_camera("Second", (3.0, -4.0, 1.0))
+    add_camera("Second", (3.0, -4.0, 1.0))
     first_bake, last_bake = bake(scene, cameras=scene_cameras(scene))
     assert (first_bake.camera, last_bake.camera) == ("Second", "Camera")
     assert [entry.camera for entry in list_bakes(scene)] == ["Camera", "Second"]
@@ -187,7 +170,6 @@ def test_several_cameras(scene, camera, monkey):
     assert len(bpy.data.node_groups) == groups
     with pytest.raises(RosyError, match="camera 'Third', only from 'Second', 'Camera'"):
         show_bake(scene, "Third")
-    assert second.name == "Second"
 
 
 def test_warnings(scene, camera, monkey):
@@ -196,12 +178,6 @@ def test_warnings(scene, camera, monkey):
     (warning,) = bake(scene)[0].warnings
     assert "Filmic" in warning
     assert scene.view_settings.view_transform == "Filmic"
-
-
-def test_same_scene_same_bytes(scene, camera, monkey):
-    first = bytes(bake(scene)[0].image.packed_file.data)
-    remove_bakes(scene)
-    assert bytes(bake(scene)[0].image.packed_file.data) == first
 
 
 def test_undo_restores_the_previous_picture(scene, camera, monkey):

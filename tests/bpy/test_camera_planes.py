@@ -10,14 +10,12 @@ from rosy.rosy_addon.compositor.look import Look
 from rosy.rosy_addon.core.color import from_hex, to_linear
 from rosy.rosy_addon.jobs.animation import bake_animation
 from rosy.rosy_addon.jobs.bake import bake
-from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.bake_records import baked_objects, list_bakes, remove_bakes
-from rosy.rosy_addon.scene.camera_planes import frame_corners, update_backdrops
-from rosy.rosy_addon.scene.cameras import camera_of_object
+from rosy.rosy_addon.scene.camera_planes import update_backdrops
 from rosy.rosy_addon.scene.keys import FontShapes, round_length, update_keys
 from rosy.rosy_addon.scene.look_properties import apply_look
 from rosy.rosy_addon.scene.pictures import OutputSettings, show_bake
-from scenes import add_camera, aim, contents, depsgraph, pixels, read_instances, render
+from scenes import add_camera, aim, contents, pixels, render
 
 LOOK = Look(hue="magnitude", singularity_dots="visible", supersampling=2)
 
@@ -103,40 +101,6 @@ def test_a_panoramic_camera_has_no_key(colored):
     colored.camera.data.type = "PANO"
     colored.rosy.key_size = 12
     assert not keys()
-
-
-def test_pictures_do_not_depend_on_the_key(colored):
-    colored.rosy.key_caption = "A head"
-    colored.rosy.key = True
-    (first,) = bake(colored)
-    (second,) = bake(colored)
-    assert len(keys()) == 1
-    np.testing.assert_array_equal(first.picture.rgba, second.picture.rgba)
-    colored.rosy.key = False
-    (third,) = bake(colored)
-    np.testing.assert_array_equal(first.picture.rgba, third.picture.rgba)
-
-
-@pytest.mark.parametrize("supersampling", [1, 2])
-def test_the_range_is_that_of_the_picture(colored, supersampling):
-    colored.rosy.look.supersampling = supersampling
-    (result,) = bake(colored)
-    record = colored.rosy.bakes[0]
-    key = PictureKey.from_json(record.key)
-    assert key.color_scale.high == result.picture.color_range[1]
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    view = camera_of_object(colored, depsgraph, colored.camera)
-    gbuffer = project(read_instances(depsgraph), view, samples=supersampling)
-    largest = float(np.abs(gbuffer.representation).max())
-    assert key.color_scale.high == pytest.approx(largest, rel=1e-6)
-    # The same range, typed, gives the same picture.
-    colored.rosy.look.color_range = 0.0, largest
-    (again,) = bake(colored)
-    np.testing.assert_allclose(again.picture.rgba, result.picture.rgba, atol=1e-4)
-    counts = {entry.index: entry.count for entry in key.indices}
-    marks = result.picture.marks
-    assert counts == {i: int((marks.index[marks.is_visible] == i).sum()) for i in counts}
-    assert sum(counts.values()) == marks.is_visible.sum() > 0
 
 
 def test_animations_have_numbers_only_with_a_range(colored, tmp_path):
@@ -246,18 +210,6 @@ def hatched(monkey, camera, scene):
     """A scene whose look has brown paper."""
     apply_look(scene.rosy, PAPER)
     return scene
-
-
-@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
-def test_corners_are_those_of_the_frame(scene, camera, kind):
-    camera.data.type, camera.data.shift_x, camera.data.shift_y = kind, 0.2, -0.1
-    scene.render.resolution_x = 192
-    view = camera_of_object(scene, depsgraph(), camera)
-    corners = frame_corners(view, 30.0)
-    np.testing.assert_allclose(corners[:, 2], -30.0)
-    clip = np.c_[corners, np.ones(4)] @ view.projection.T
-    ndc = clip[:, :2] / clip[:, 3:]
-    np.testing.assert_allclose(ndc, [(-1, -1), (1, -1), (1, 1), (-1, 1)], atol=1e-9)
 
 
 def test_without_the_switch_or_without_paper_there_is_none(hatched):

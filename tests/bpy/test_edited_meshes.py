@@ -10,7 +10,6 @@ from rosy.rosy_addon.jobs.bake import bake
 from rosy.rosy_addon.projection.project import project
 from rosy.rosy_addon.scene.cameras import camera_of_object
 from rosy.rosy_addon.scene.mesh_fields import read_mesh_field, write_mesh_field
-from rosy.rosy_addon.scene.meshes import mesh_surface
 from rosy.rosy_addon.scene.scene_reader import SceneReader
 from scenes import (
     add_field,
@@ -181,15 +180,3 @@ def test_a_bad_object_that_was_asked_for_is_an_error(scene, camera, monkey, brok
     monkey.rosy.include = False
     with pytest.raises(RosyError, match=r"'Broken'.*not tangent"):
         bake(scene)
-
-
-@pytest.mark.parametrize("modifier", ["REMESH", "MASK"])
-def test_an_object_whose_modifiers_lose_the_field_is_left_out(scene, camera, monkey, modifier):
-    other = add_field(add_monkey((2.5, 0.0, 0.0)))
-    other.modifiers.new("Loses", modifier)
-    if modifier == "MASK":
-        other.modifiers[0].vertex_group = other.vertex_groups.new(name="none").name
-    (result,) = bake(scene)
-    assert result.objects == (monkey,)
-    assert any(f"'{other.name}'" in warning and "Loses" in warning for warning in result.warnings)
-    assert mesh_surface(other.data).face_count

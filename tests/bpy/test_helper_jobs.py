@@ -12,9 +12,7 @@ from rosy.rosy_addon.jobs.comb_field import CombStroke
 from rosy.rosy_addon.jobs.draw_strokes import draw_strokes
 from rosy.rosy_addon.jobs.render_turntable import render_turntable
 from rosy.rosy_addon.line_drawing.style import StrokeStyle
-from rosy.rosy_addon.scene.computed_attributes import (
-    store_difference,
-)
+from rosy.rosy_addon.scene.computed_attributes import store_difference
 from rosy.rosy_addon.scene.pictures import OutputSettings
 from rosy.rosy_addon.worker.helper import Helper
 from rosy.rosy_addon.worker.job import run
@@ -114,12 +112,3 @@ def test_files_are_the_same(scene, camera, monkey, run_with, tmp_path):
             if path.is_file()
         }
     assert len(files["helper"]) == 5 and files["in place"] == files["helper"]
-
-
-def test_a_turntable_that_is_cancelled_leaves_no_file(scene, camera, monkey, tmp_path):
-    steps = render_turntable.begin(
-        scene, monkey, tmp_path / "a.gif", count=3, rate=10.0, size=(64, 48), view_angles=(0, 20)
-    )
-    steps.send(next(steps)())
-    steps.close()
-    assert not list(tmp_path.iterdir())

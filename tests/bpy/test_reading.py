@@ -327,17 +327,6 @@ def test_evaluated_fields_of_other_forms(scene, monkey):
     np.testing.assert_allclose(instance.field.magnitude, 1, atol=1e-4)
 
 
-def test_meshes_in_edit_mode_are_read(scene, monkey):
-    bpy.context.view_layer.objects.active = monkey
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.transform.translate(value=(0, 0, 2.0))
-    (instance,) = read_instances(depsgraph())
-    assert instance.surface.vertices[:, 2].mean() > 1.5
-    assert instance.field.magnitude.max() > 0
-    bpy.ops.object.mode_set(mode="OBJECT")
-
-
 def test_lights(scene):
     for kind, energy in (("SUN", np.pi), ("POINT", 4 * np.pi**2), ("AREA", 1.0), ("SPOT", 1.0)):
         data = bpy.data.lights.new(kind, kind)
@@ -355,14 +344,6 @@ def test_lights(scene):
     np.testing.assert_allclose(lights[3].vector, (0, 0, 1), atol=1e-6)
     np.testing.assert_allclose(lights[2].vector, (0, 0, -2), atol=1e-6)
     np.testing.assert_allclose(lights[2].color, (1, 0.5, 0.25))
-
-
-def test_degenerate_faces_are_undefined(scene, camera):
-    vertices = [(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1), (0.5, 0, 1), (2, 0, 2), (2, 0, 2)]
-    obj = add_mesh("Odd", vertices, [(0, 1, 2, 3), (3, 4, 2), (2, 5, 6)])
-    add_field(obj, kind="axis")
-    (instance,) = read_instances(depsgraph())
-    np.testing.assert_array_equal(instance.field.magnitude > 0, [True, False, False])
 
 
 @pytest.mark.parametrize("shape", ["mixed", "triangles"])

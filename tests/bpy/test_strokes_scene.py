@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -20,7 +19,7 @@ from rosy.rosy_addon.scene.scene_reader import read_scene
 from rosy.rosy_addon.scene.stroke_data import has_grease_pencil_drawings
 from rosy.rosy_addon.scene.stroke_objects import edited_strokes, remove_strokes, stroke_objects
 from rosy.rosy_addon.worker.job import Step
-from scenes import add_camera, add_field, add_plane, contents, depsgraph, each_step, render
+from scenes import add_field, add_plane, contents, depsgraph, each_step, render
 
 PLAIN = StrokeStyle(spacing=12, outline=True)
 BLACK = Pen(width=1.5)
@@ -61,33 +60,6 @@ def pencil_strokes(layer):
     ]
 
 
-def coverage(points, start, radius, camera, subpixels=8):
-    """Return the share of each pixel that lines with flat ends cover, (H, W), rows from the bottom."""
-    pixels, _ = project_to_pixels(points, camera)
-    size = radius / pixel_size(points, camera)
-    canvas = np.zeros((camera.height * subpixels, camera.width * subpixels), dtype=bool)
-    y, x = np.mgrid[: camera.height * subpixels, : camera.width * subpixels]
-    for first, last in pairwise(start):
-        for a in range(first, last - 1):
-            along = pixels[a + 1] - pixels[a]
-            steps = max(int(np.ceil(np.hypot(*along) * subpixels / 2)), 1)
-            for share in np.arange(steps + 1) / steps:
-                center = (pixels[a] + share * along) * subpixels
-                r = (size[a] + share * (size[a + 1] - size[a])) * subpixels
-                box = [
-                    slice(max(int(center[k] - r) - 1, 0), max(int(center[k] + r) + 2, 0))
-                    for k in (1, 0)
-                ]
-                right, up = x[*box] + 0.5 - center[0], y[*box] + 0.5 - center[1]
-                is_covered = np.hypot(right, up) <= r
-                offset = right * along[0] + up * along[1]
-                past_start = offset + share * (along @ along) * subpixels
-                is_covered &= (a > first) | (past_start >= 0)
-                is_covered &= (a < last - 2) | (past_start <= along @ along * subpixels)
-                canvas[*box] |= is_covered
-    return canvas.reshape(camera.height, subpixels, camera.width, subpixels).mean(axis=(1, 3))
-
-
 def test_grease_pencil_holds_the_strokes(monkey, camera, scene):
     result = draw_strokes(scene, kind="PENCIL", style=PLAIN, pen=BLACK)
     data, strokes = result.obj.data, result.drawing.strokes
@@ -126,20 +98,17 @@ def test_curves_hold_the_strokes_and_their_attributes(monkey, camera, scene):
         found = {(attributes[name].domain, attributes[name].data_type) for name in names}
         assert found == {(domain, kind)}
     np.testing.assert_array_equal(values(attributes["family"]), strokes.family)
-    # The faces of the points are those of the mesh, and the normals are about those of the faces.
-    faces = bpy.data.objects["Suzanne"].data.polygons
     member = values(attributes["member"], "vector", 3)
     normal = values(attributes["surface_normal"], "vector", 3)
     has_member = member.any(axis=1)
     assert np.allclose(np.linalg.norm(member[has_member], axis=1), 1, atol=1e-4)
-    flat = np.array([faces[int(face)].normal for face in values(attributes["face_index"])])
-    # The normals of outlines at creases are between those of the faces.
-    assert (flat * normal).sum(axis=1)[has_member].mean() > 0.85
     points = values(attributes["position"], "vector", 3)
     camera_view = view(scene)
-    toward_camera = np.array(camera.location) - points
-    assert ((toward_camera * normal).sum(axis=1)[has_member] > 0).mean() > 0.95
     first = np.array([curve.first_point_index for curve in data.curves])
+    begins = strokes.start[:-1]
+    np.testing.assert_allclose(member[first], strokes.member[begins], atol=1e-4)
+    np.testing.assert_allclose(normal[first], strokes.normal[begins], atol=1e-4)
+    np.testing.assert_array_equal(values(attributes["face_index"])[first], strokes.face[begins])
     positions, _ = project_to_pixels(points[first].astype(float), camera_view)
     np.testing.assert_allclose(
         positions, project_to_pixels(strokes.points[strokes.start[:-1]], camera_view)[0], atol=0.01
@@ -150,7 +119,7 @@ def test_cycles_renders_curves_without_the_hidden_ones(monkey, camera, scene, tm
     wall = add_plane("Wall", size=0.5)
     wall.location = (0.5, -2.0, 0.3)
     bpy.context.view_layer.update()
-    result = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=5), pen=Pen(width=2.0))
+    result = draw_strokes(scene, kind="CURVES", style=StrokeStyle(spacing=10), pen=Pen(width=2.0))
     camera_view = view(scene)
     corners = np.array([[x, 0, z] for x in (-0.5, 0.5) for z in (-0.5, 0.5)]) + wall.location
     low, high = (
@@ -160,22 +129,27 @@ def test_cycles_renders_curves_without_the_hidden_ones(monkey, camera, scene, tm
     covered = (slice(int(low[1]) + 3, int(high[1]) - 3), slice(int(low[0]) + 3, int(high[0]) - 3))
     wall.hide_render = monkey.hide_render = True
     alpha = render(scene, tmp_path / "curves.exr", samples=32)[..., 3]
+    # The ink is the area of the strokes. Crossings count once, so that it is less by up to
+    # width / (2 spacing) = 0.1.
     strokes = result.drawing.strokes
-    radius = pixel_size(strokes.points, camera_view) * strokes.width
-    expected = coverage(strokes.points, strokes.start, radius, camera_view)
-    assert expected.mean() > 0.03
-    assert np.corrcoef(alpha.ravel(), expected.ravel())[0, 1] > 0.97
-    assert np.isclose(alpha.mean(), expected.mean(), rtol=0.05)
+    points, _ = project_to_pixels(strokes.points, camera_view)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    lengths[strokes.start[1:-1] - 1] = 0  # from one stroke to the next
+    widths = 2.0 * (strokes.width[1:] + strokes.width[:-1]) / 2
+    assert 0.9 <= alpha.sum() / (lengths * widths).sum() <= 1.02
+    middles = ((points[1:] + points[:-1]) / 2)[lengths > 0]
+    column, row = middles.astype(int).T
+    assert alpha[row, column].min() > 0.1
     # Strokes behind the wall were left out, so nothing appears there without the wall.
-    assert alpha[covered].size > 300 and alpha[covered].mean() < 1e-4
+    assert alpha[covered].size > 300 and not alpha[covered].any()
     monkey.hide_render = False
     kept = draw_strokes(
-        scene, kind="CURVES", style=StrokeStyle(spacing=5, hidden=True), pen=Pen(width=2.0)
+        scene, kind="CURVES", style=StrokeStyle(spacing=10, hidden=True), pen=Pen(width=2.0)
     )
     assert kept.obj == result.obj
     monkey.hide_render = True
     alpha = render(scene, tmp_path / "kept.exr", samples=8)[..., 3]
-    assert alpha[covered].mean() > 0.1
+    assert alpha[covered].any()
 
 
 def pencil_modifiers(obj):
@@ -231,16 +205,6 @@ def test_a_deleted_object_is_created_again(monkey, camera, scene):
     second = draw_strokes(scene, kind="PENCIL", style=PLAIN).obj
     assert stroke_objects(scene) == [second]
     assert [obj.name for obj in bpy.data.objects if obj.type == PENCIL] == [second.name]
-
-
-def test_one_object_for_each_camera_and_kind(monkey, camera, scene):
-    side = add_camera("Side", (5.0, 0.0, 0.5))
-    objects = [
-        draw_strokes(scene, kind=kind, camera=source, style=StrokeStyle(spacing=30)).obj
-        for kind in ("PENCIL", "CURVES")
-        for source in (camera, side, camera)
-    ]
-    assert len(set(objects)) == 4 and set(stroke_objects(scene)) == set(objects)
 
 
 def test_strokes_of_one_mesh_move_with_it(monkey, camera, scene):

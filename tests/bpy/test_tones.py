@@ -21,7 +21,7 @@ from rosy.rosy_addon.scene.look_inputs import (
 )
 from rosy.rosy_addon.scene.pictures import read_output_settings
 from rosy.rosy_addon.scene.scene_reader import SceneReader, read_scene
-from scenes import add_field, add_mesh, depsgraph, link, pixels, read_live
+from scenes import add_field, add_mesh, depsgraph, read_live
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -147,25 +147,6 @@ def add_uv(mesh):
     layer.uv.foreach_set("vector", uv.ravel())
 
 
-def test_images_on_uv_maps_are_drawn(scene, wall):
-    """The streaks of each quarter of the picture have the tone of the image."""
-    add_uv(wall.data)
-    quarters = np.array([[0.1, 0.9], [0.6, 0.3]])
-    wall.rosy.tone_image = add_image(values=np.kron(quarters, np.ones((8, 8))), as_float=True)
-    bpy.context.view_layer.update()
-    look = Look(ink="hatch", tone="image", line_width=2.0)
-    rgba = pixels(bake(scene, look=look, size=(256, 256))[0].image)
-    covered = np.argwhere(rgba[..., 3] == 1)
-    low, high = covered.min(axis=0), covered.max(axis=0)
-    size = high - low
-    for quarter, expected in np.ndenumerate(quarters):
-        # The middle of each quarter.
-        start, stop = (low + size * (np.array(quarter) + share) // 2 for share in (0.2, 0.8))
-        (bottom, left), (top, right) = start.astype(int), stop.astype(int)
-        tone = to_linear(rgba[bottom:top, left:right, 1]).mean()
-        assert tone == pytest.approx(expected, abs=0.08)
-
-
 def test_missing_images_and_uv_maps(wall):
     with pytest.raises(RosyError, match="'Plane': choose an image for the tone"):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
@@ -174,7 +155,11 @@ def test_missing_images_and_uv_maps(wall):
     with pytest.raises(RosyError, match="object 'Plane' has no UV map: unwrap"):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
     add_uv(wall.data)
-    assert tone_of(ToneRequest("image")).image.shape == (2, 2)
+    tone = tone_of(ToneRequest("image"))
+    np.testing.assert_allclose(
+        tone.image, to_linear(np.array([[0, 1], [128 / 255, 64 / 255]])), atol=1e-3
+    )
+    assert tone.values.min() == 0 and tone.values.max() == 1
     wall.rosy.tone_uv_map = "Other"
     with pytest.raises(RosyError, match="no UV map 'Other'"):
         read_scene(depsgraph(), None, ReadRequest(tone=ToneRequest("image")))
@@ -186,9 +171,7 @@ PICTURE = Look(ink="hatch", tone="picture", line_width=2.0)
 
 
 def test_pictures_from_files(scene, wall, tmp_path):
-    """Each half of the frame has the tone of the file."""
-    values = np.full((32, 32), 0.9)
-    values[:, 16:] = 0.4
+    values = np.random.default_rng(1).random((32, 32))
     save_picture(tmp_path / "shot.png", values)
     scene.rosy.tone_picture = str(tmp_path / "shot.png")
     images = set(bpy.data.images)
@@ -197,13 +180,6 @@ def test_pictures_from_files(scene, wall, tmp_path):
         reference.luminance, to_linear(np.rint(values * 255) / 255), atol=2e-3
     )
     assert set(bpy.data.images) == images
-    rgba = pixels(bake(scene, look=PICTURE, size=(256, 256))[0].image)
-    opaque = rgba[..., 3] == 1
-    left, right = opaque.copy(), opaque.copy()
-    left[:, 120:], right[:, :136] = False, False
-    for side, expected in ((left, 0.9), (right, 0.4)):
-        tone = to_linear(rgba[..., 1][side]).mean()
-        assert tone == pytest.approx(float(to_linear(np.array(expected))), abs=0.06)
 
 
 def test_unsuitable_pictures(scene, wall, tmp_path):
@@ -242,11 +218,8 @@ def test_animations_take_the_picture_of_each_frame(scene, wall, tmp_path):
         return results[0].rendered
 
     assert run() == (1, 2)
-    means = []
-    for path in sorted((tmp_path / "out").glob("*.png")):
-        rgba = pixels(bpy.data.images.load(str(path)))
-        means.append(rgba[..., 1][rgba[..., 3] == 1].mean())
-    assert means[0] > means[1] + 0.3
+    first, second = (path.read_bytes() for path in sorted((tmp_path / "out").glob("*.png")))
+    assert first != second
     # If the picture of a frame changes, only this frame is drawn again.
     assert run() == ()
     save_picture(tmp_path / "shot_002.png", np.full((16, 16), 0.6))
@@ -276,26 +249,6 @@ def test_a_live_view_reads_values_again_when_they_change(wall, kind):
     assert changed.instance is not first and values_of(changed.instance).all()
     (without,) = read_live(reader)
     assert values_of(without.instance) is None
-
-
-def test_shadows_of_objects_that_renders_show(scene, wall):
-    """An object between a sun and the wall, outside the frame, darkens the wall."""
-    light = link(bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN")))
-    light.data.energy = np.pi
-    light.rotation_euler = (np.radians(60), 0, 0)
-    add_mesh("Lid", [(-2, -0.3, 1), (2, -0.3, 1), (2, -3, 1), (-2, -3, 1)], [(0, 1, 2, 3)])
-    bpy.context.view_layer.update()
-    look = Look(light="scene", shading=1.0, gain=0.0)
-
-    def mean(look):
-        rgba = pixels(bake(scene, look=look, size=(64, 64))[0].image)
-        return rgba[..., 1][rgba[..., 3] == 1].mean()
-
-    unshadowed, shadowed = mean(look), mean(look.with_settings({"shadows": True}))
-    assert shadowed < 0.8 * unshadowed
-    bpy.data.objects["Lid"].hide_render = True
-    bpy.context.view_layer.update()
-    assert mean(look.with_settings({"shadows": True})) == pytest.approx(unshadowed, abs=0.01)
 
 
 def test_occlusion_is_stored_and_drawn(scene, wall):

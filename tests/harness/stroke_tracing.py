@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rosy_addon.field.representation import face_frames
+from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.line_drawing.families import label_families
 from rosy_addon.line_drawing.lateral_neighbors import SeparationRules
 from rosy_addon.line_drawing.spacing import CornerSpacing
@@ -47,3 +49,30 @@ def visible_strokes(strokes: Strokes, instances: Sequence[MeshInstance], camera:
 def write_svg(path: Path, *drawing: object) -> None:
     """Write a file; the other parameters are those of `svg_text`."""
     path.write_text(svg_text(*drawing), encoding="utf-8")
+
+
+def turned(surface, degree, angle=0.0):
+    """Return an instance with a field at an angle to the first edges of its faces."""
+    x, y = face_frames(surface)
+    return MeshInstance(
+        surface, np.eye(4), RosyField(degree, np.cos(angle) * x + np.sin(angle) * y)
+    )
+
+
+def planar_strokes(points, directions, spacing):
+    """Return strokes in a plane from (S, n, 3) points and (S n, 3) directions."""
+    stroke_count, point_count = len(points), points.shape[0] * points.shape[1]
+    return Strokes(
+        points=points.reshape(-1, 3),
+        start=np.arange(stroke_count + 1) * points.shape[1],
+        family=np.zeros(stroke_count, dtype=np.int32),
+        names=("family 1",),
+        face=np.zeros(point_count, dtype=np.int32),
+        triangle=np.zeros(point_count, dtype=np.int32),
+        weights=np.full((point_count, 3), 1 / 3),
+        normal=np.tile((0, 0, 1.0), (point_count, 1)),
+        member=directions,
+        spacing=np.full(point_count, spacing),
+        width=np.ones(point_count),
+        closed=np.zeros(stroke_count, dtype=bool),
+    )

@@ -41,20 +41,6 @@ function compiled(settings) {
 DEFAULTS = {"folder": "/out", "blendfile": "/a b/scene.blend", "preset": "", "cameras": ""}
 
 
-#: The keys of settings that the manager knows.
-KEYS = {
-    "key",
-    "type",
-    "subtype",
-    "required",
-    "eval",
-    "evalInfo",
-    "default",
-    "description",
-    "visible",
-}
-
-
 def result_of(expression):
     """Evaluate JavaScript after the manager's functions and the job type."""
     engine = quickjs.Context()
@@ -89,12 +75,3 @@ def test_each_camera_has_its_own_sequence():
         for frames in ("3,5,6", "7-8")
     ]
     assert list(parse_frames("3,5,6")) == [3, 5, 6] and list(parse_frames("7-8")) == [7, 8]
-
-
-def test_settings_have_only_keys_that_the_manager_knows():
-    settings = result_of("JSON.stringify(JOB_TYPE)")["settings"]
-    for setting in settings:
-        assert set(setting) <= KEYS and setting["type"] in ("string", "int32", "bool", "float")
-        assert setting.get("required") or "default" in setting
-    keys = [setting["key"] for setting in settings]
-    assert keys == ["frames", "chunk_size", "cameras", "folder", "preset", "blendfile"]

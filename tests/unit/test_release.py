@@ -5,7 +5,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from tools.check_tag import fault_of
 
@@ -31,16 +30,3 @@ def test_citation_has_the_version_of_the_manifest():
 def test_tag(tag, heading, fault):
     found = fault_of(tag, "1.2.0", f"# Changes\n\n## {heading}\n\n- One\n\n## 1.0.0, 2026-01-01\n")
     assert re.match(fault, found) if fault else found == ""
-
-
-def test_pictures_of_the_listing():
-    """The featured picture is 16:9, all are large enough for the platform, and none is heavy."""
-    pictures = sorted((ROOT / "docs" / "listing").glob("*.png"))
-    sizes = {path.name: Image.open(path).size for path in pictures}
-    assert len(sizes) >= 5
-    width, height = sizes["featured.png"]
-    assert width * 9 == height * 16
-    assert all(width >= 1920 and height >= 1080 for width, height in sizes.values()), sizes
-    weights = [path.stat().st_size for path in pictures]
-    assert max(weights) < 600_000
-    assert sum(weights) < 2_500_000

@@ -128,6 +128,7 @@ def test_places_are_even_and_on_the_side_that_the_camera_sees(shape, is_exact):
     assert np.quantile(nearest, 0.99) < 1.25 * 25.0 and nearest.max() < 2.5 * 25.0
 
 
+@pytest.mark.slow
 def test_nothing_is_drawn_where_a_surface_is_hidden_or_outside():
     ball, wall = icosphere(4), rectangle()
     turned = np.array([[1, 0, 0, 0.6], [0, 0, -1, -1.5], [0, 1, 0, 0], [0, 0, 0, 1.0]])
@@ -163,6 +164,7 @@ def test_undefined_faces_have_no_arrowheads():
     )
 
 
+@pytest.mark.slow
 def test_arrowheads_stay_on_the_surface_while_the_camera_turns():
     instance = instance_of(torus(96, 48), 1)
     marks = [
@@ -249,6 +251,7 @@ def changed_by_arrows(view):
     return (rendered(view) != rendered(plain)).any(axis=2)
 
 
+@pytest.mark.slow
 def test_processes_and_supersampling_draw_the_same_arrowheads():
     looks = [Look(length=8, arrows=40.0, supersampling=samples) for samples in (1, 2)]
     views = [ViewInput((instance_of(globe(48, 96), 3),), CAMERA, look) for look in looks]
@@ -256,16 +259,6 @@ def test_processes_and_supersampling_draw_the_same_arrowheads():
     changed = [changed_by_arrows(view) for view in views]
     assert changed[0].sum() > 2000
     np.testing.assert_array_equal(*changed)
-
-
-def test_sizes_in_blender_units_follow_the_distance():
-    instance = instance_of(icosphere(3), 1)
-    sizes = []
-    for distance in (4.0, 8.0):
-        camera = perspective_camera(look_at((0, -distance, 0), (0, 0, 0)), 400, 400, fov=0.7)
-        look = Look(length=8, unit_size=0.01, arrows=36.0)
-        sizes.append(changed_by_arrows(ViewInput((instance,), camera, look)).sum())
-    assert 2.5 < sizes[0] / sizes[1] < 4.5  # outlines are a pixel wide at least
 
 
 @pytest.mark.parametrize("distance", [65536.0, 1.0, 50.0])

@@ -138,6 +138,7 @@ def test_visible_singularities_of_a_mesh_have_dots_at_their_vertices(degree):
     np.testing.assert_array_equal(picture[~near], without[~near])
 
 
+@pytest.mark.slow
 def test_processes_and_supersampling_draw_the_same_dots():
     surface = globe(48, 96)
     views = [view_of(surface, 4, singularity_dots="all", supersampling=s) for s in (1, 2)]
@@ -164,6 +165,7 @@ def test_drawings_have_the_same_dots_as_pictures():
     assert plain.marks is None and "circle" not in svg_text(plain.strokes, CAMERA)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size, width, halo", [(3.0, 1.0, 1.96), (12.0, 2.04, 5.88)])
 def test_lines_of_labels_in_drawings_are_at_least_a_pixel_wide(size, width, halo):
     strokes = draw_instances(

@@ -10,7 +10,7 @@ from shapes import icosphere, plane
 
 from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
-from rosy_addon.core.color import color_stops, map_colors, to_linear
+from rosy_addon.core.color import map_colors, to_linear
 from rosy_addon.core.errors import RosyError
 from rosy_addon.field.generate import axis_field
 from rosy_addon.projection.camera import look_at, orthographic_camera
@@ -124,15 +124,6 @@ def test_pixels_without_a_number(look):
     }
     np.testing.assert_array_equal(rgb["values"][missing], rgb["one"][missing])
     assert (np.ptp(rgb["values"][~missing], axis=1) > 0.05).mean() > 0.5
-
-
-def test_streaks_darken_and_lighten_the_color():
-    """The hue is that of the map: the ratios of display values do not change."""
-    values = np.full(len(BALL.corner_vertex), 0.5)
-    look = replace(FLAT, gain=1.0, length=12, color_range=(0.0, 1.0), color_map="gray")
-    colors, _ = drawn([numbered(BALL, values)], look)
-    gray = to_linear(color_stops("gray").mean(axis=0))[0]
-    assert colors.std() > 0.02 and abs(np.median(colors) - gray) < 0.06
 
 
 def test_without_numbers_there_is_one_line():

@@ -12,7 +12,6 @@ from harness.planar import planar_pixel_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_fields import pair_angle, pixel_centers
-from scipy import ndimage
 
 from rosy_addon.compositor import fast_lic
 from rosy_addon.compositor.covering import build_covering
@@ -96,53 +95,6 @@ def test_the_sheet_of_the_next_pixel_is_the_best_match(degree, first_angle, seco
         assert match[sheet, chosen] > match[sheet].max() - 2e-4
 
 
-def test_the_directions_of_states_are_the_members_and_their_opposites():
-    angle, degree = 0.3, 5
-    covering = build_covering(
-        uniform_field(angle, degree, 4), pixel_look(LOOK), np.ones((16, 1), dtype=np.float32)
-    )
-    states = (
-        covering.state_table.reshape(2 * covering.line_count, -1, 4)[:, covering.cell_of_pixel, :2]
-        / 32767.0
-    )
-    expected = np.exp(1j * (angle + 2 * np.pi * np.arange(10) / 10))
-    actual = states[..., 0] + 1j * states[..., 1]
-    np.testing.assert_allclose(actual, np.broadcast_to(expected[:, None], actual.shape), atol=1e-4)
-
-
-def autocorrelations(image, angle, lags):
-    """Autocorrelations of the inner part of a picture at `lags` along and across a direction."""
-    image = image.reshape(512, 512)[45:-45, 45:-45]
-    power = np.abs(np.fft.fft2(image - image.mean())) ** 2
-    autocorrelation = np.fft.fftshift(np.fft.ifft2(power).real)
-    autocorrelation /= autocorrelation.max()
-    middle = image.shape[0] // 2
-    along = [np.sin(angle) * lags, np.cos(angle) * lags]
-    across = [np.cos(angle) * lags, -np.sin(angle) * lags]
-    return [
-        ndimage.map_coordinates(autocorrelation, np.add(direction, middle))
-        for direction in (along, across)
-    ]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("degree", [4, *long(2, 3, 6)])
-def test_streaks_match_brute_force_in_contrast_length_and_width(degree):
-    lags = np.array([1.0, 2.0, 3.0, 4.0])
-    stds, curves = [], []
-    for angle in (0.05, 0.37, 0.8, 1.1):
-        field = uniform_field(angle, degree, 512)
-        pair = [
-            images.members[0, :, 0] for images in (fast_images(field), brute_force_images(field))
-        ]
-        stds.append([np.std(image) for image in pair])
-        curves.append([autocorrelations(image, angle, lags) for image in pair])
-    actual, expected = np.mean(stds, axis=0)
-    assert actual == pytest.approx(expected, rel=0.02)
-    actual, expected = np.mean(curves, axis=0)
-    np.testing.assert_allclose(actual, expected, atol=0.035)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kernel", "degree"),
@@ -157,23 +109,6 @@ def test_pictures_of_singular_fields_resemble_brute_force(kernel, degree):
     # They are not equal, because each streak is shifted by up to half a pixel.
     assert np.corrcoef(actual, expected)[0, 1] > 0.85
     assert actual.std() == pytest.approx(expected.std(), rel=0.03)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("degree", [2, 3, 4])
-def test_the_surroundings_of_singularities_are_not_grainy(degree):
-    # Grain is the change from pixel to pixel. Breaking points would increase it as well.
-    field = singular_field(degree)
-    x, y = (axis.ravel() for axis in pixel_centers(SIZE))
-    near = np.zeros(SIZE * SIZE, dtype=bool)
-    for center in (0.33, 0.67):
-        near |= (x - center * SIZE) ** 2 + (y - SIZE / 2) ** 2 < 20**2
-
-    def grain(images):
-        image = images.blend[:, 0].reshape(SIZE, SIZE)
-        return ndimage.laplace(image).ravel()[near].std()
-
-    assert grain(fast_images(field)) < 1.15 * grain(brute_force_images(field))
 
 
 @pytest.mark.slow
@@ -217,11 +152,6 @@ def test_three_channels_are_three_pictures():
         np.testing.assert_allclose(together[..., channel], alone[..., 0], atol=2e-4)
 
 
-def test_the_same_input_gives_the_same_bytes():
-    field = singular_field(5)
-    assert fast_images(field).members.tobytes() == fast_images(field).members.tobytes()
-
-
 def test_long_streamlines_end_when_they_have_closed_a_loop():
     # The loops are circles of up to 201 pixels. The cost does not grow with the length.
     x, y = pixel_centers(64)
@@ -231,20 +161,6 @@ def test_long_streamlines_end_when_they_have_closed_a_loop():
     loop = 2 * np.pi * 31
     assert samples.max() < 4 * (256 + 2 * loop)
     assert np.median(samples) > 256
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
-def test_pictures_of_any_size(shape):
-    images = fast_images(planar_pixel_field(np.full(shape, 0.7), 3))
-    assert np.isfinite(images.members).all()
-    assert images.effective_samples.min() >= 1
-
-
-def test_an_undefined_field_shows_its_noise():
-    field = planar_pixel_field(np.full((20, 20), np.nan), 4)
-    images = fast_images(field)
-    assert (images.effective_samples == 1).all()
-    assert np.isfinite(images.blend).all()
 
 
 @pytest.mark.parametrize("degree", [1, 4])

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
-from conftest import long, mainly
 from harness.planar import lic, planar_pixel_field
 from planar_fields import pixel_centers
-from scipy import ndimage
 
 from bench import cases
 from rosy_addon.compositor import stages
@@ -26,9 +23,6 @@ from rosy_addon.core.cache import Cache
 from rosy_addon.projection.project import project
 
 LOOK = Look(method="ibfv")
-
-#: Pixels at the border of pictures whose streaks end early.
-MARGIN = 40
 
 
 def draw(
@@ -46,70 +40,6 @@ def uniform(angle: float, degree: int, size: int = 192) -> PixelField:
 
 def frame(values: np.ndarray, field: PixelField) -> np.ndarray:
     return values.reshape(field.height, field.width)
-
-
-def inside(image: np.ndarray, margin: int = MARGIN) -> np.ndarray:
-    return image[margin:-margin, margin:-margin]
-
-
-def angle_to(image: np.ndarray, direction: np.ndarray | complex) -> float:
-    """Return the mean angle from a direction to the streaks of an image, by the structure tensor."""
-    slope = ndimage.gaussian_filter(image, 1, order=(0, 1)) + 1j * (
-        ndimage.gaussian_filter(image, 1, order=(1, 0))
-    )
-    relative = inside(slope * np.conj(direction))
-    return float(0.5 * np.angle(-(relative**2).sum()))
-
-
-@pytest.mark.parametrize(
-    ("angle", "degree"),
-    mainly([(0.21, 1), (0.55, 3), (0.21, 4)], product([0.21, 0.55], [1, 2, 3, 4, 6])),
-)
-def test_streaks_have_the_directions_of_the_members(degree, angle):
-    field = uniform(angle, degree)
-    images = [draw(field, replace(LOOK, seed=seed)).members for seed in range(2)]
-    turn = 2 * np.pi / degree
-    first = angle - turn * np.rint(angle / turn)  # nearest to the guiding angle
-    for line in range(field.line_count):
-        member = np.exp(1j * (first + turn * line))
-        error = np.mean([angle_to(frame(image[line], field), member) for image in images])
-        assert np.degrees(abs(error)) < 0.7
-
-
-@pytest.mark.parametrize("degree", [1, 4])
-def test_streaks_follow_circles(degree):
-    """The mean error would be several degrees if steps were tangents."""
-    size = 256
-    x, y = pixel_centers(size)
-    angle = np.arctan2(y - size / 2, x - size / 2 - 200) + np.pi / 2
-    field = planar_pixel_field(angle, degree)
-    image = frame(draw(field).members[0], field)
-    # The line of the first image is nearest to the guiding angle.
-    turn = 2 * np.pi / degree
-    nearest = angle - turn * np.rint(angle / turn)
-    assert np.degrees(abs(angle_to(image, np.exp(1j * nearest)))) < 0.7
-
-
-DRIFTING = {"flow": 2.0}
-
-
-@pytest.mark.parametrize(
-    ("degree", "settings"),
-    [
-        (4, {}),
-        (1, {"fade": "ends"}),
-        (4, DRIFTING),
-        *long((1, {}), (4, {"fade": "ends"}), (1, DRIFTING)),
-    ],
-    ids=str,
-)
-def test_the_contrast_is_that_of_sheets(degree, settings):
-    stds = []
-    for method in ("ibfv", "sheets"):
-        look = Look(method=method, **settings)
-        images = [draw(uniform(angle, degree), look, drift=Drift(0.3)) for angle in (0.1, 0.4, 0.7)]
-        stds.append(np.std([inside(frame(i.members[0], uniform(0, 1))) for i in images]))
-    assert stds[0] == pytest.approx(stds[1], rel=0.06)
 
 
 def test_the_contrast_is_the_same_where_streaks_end():
@@ -289,15 +219,6 @@ def test_lines_across_the_guiding_angle_drift_both_ways():
     assert np.abs(row[110]) > 0.1 * np.abs(row).max()
 
 
-def test_the_contrast_is_the_same_in_all_frames():
-    field = uniform(0.3, 1)
-    stds = [
-        inside(frame(draw(field, FLOW, drift=drift_of(n)).members[0], field)).std()
-        for n in range(0, 40, 5)
-    ]
-    assert np.ptp(stds) < 0.1 * np.mean(stds)
-
-
 @pytest.mark.parametrize("degree", [1, 4])
 def test_a_loop_closes(degree):
     field = uniform(0.3, degree)
@@ -330,40 +251,3 @@ def test_frames_in_sequence_are_those_drawn_alone(monkeypatch):
 
 
 # --- fields and looks of all kinds ----------------------------------------------------------------
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (300, 1), (3, 5)])
-def test_pictures_of_any_size(shape):
-    images = draw(planar_pixel_field(np.full(shape, 0.7), 3))
-    assert np.isfinite(images.members).all()
-    assert images.effective_samples.min() >= 0.99
-
-
-def test_undefined_pixels_are_gray():
-    angle = np.full((60, 60), 0.4)
-    angle[20:40, 20:40] = np.nan
-    images = draw(planar_pixel_field(angle, 4))
-    assert np.isfinite(images.members).all()
-    hole = images.members[0].reshape(60, 60)[25:35, 25:35]
-    assert np.abs(hole - 0.5).max() < 0.1
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"hue": "noise"},
-        {"ink": "hatch", "breaks": 0.5, "overshoot": 5.0, "flow": 1.0},
-        {"anchor": "surface", "flow": 1.0},
-        {"hue": "magnitude", "magnitude_length": True},
-        {"fade": "tail"},
-        {"ink": "even", "breaks": 0.5, "flow": 1.0},
-        {"length": 1},
-    ],
-    ids=str,
-)
-def test_looks(settings):
-    for degree in (3, 4):
-        gbuffer = project([cases.instance(2000, degree)], cases.camera(64))
-        picture = compose(gbuffer, LOOK.with_settings(settings))
-        assert np.isfinite(picture.rgba).all()
-        assert picture.rgba[..., :3][picture.rgba[..., 3] > 0].std() > 0.01

@@ -76,7 +76,7 @@ def test_thresholds_draw_the_lines_of_a_picture(breaks, wobble, grain):
         assert is_clear.mean() > 0.9
 
 
-def random_lines(lines: int, count: int = 200_000, seed: int = 1):
+def random_lines(lines: int, count: int = 40_000, seed: int = 1):
     """Independent thresholds, evenly distributed, and random places of the lines."""
     rng = np.random.default_rng(seed)
     first = rng.dirichlet(np.full(lines, 0.5), count).T.astype(np.float32)
@@ -106,7 +106,8 @@ def test_ordered_thresholds_transmit_what_the_tone_asks(lines, layers, layering)
             for share in layer_shares(np.array(1 - transmittance), layers, layering)
         ]
         bare = np.all([t > c for t, c in zip(ordered, coverages, strict=True)], axis=0)
-        assert bare.mean() == pytest.approx(transmittance, abs=0.006)
+        # The standard error of a share of 40,000 samples is at most 0.0025.
+        assert bare.mean() == pytest.approx(transmittance, abs=0.01)
 
 
 def test_lines_keep_their_thresholds_where_none_swap():
@@ -121,7 +122,7 @@ def test_lines_keep_their_thresholds_where_none_swap():
 
 def test_ink_of_lines_in_equal_places_is_that_of_both():
     """Each is as dark as the other, and where neither has ink, there is none."""
-    thresholds, _ = random_lines(2, 100_000)
+    thresholds, _ = random_lines(2)
     first = np.full_like(thresholds, 0.5)
     undefined = np.zeros(thresholds.shape[1], dtype=bool)
     ordered = ordered_thresholds(thresholds, cyclic_places(first), undefined, INK)
@@ -136,22 +137,22 @@ def test_ink_of_lines_in_equal_places_is_that_of_both():
 
 def test_ordered_thresholds_are_continuous():
     """Neither where two lines swap, nor where one of them begins before the other, is there a jump."""
-    count = 100_001
+    count = 20_001
     share = np.linspace(0, 1, count, dtype=np.float32)
     undefined = np.zeros(count, dtype=bool)
-    for first, second, third in np.random.default_rng(5).random((10, 3), dtype=np.float32) * 0.9:
+    for first, second, third in np.random.default_rng(5).random((4, 3), dtype=np.float32) * 0.9:
         thresholds = np.broadcast_to(np.array([[first], [second], [third]]), (3, count))
         places = cyclic_places(np.stack([share, 1 - share, 0 * share]))
         ordered = ordered_thresholds(thresholds, places, undefined, INK)
         # A jump would not get smaller with the steps.
-        assert np.abs(np.diff(ordered, axis=1)).max() < 0.005
+        assert np.abs(np.diff(ordered, axis=1)).max() < 0.025
 
 
 def test_undefined_pixels_have_the_ink_of_all_lines():
     """There the first line alone transmits what the tone asks."""
     rng = np.random.default_rng(2)
-    thresholds = rng.random((3, 100_000), dtype=np.float32)
-    everywhere = np.ones(100_000, dtype=bool)
+    thresholds = rng.random((3, 40_000), dtype=np.float32)
+    everywhere = np.ones(40_000, dtype=bool)
     places = cyclic_places(np.full_like(thresholds, 1 / 3))
     ordered = ordered_thresholds(thresholds, places, everywhere, INK)
     assert (ordered[1:] > 0.999).all()
@@ -161,8 +162,8 @@ def test_undefined_pixels_have_the_ink_of_all_lines():
         assert bare == pytest.approx(transmittance, abs=0.02)
 
 
-@pytest.mark.parametrize("ink", ["hatch", "even"])
-@pytest.mark.parametrize("supersampling", [1, 2])
+@pytest.mark.slow
+@pytest.mark.parametrize(("ink", "supersampling"), [("hatch", 1), ("even", 2)])
 def test_thresholds_of_a_picture_draw_its_ink(ink, supersampling):
     """At any tone: a torus in the light of the camera, whose contour has all of them."""
     look = replace(INK, ink=ink, layers=2, supersampling=supersampling, light="headlight")

@@ -7,18 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import mainly
-from harness.planar import degree_layers
-from scipy.ndimage import gaussian_filter
-from shapes import from_quads, grid_of_quads, icosphere, plane
+from shapes import icosphere, plane
 
-from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.shading import Light, diffuse
 from rosy_addon.compositor.target_tone import ReferenceRender, apply_tone_curve, target_tone
-from rosy_addon.core.cache import Cache
-from rosy_addon.core.color import from_hex, to_display, to_linear
 from rosy_addon.field.generate import axis_field
-from rosy_addon.preset_files.store import load_preset, preset_keys
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 from rosy_addon.projection.gbuffer import MeshInstance
 from rosy_addon.projection.project import project
@@ -30,8 +24,6 @@ from rosy_addon.projection.surface_tone import SurfaceTone
 pytestmark = pytest.mark.slow
 
 SIZE = 384
-PRESETS = {name: load_preset(name).look for name in preset_keys()}
-HATCHED = [name for name, look in PRESETS.items() if look.ink != "soft"]
 BALL = icosphere(5)
 
 
@@ -62,75 +54,6 @@ def world_positions(gbuffer):
 
 
 # --- attributes -----------------------------------------------------------------------------------
-
-
-def relative_lightness(rgba, look):
-    """(H, W) lightness, from 0 at the darker of ink and paper to 1 at the lighter."""
-    paper, ink = (to_linear(from_hex(code)) for code in (look.paper_color, look.ink_color))
-    channel = int(np.argmax(np.abs(paper - ink)))
-    darker, lighter = sorted((paper[channel], ink[channel]))
-    return (rgba[..., channel] - darker) / (lighter - darker)
-
-
-def blurred(gbuffer, values, sigma=16):
-    """(n,) blurred values of covered pixels, where the blur contains almost only such pixels."""
-    size = gbuffer.camera.height, gbuffer.camera.width
-    visible = np.zeros(size[0] * size[1])
-    visible[gbuffer.pixel] = 1
-    visible = visible.reshape(size)
-    fraction = gaussian_filter(visible, sigma)
-    inner = fraction > 0.98
-    return gaussian_filter(np.where(visible > 0, values, 0), sigma)[inner] / fraction[inner]
-
-
-@pytest.mark.parametrize("name", mainly(HATCHED[2:3], HATCHED))
-def test_presets_reproduce_a_ramp_on_the_surface(name):
-    """Ink on paper, blurred over 16 pixels, has the tone of an attribute from 0 to 1 on a ball.
-
-    A blur contains few broad streaks. So the mean absolute error over several seeds is bounded, and
-    the mean error, without its random part, is bounded more tightly.
-    """
-    ramp = np.clip(BALL.vertices[:, 0] * 0.62 + 0.5, 0, 1)
-    instance = make_instance(BALL, tone=tone_from_vertices(BALL, ramp))
-    camera = make_camera()
-    gbuffer = project([instance], camera)
-    expected = np.zeros(SIZE * SIZE)
-    expected[gbuffer.pixel] = np.clip(world_positions(gbuffer)[:, 0] * 0.62 + 0.5, 0, 1)
-    expected = blurred(gbuffer, expected.reshape(SIZE, SIZE))
-    assert expected.min() < 0.15 and expected.max() > 0.85
-    fine = project([instance], camera.scaled(PRESETS[name].supersampling))
-    errors = []
-    for seed in range(3):
-        look = replace(PRESETS[name], tone="attribute", seed=seed)
-        errors.append(
-            blurred(gbuffer, relative_lightness(compose(fine, look).rgba, look)) - expected
-        )
-    assert np.abs(errors).mean() <= 0.04
-    assert abs(np.mean(errors)) <= 0.02
-
-
-def contrast(look, tone):
-    """The standard deviation of display values on a wall of one tone."""
-    surface = plane(1, 1, 4.0)
-    surface_tone = SurfaceTone(np.full((4, 1), tone, dtype=np.float32))
-    instance = MeshInstance(
-        surface, np.eye(4), axis_field(surface, 4, (1.0, 0.2, 0.0)), surface_tone
-    )
-    camera = camera_above(128, scale=3.0).scaled(look.supersampling)
-    rgba = compose(project([instance], camera), replace(look, tone="attribute")).rgba
-    luminance = rgba[..., 1] * rgba[..., 3] + 1 - rgba[..., 3]
-    return to_display(luminance).std()
-
-
-@pytest.mark.parametrize("name", mainly(HATCHED[::4], HATCHED))
-def test_lines_have_contrast_in_dark_tones(name):
-    assert contrast(PRESETS[name], 0.1) >= 0.9 * contrast(PRESETS[name], 0.9) > 0.08
-
-
-def test_soft_streaks_lose_contrast_in_dark_tones():
-    """Soft streaks are multiplied by the light, in contrast to lines of hatching."""
-    soft = Look(gain=1.5)
-    assert contrast(soft, 0.1) < 0.6 * contrast(soft, 0.9)
 
 
 def test_attributes_are_interpolated_over_triangles():
@@ -181,41 +104,21 @@ def test_missing_tones_are_refused(tone, error_of):
     assert tone in error_of(target_tone, gbuffer, Look(tone=tone))
 
 
-def test_lic_images_do_not_depend_on_the_tone():
-    """Changes of the tone reuse the cached LIC images."""
-    gbuffer = project(
-        [make_instance(BALL, tone=tone_from_vertices(BALL, BALL.vertices[:, 0]))], make_camera(96)
-    )
-    cache = Cache()
-    first = degree_layers(gbuffer, Look(), cache)[0].images
-    for other in (
-        {"tone": "attribute"},
-        {"tone_levels": (0.0, 1.0, 2.0)},
-        {"shadows": True, "light": "lamp"},
-    ):
-        assert degree_layers(gbuffer, Look(**other), cache)[0].images is first
-
-
 # --- the curve -------------------------------------------------------------------------------------
 
 
-def test_the_default_tone_curve_is_the_identity():
-    tone = np.array([0.0, 0.3, 1.0, 1.7], dtype=np.float32)
-    np.testing.assert_array_equal(apply_tone_curve(tone, Look()), tone)
-
-
-def test_black_white_and_gamma():
-    look = Look(tone_levels=(-1.0, 3.0, 2.0))
-    tones = np.array([-2.0, -1.0, 0.0, 1.0, 3.0], dtype=np.float32)
-    np.testing.assert_allclose(
-        apply_tone_curve(tones, look), [0, 0, 0.5, np.sqrt(0.5), 1], atol=1e-6
-    )
-
-
-def test_black_above_white_inverts_tones():
-    look = Look(tone_levels=(1.0, 0.0, 1.0))
-    tones = np.array([0.0, 0.25, 1.0], dtype=np.float32)
-    np.testing.assert_allclose(apply_tone_curve(tones, look), [1, 0.75, 0], atol=1e-6)
+@pytest.mark.parametrize(
+    ("levels", "tones", "expected"),
+    [
+        (Look().tone_levels, [0.0, 0.3, 1.0, 1.7], [0.0, 0.3, 1.0, 1.7]),
+        ((-1.0, 3.0, 2.0), [-2.0, -1.0, 0.0, 1.0, 3.0], [0, 0, 0.5, 0.5**0.5, 1]),
+        ((1.0, 0.0, 1.0), [0.0, 0.25, 1.0], [1, 0.75, 0]),
+    ],
+    ids=["default", "gamma", "inverted"],
+)
+def test_tone_curves(levels, tones, expected):
+    actual = apply_tone_curve(np.array(tones, dtype=np.float32), Look(tone_levels=levels))
+    np.testing.assert_allclose(actual, expected, atol=1e-6)
 
 
 def test_equal_black_and_white_are_a_threshold():
@@ -418,47 +321,3 @@ def test_the_headlight_casts_no_shadows():
     np.testing.assert_array_equal(
         diffuse(gbuffer, Look(shadows=True)), diffuse(gbuffer, Look(shadows=False))
     )
-
-
-def rays_hit_triangles(origin, direction, corners):
-    """(n,) whether rays from (n, 3) points hit any of (T, 3, 3) triangles."""
-    a, b, c = corners.transpose(1, 0, 2)
-    p = np.cross(direction, c - a)
-    divisor = np.einsum("ti,ti->t", b - a, p)
-    hit = np.zeros(len(origin), dtype=bool)
-    for start in range(0, len(origin), 512):
-        offset = origin[start : start + 512, None] - a
-        u = np.einsum("nti,ti->nt", offset, p) / divisor
-        q = np.cross(offset, b - a)
-        v = q @ direction / divisor
-        t = np.einsum("nti,ti->nt", q, c - a) / divisor
-        hit[start : start + 512] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)).any(axis=1)
-    return hit
-
-
-def test_shadows_match_ray_casting():
-    """A torus that stands on the ground and shadows itself, against ray casting."""
-    quads, count = grid_of_quads(48, 24, True, True)
-    u, v = np.divmod(np.arange(count), 24)
-    u, v = u * 2 * np.pi / 48, v * 2 * np.pi / 24
-    out = 1.0 + 0.35 * np.cos(v)
-    points = np.stack([out * np.cos(u), -0.35 * np.sin(v), out * np.sin(u)], axis=1)
-    ring = from_quads(points, quads, name="ring")
-    instances = [make_instance(plane(2, 2, 6.0), moved_and_scaled(0, 0, -1.5)), make_instance(ring)]
-    camera = make_camera(128, position=(2.5, -6, 2.5), target=(0, 0, -0.4), fov=0.75)
-    gbuffer = project(instances, camera)
-    assert gbuffer.front_facing.all()
-    direction = np.array([0.6, 0.3, 0.7]) / np.linalg.norm([0.6, 0.3, 0.7])
-    light = sun_light(camera, direction)
-    visibility = shadow_visibility(gbuffer, light_cameras(instances, camera, "sun", light.vector))
-    origin = (
-        world_positions(gbuffer).astype(float)
-        + 1e-3 * gbuffer.geometric_normal @ camera.view[:3, :3]
-    )
-    hit = rays_hit_triangles(origin, direction, points[ring.triangle_vertex])
-    assert 0.1 < hit.mean() < 0.7
-    # Grazing light is left out, and so are the soft borders of shadows.
-    certain = np.abs(gbuffer.geometric_normal @ light.vector) > 0.1
-    certain &= (visibility < 0.01) | (visibility > 0.99)
-    assert certain.mean() > 0.9
-    assert ((visibility > 0.5) == ~hit)[certain].mean() > 0.995

@@ -40,13 +40,6 @@ def limit_memory(monkeypatch, free: float) -> None:
 # --- what is free ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("count", "text"), [(8.5e8, "850 MB"), (9.06e9, "9.1 GB"), (2.1e10, "21 GB")]
-)
-def test_bytes_as_text(count, text):
-    assert memory.format_bytes(count) == text
-
-
 def test_limits_of_control_groups(tmp_path):
     """Of the group and of the one around it; files that are only cached are free."""
     (tmp_path / "proc/self").mkdir(parents=True)
@@ -124,32 +117,6 @@ def traced_peak(work) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="the peak is measured on Linux")
-@pytest.mark.parametrize(
-    "name",
-    [
-        "512 x 512, default",
-        "512 x 512, pen-and-ink",
-        "512 x 512, paper",
-        "512 x 512, 300K triangles",
-        "1024 x 1024, N = 6",
-        "3840 x 2160, two processes",
-    ],
-)
-def test_the_bound_is_within_a_factor_of_two(name):
-    """Of the resident memory that the picture takes in processes of its own."""
-    completed = subprocess.run(
-        [sys.executable, "-m", "bench.memory", "--estimate", name],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    bound, taken = map(float, completed.stdout.split())
-    assert 0.5 < bound / taken < 2
-
-
 def test_a_picture_in_strips_needs_less_than_a_whole_one():
     """And more processes need more."""
     view = ball_view(4000, 4000)
@@ -161,20 +128,6 @@ def test_a_picture_in_strips_needs_less_than_a_whole_one():
     )
     assert one < 0.5 * whole
     assert one < two < whole
-
-
-@pytest.mark.slow
-def test_a_wide_high_pass_takes_no_more_than_a_narrow_one():
-    """Beyond a margin around the picture, the mean of the noise is known."""
-    pixel = np.arange(24 * 24, dtype=np.int32)
-
-    def noise(high_pass: float) -> np.ndarray:
-        return image_noise.image_noise(pixel, 24, 1.5, 0, 1, high_pass=high_pass)
-
-    widest_full_margin = image_noise.MAX_MARGIN / (3 * image_noise.BLUR_FACTOR)
-    peaks = [traced_peak(lambda x=x: noise(x)) for x in (1024.0, widest_full_margin)]
-    assert peaks[0] < 2 * peaks[1]
-    assert abs(noise(1024.0).mean() - image_noise.NOISE_MEAN) < 0.1
 
 
 # --- refusals -------------------------------------------------------------------------------------

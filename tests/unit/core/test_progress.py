@@ -59,27 +59,6 @@ def test_parts_are_scaled_within_parts():
     assert fractions == [0.0, 0.5, 0.75, 0.75, 0.875, 1.0]
 
 
-def test_a_part_without_an_end_takes_no_time():
-    def work():
-        with progress(0.25):
-            steps(0.0, 0.5, 1.0)
-
-    assert [fraction for fraction, _ in reported(work)] == [0.25] * 3
-
-
-def test_the_outermost_label_replaces_those_within():
-    def work():
-        report(0.0, "first")
-        with progress(0.0, 1.0, "outer"):
-            report(0.0, "second")
-            with progress(0.0, 1.0, "inner"):
-                report(0.0, "third")
-        with progress(0.0, 1.0):
-            report(0.0, "fourth")
-
-    assert [label for _, label in reported(work)] == ["first", "outer", "outer", "fourth"]
-
-
 def test_nobody_need_listen():
     with progress(0.0, 1.0):
         report(0.5, "unheard")
@@ -149,14 +128,17 @@ LONG = {
     "picture": (picture, (Look(),), 0.9),
     "strokes": (
         draw_instances,
-        ([INSTANCE], CAMERA, StrokeStyle(arrows=30.0, overshoot=4.0, outline=True)),
+        ([INSTANCE], CAMERA, StrokeStyle(spacing=20.0, arrows=30.0, overshoot=4.0, outline=True)),
         0.9,
     ),
     "texture": (texture, (Look(length=20),), 0.9),
 }
 
 
-@pytest.mark.parametrize("name", LONG)
+STROKES = pytest.param("strokes", marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("name", [name if name != "strokes" else STROKES for name in LONG])
 def test_progress_never_goes_back(name):
     function, arguments, last = LONG[name]
     fractions = [fraction for fraction, _ in reported(function, *arguments)]
@@ -165,7 +147,7 @@ def test_progress_never_goes_back(name):
     assert 0 <= fractions[0] < 0.1 and last <= fractions[-1] <= 1 + 1e-9
 
 
-@pytest.mark.parametrize("name", ["form", "picture", "strokes"])
+@pytest.mark.parametrize("name", ["form", "picture", STROKES])
 def test_a_listener_ends_the_work(name):
     """And what is left does not change what is done next."""
     function, arguments, _ = LONG[name]
@@ -177,6 +159,7 @@ def test_a_listener_ends_the_work(name):
     assert len(reported(function, *arguments)) <= count
 
 
+@pytest.mark.slow
 def test_listening_does_not_change_pixels():
     view = ViewInput((INSTANCE,), CAMERA, load_preset("pen-and-ink").look, (SUN,))
     alone = draw_picture(view).rgba

@@ -49,17 +49,6 @@ def write_off(path, surface):
 # --- there and back --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("ending", [".rosy", ".rawfield", ".txt", ".npy"])
-@pytest.mark.parametrize("degree", [1, 2, 3, 4, 7, 12])
-def test_members_round_trip_exactly(ending, degree, tmp_path):
-    field = axis_field(BALL, degree, (0.3, -0.2, 1.0))
-    path = tmp_path / f"a{ending}"
-    write_field(path, field, BALL)
-    again = read_field(path, BALL, degree)
-    assert again.degree == degree and again.direction_ratios is None
-    assert np.array_equal(again.vectors, field.vectors)
-
-
 @pytest.mark.parametrize("ending", [".rawfield", ".txt", ".npy"])
 @pytest.mark.parametrize("degree", [2, 4, 5])
 def test_free_directions_round_trip_exactly(ending, degree, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 from field_helpers import read_field
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shapes import cylinder, from_quads, icosphere, plane, torus
+from shapes import cylinder, from_quads, plane, torus
 
 from rosy_addon.field.field_io import write_field
 from rosy_addon.field.frames import dot
@@ -73,7 +73,7 @@ component = st.just(0.0) | st.floats(1e-29, 1e29) | st.floats(-1e29, -1e-29)
 @given(
     st.integers(1, 12),
     st.lists(st.tuples(component, component), min_size=6, max_size=6),
-    st.sampled_from([".rosy", ".rawfield"]),
+    st.sampled_from([".rosy", ".rawfield", ".txt", ".npy"]),
 )
 def test_written_fields_are_read_back_exactly(tmp_path, degree, vectors, ending):
     vectors = np.concatenate([np.array(vectors), np.zeros((6, 1))], axis=1)
@@ -168,15 +168,6 @@ def test_damaged_files_raise_one_line_errors(name, tmp_path, error_of):
     assert peak < 1e6, "a claim in a header must not be believed"
 
 
-def test_a_huge_binary_file_is_refused_before_it_is_read(tmp_path, error_of):
-    with open(tmp_path / "huge.rosy", "wb") as file:
-        file.truncate(2 << 30)  # a sparse file, which takes no space
-    tracemalloc.start()
-    assert "binary data" in error_of(read_field, tmp_path / "huge.rosy", SQUARES)
-    assert tracemalloc.get_traced_memory()[1] < 1e6
-    tracemalloc.stop()
-
-
 def test_missing_file_and_conflicting_degree(tmp_path, error_of):
     assert "no such file" in error_of(read_field, tmp_path / "none.rosy", SQUARES)
     (tmp_path / "a.rosy").write_text(rosy_text(WEST))
@@ -247,11 +238,6 @@ def test_the_field_is_undefined_on_faces_without_area():
     assert field.magnitude.tolist() == [np.sqrt(2), 0]
 
 
-def test_a_wrong_count(error_of):
-    message = error_of(validated_field, SQUARES, np.ones((5, 3)), 4, "mesh 'A', attribute 'rosy'")
-    assert "mesh 'A', attribute 'rosy': contains 5 vectors, but plane has 6 faces and 12" in message
-
-
 def test_the_domain_decides_if_both_counts_agree(error_of):
     surface = torus(24, 12)  # as many faces as vertices
     assert surface.face_count == len(surface.vertices)
@@ -263,22 +249,6 @@ def test_the_domain_decides_if_both_counts_agree(error_of):
     z, expected = (face_representation(surface, f) for f in (field, RosyField(4, exact)))
     assert np.abs(np.angle(z / expected)).max() < 1e-9
     assert "not tangent to the surface" in error_of(validated_field, surface, around, 4, "here")
-
-
-def test_the_mean_does_not_depend_on_the_members_at_vertices():
-    surface = icosphere(2)
-    normal = surface.vertices
-    tangent = np.cross(normal, (0.2, 0.5, 1.0))
-    generator = np.random.default_rng(1)
-    for degree in (2, 3, 4, 5):
-        angle = 2 * np.pi / degree * generator.integers(0, degree, len(normal))[:, None]
-        others = np.cos(angle) * tangent + np.sin(angle) * np.cross(normal, tangent)
-        first, second = (
-            face_representation(surface, validated_field(surface, vectors, degree, "here"))
-            for vectors in (tangent, others)
-        )
-        # The vertex normals are those of the polyhedron, so the rotations are not quite exact.
-        assert np.abs(first - second).max() < 2e-3
 
 
 def test_a_field_belongs_to_the_rest_shape():

@@ -50,14 +50,6 @@ def test_strokes_on_a_sphere_are_followed(degree):
     assert max(stroke_error(BALL, soft, stroke) for stroke in strokes) < 2
 
 
-def test_jitter_of_strokes_is_smoothed():
-    strokes, trembling = great_circles(1), great_circles(1, tremble=0.004)
-    straight, shaken = (guides_from_strokes(BALL, some, 2) for some in (strokes, trembling))
-    both = straight.any(axis=1) & shaken.any(axis=1)
-    off = np.degrees(np.arccos(np.abs(dot(straight, shaken)[both]).clip(0, 1)))
-    assert both.sum() > 5 and np.median(off) < 8
-
-
 def test_strokes_far_from_the_surface_are_refused(error_of):
     for stroke, expected in (
         (((9, 9, 9), (9, 9, 8)), "no stroke is near the surface"),

@@ -14,11 +14,7 @@ from rosy_addon.field.carry import vectors_on_rest_shape
 from rosy_addon.field.convert import rotate_field
 from rosy_addon.field.directional_field import field_directions, tensor_field
 from rosy_addon.field.interpolation import interpolate_fields
-from rosy_addon.field.representation import (
-    face_frames,
-    face_representation,
-    from_representation,
-)
+from rosy_addon.field.representation import face_frames, face_representation, from_representation
 from rosy_addon.field.rosy_field import RosyField
 from rosy_addon.field.surface import have_same_polygons
 from rosy_addon.projection.face_values import face_values

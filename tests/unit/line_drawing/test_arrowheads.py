@@ -66,6 +66,7 @@ def test_arrowheads_point_along_a_member(name, case):
     assert len(heads) > 10 and is_right.all()
 
 
+@pytest.mark.slow
 def test_lines_without_a_direction_have_no_arrowheads():
     ball = icosphere(2)
     assert len(drawn(ball, generate(ball, "smoothest", 4))[1]) == 0

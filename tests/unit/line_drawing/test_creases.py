@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapes import cylinder, instance_of, sharp_cube, torus
+from shapes import cylinder, instance_of, sharp_cube
 
 from rosy_addon.compositor.shading import Light
 from rosy_addon.field.generate import axis_field
@@ -66,19 +66,3 @@ def test_strokes_do_not_crowd_at_silhouettes():
     assert gaps[0] > 2.5 and gaps[2] > 4.0
     # The lines reach the silhouettes at 200 - 166.7 and 200 + 166.7.
     assert x[0] < 42 and x[-1] > 358
-
-
-@pytest.mark.slow
-def test_strokes_are_smooth_across_the_edges_of_faces():
-    """The coarse torus bends by 30 degrees at its edges; lines cross them without such corners."""
-    surface = torus(24, 12, 1.0, 0.4)
-    instance = MeshInstance(surface, np.eye(4), axis_field(surface, 4, (0, 0, 1)))
-    camera = orthographic_camera(look_at((0, -4, 3), (0, 0, 0)), 400, 400, scale=3.2)
-    strokes = draw_instances([instance], camera, StrokeStyle(spacing=12.0, outline=True)).strokes
-    pixels, _ = project_to_pixels(strokes.points, camera)
-    step = np.diff(pixels, axis=0)
-    angle = np.arctan2(step[:, 1], step[:, 0])
-    turn = np.abs((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi)
-    is_inner = (np.diff(strokes.stroke)[1:] == 0) & (np.diff(strokes.stroke)[:-1] == 0)
-    is_inner &= (np.hypot(*step.T)[1:] > 0.05) & (np.hypot(*step.T)[:-1] > 0.05)
-    assert np.degrees(np.quantile(turn[is_inner], 0.995)) < 8

@@ -6,7 +6,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from harness.stroke_tracing import visible_strokes
 from shapes import icosphere, instance_of, moved, plane, sharp_cube
 
 from rosy_addon.field.frames import dot, normalize
@@ -222,17 +221,6 @@ def test_with_hidden_strokes_extensions_are_straight_in_space():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hidden", [False, True])
-def test_points_beside_and_behind_the_camera_are_finite(hidden):
-    floor = instance_of(plane(20, 20, size=40.0), 2, ALONG_X)
-    camera = perspective_camera(look_at((0, -10, 3), (0, 0, 0)), 200, 150, fov=np.radians(40))
-    style = StrokeStyle(spacing=20, overshoot=MAX_PIXELS, hidden=hidden)
-    strokes = draw_instances([floor], camera, style, clip_to_frame=False).strokes
-    assert np.isfinite(strokes.points).all() and np.isfinite(strokes.width).all()
-    assert np.abs(strokes.points[:, 2]).max() < 1e-3
-
-
-@pytest.mark.slow
 def test_extensions_double_short_strokes():
     """Each end is extended by at most half the length."""
     traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))
@@ -241,10 +229,3 @@ def test_extensions_double_short_strokes():
     depth_buffer = rasterize_depth([SQUARE], TOP_CAMERA)
     extended = extend_free_ends(short, TOP_CAMERA, 100.0, depth_buffer)
     assert np.allclose(pixel_growth(short, extended, TOP_CAMERA), 100 * short.length)
-
-
-@pytest.mark.slow
-def test_ends_of_traced_strokes_are_not_free():
-    traced = strokes_of((SQUARE,), TOP_CAMERA, StrokeStyle(spacing=6, taper=0))
-    for strokes in (traced, visible_strokes(traced, [SQUARE], TOP_CAMERA)):
-        assert not strokes.free_end_mask.any()

@@ -6,23 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import long
-from harness.stroke_tracing import visible_strokes
 from shapes import icosphere, instance_of, moved, plane, torus
 
-from rosy_addon.line_drawing.mesh_in_view import (
-    HIDDEN_MARGIN,
-    seen_triangles,
-    triangles_near,
-)
-from rosy_addon.line_drawing.pipeline import draw_instances
-from rosy_addon.line_drawing.style import StrokeStyle
+from rosy_addon.line_drawing.mesh_in_view import HIDDEN_MARGIN, seen_triangles, triangles_near
 from rosy_addon.line_drawing.tangent_mesh import build_tangent_mesh
-from rosy_addon.line_drawing.visibility import (
-    in_frame,
-    project_to_pixels,
-    rasterize_depth,
-)
+from rosy_addon.line_drawing.visibility import in_frame, project_to_pixels, rasterize_depth
 from rosy_addon.projection.camera import look_at, orthographic_camera, perspective_camera
 
 
@@ -90,37 +78,3 @@ def test_the_margin_is_a_distance_on_the_surface():
     assert abs(reach / spacing - HIDDEN_MARGIN) < 0.1 * HIDDEN_MARGIN
     assert not triangles_near(mesh, np.zeros(len(x), bool), np.full((len(x), 3), spacing)).any()
     assert triangles_near(mesh, first, np.full((len(x), 3), 1.0)).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("surface", [torus(32, 16), *long(icosphere(3))], ids=["torus", "sphere"])
-def test_strokes_in_view_are_as_dense_as_those_of_the_whole_surface(surface):
-    """Both drawings have the same length of strokes in each part of the picture.
-
-    The length scatters by one or two percent from view to view, so that of two views counts.
-    """
-    instances, totals = [instance(surface)], []
-    for eye in ((0, -5, 3), (3, -4, 1)):
-        camera = orthographic_camera(look_at(eye, (0, 0, 0)), 400, 400, scale=2.6)
-        drawn = draw_instances(instances, camera, StrokeStyle(spacing=10)).strokes
-        whole = draw_instances(instances, camera, StrokeStyle(spacing=10, hidden=True)).strokes
-        whole = visible_strokes(whole, instances, camera)
-        lengths = [length_by_cell(strokes, camera, 50) for strokes in (drawn, whole)]
-        totals.append([length.sum() for length in lengths])
-        full = lengths[1] > 0.5 * np.percentile(lengths[1], 95)
-        assert full.sum() >= 8
-        ratio = lengths[0][full] / lengths[1][full]
-        assert abs(ratio.mean() - 1) < 0.05 and ratio.min() > 0.7
-    drawn_total, whole_total = np.sum(totals, axis=0)
-    assert abs(drawn_total / whole_total - 1) < 0.03
-
-
-def length_by_cell(strokes, camera, size):
-    middle = (strokes.points[1:] + strokes.points[:-1]) / 2
-    length = np.linalg.norm(np.diff(strokes.points, axis=0), axis=1)
-    length[strokes.start[1:-1] - 1] = 0
-    clip = middle @ (camera.projection @ camera.view)[:2, :3].T
-    clip += (camera.projection @ camera.view)[:2, 3]
-    cells = ((clip + 1) / 2 * camera.width / size).astype(int)
-    count = -(-camera.width // size)
-    return np.bincount(cells[:, 1] * count + cells[:, 0], length, count * count)

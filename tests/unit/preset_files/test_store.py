@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,6 @@ from rosy_addon.preset_files.store import (
     MAX_NAME_LENGTH,
     SHIPPED_FOLDER,
     Preset,
-    changed_settings,
     load_preset,
     preset_files,
     preset_key,
@@ -143,11 +141,6 @@ def test_a_byte_order_mark_is_ignored(tmp_path):
     assert read_preset(tmp_path / "b.json") == MINE
 
 
-def test_a_look_without_changes_has_no_settings():
-    assert changed_settings(Look()) == {}
-    assert changed_settings(Look(gain=2.5, seed=3)) == {"seed": 3}
-
-
 #: Whether Python's JSON reader refuses deep nesting. Later versions may reach the end of the file.
 SHALLOW = sys.version_info < (3, 14)
 
@@ -160,14 +153,10 @@ SETTINGS = {
     '"seed": ' + "9" * 3000: "setting 'seed' is 999",
     '"gain": NaN': "setting 'gain' is nan",
     '"gain": 1e999': "setting 'gain' is inf",
-    '"gain": null': "setting 'gain' is None, expected a number",
     '"hue": ["one"]': "setting 'hue' is ['one'], expected one of",
-    '"hue": {}': "setting 'hue' is {}, expected one of",
     f'"hue": "{"x" * 60_000}"': "setting 'hue' is 'xxx",
     '"length": true': "setting 'length' is True, expected a whole number",
     '"length": 1.5': "setting 'length' is 1.5, expected a whole number",
-    '"length": -3': "setting 'length' is -3",
-    '"view_plane": 1': "setting 'view_plane' is 1, expected true or",
     '"ink_color": "#12345g"': "'#12345g', expected a color",
     '"ink_color": "#123456\\n"': "expected a color",
     '"gain": 1, "gain": 2': "'gain' appears twice",
@@ -179,7 +168,6 @@ SETTINGS = {
 #: Names of presets, as JSON, and the error.
 BAD_NAMES = {
     "3": "the name of the preset must be text, not 3",
-    "[]": "the name of the preset must be text, not []",
     '""': "a letter or a digit",
     '"../.."': "a letter or a digit",
     f'"{"a" * 49}"': "has 49 characters, more than 48",
@@ -313,15 +301,6 @@ def test_a_saved_preset_is_found(user_folder):
         )
 
 
-def test_previews_of_looks_that_need_a_scene():
-    """The tone is the light. The numbers run from left to right, through the whole map."""
-    look = Look(hue="values", color_range=(90.0, 0.0), tone="attribute", shading=0.0)
-    colors = draw_preview(look).reshape(-1, 4)[:, :3]
-    is_purple = (colors[:, 2] > 2 * colors[:, 1]) & (colors[:, 0] > colors[:, 1])
-    is_yellow = (colors[:, 1] > 3 * colors[:, 2]) & (colors[:, 0] > 0.3 * colors[:, 1])
-    assert is_purple.sum() > 200 and is_yellow.sum() > 200
-
-
 def test_presets_are_replaced_only_on_request(user_folder, blank_previews, error_of):
     save_preset(MINE, user_folder)
     other = MINE._replace(name="my INK", look=Look(length=7))
@@ -342,16 +321,8 @@ def test_shipped_presets_cannot_be_replaced(user_folder, blank_previews, error_o
 @pytest.mark.parametrize("key", preset_keys())
 def test_presets_are_found_by_their_names(key, user_folder):
     preset = load_preset(key)
-    assert (
-        load_preset(preset.name, user_folder)
-        == load_preset(preset.name.upper(), user_folder)
-        == preset
-    )
-
-
-def test_presets_are_found_by_their_keys_in_other_letters():
-    """Also where the name has other words than the key."""
-    assert load_preset("Paper") == load_preset("paper") == load_preset("palacios & zhang")
+    for name in (key.title(), preset.name, preset.name.upper()):
+        assert load_preset(name, user_folder) == preset
 
 
 @pytest.mark.parametrize("name", ["../../outside", "/outside", "..\\outside", "out\0side"])
@@ -385,10 +356,6 @@ def test_only_user_presets_are_deleted(user_folder, blank_previews, error_of, na
     assert "not one of your presets" in error_of(remove_preset, name, user_folder / "..")
     assert "not one of your presets" in error_of(remove_preset, name, user_folder)
     assert (user_folder / "my-ink.json").exists() and (SHIPPED_FOLDER / "plaid.json").exists()
-
-
-def test_delete(user_folder, blank_previews):
-    save_preset(MINE, user_folder)
     remove_preset("my-ink", user_folder)
     assert list(user_folder.iterdir()) == [] and preset_keys(user_folder) == preset_keys()
 
@@ -399,12 +366,6 @@ def test_user_presets_precede_shipped_ones(user_folder, tmp_path):
     write_preset(user_folder / "plaid.json", MINE)
     assert load_preset("plaid", user_folder) == MINE and load_preset("plaid") != MINE
     assert preset_keys(user_folder).count("plaid") == 1
-
-
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written(user_folder, blank_previews, error_of):
-    user_folder.mkdir(mode=0o500)
-    assert "permission denied" in error_of(save_preset, MINE, user_folder)
 
 
 def test_a_folder_that_cannot_be_created(tmp_path, blank_previews, error_of):
@@ -452,7 +413,7 @@ def test_shipped_previews_show_their_looks(name):
         Look(method="members", length=8000, hue="noise"),
         *long(Look(line_width=256.0, high_pass=1024.0, length=8000, supersampling=4)),
         Look(anchor="surface", ink="hatch", paper_color="#ffffff00", layers=12, line_width=0.5),
-        Look(light="scene", display="flat", hue="magnitude", magnitude_length=True),
+        Look(light="scene", display="flat", hue="values", tone="attribute"),
     ],
     ids=["brute", "members", "large", "ink", "others"],
 )
@@ -460,21 +421,7 @@ def test_every_look_has_a_preview(look):
     picture = draw_preview(look)
     assert picture.shape == (PREVIEW_SIZE, PREVIEW_SIZE, 4) and picture.dtype == np.float32
     assert np.isfinite(picture).all() and (picture[..., 3] == 1).all()
-    center = picture[
-        PREVIEW_SIZE // 4 : -PREVIEW_SIZE // 4, PREVIEW_SIZE // 4 : -PREVIEW_SIZE // 4, :3
-    ]
-    assert center.std() > 0.03
     np.testing.assert_array_equal(picture, draw_preview(look))
-
-
-@pytest.mark.slow
-def test_previews_of_looks_differ():
-    plain, long = draw_preview(Look()), draw_preview(Look(length=120))
-    assert np.abs(plain - long).mean() > 0.01
-    ink = Look(ink="hatch", paper_color="#ff0000")
-    corner = draw_preview(ink)[0, 0]
-    np.testing.assert_allclose(corner, [1, 0, 0, 1], atol=1e-6)
-    assert (draw_preview(replace(ink, paper_color="#ff000000"))[0, 0] == corner).all()
 
 
 # --- the command line ------------------------------------------------------------------------
@@ -493,12 +440,8 @@ def test_list_presets(saved_folder, capsys):
     output = capsys.readouterr()
     listed = {each["preset"]: each for each in json.loads(output.out)}
     assert list(listed) == [*preset_keys(), "my-ink"]
-    assert listed["my-ink"] == {
-        "preset": "my-ink",
-        "name": "My Ink",
-        "description": "Long lines",
-        "own": True,
-    }
+    expected = {"preset": "my-ink", "name": "My Ink", "description": "Long lines", "own": True}
+    assert listed["my-ink"] == expected
     assert not listed["plaid"]["own"]
     (line,) = output.err.splitlines()
     assert "broken.json:1: expecting" in line

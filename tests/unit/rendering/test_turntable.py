@@ -118,12 +118,8 @@ def test_streaks_drift_before_a_still_camera_in_whole_cycles():
     views = turntable_views(instance, look, 12, (64, 64), (0.0, 0.0), still=True)
     pictures = [draw_next(view, cache).rgba[..., 0] for view in views]
     assert len(pictures) == 12 and len(cache) < 12
-    visible = pictures[0] > 0
-    likeness = [
-        np.corrcoef(picture[visible], following[visible])[0, 1]
-        for picture, following in zip(pictures, [*pictures[1:], pictures[0]], strict=True)
-    ]
-    assert max(likeness) < 0.99 and likeness[-1] > min(likeness[:-1]) - 0.02
+    # 12 frames of 1.5 pixels are three cycles of 6 pixels.
+    assert len({picture.tobytes() for picture in pictures}) == 4
     with pytest.raises(RosyError, match="ball: nothing moves"):
         check_still(Look(), True, "ball")
 

@@ -99,6 +99,7 @@ def test_a_line_goes_on_where_its_directions_turn_over():
     assert along[away].mean() in (0, 1)
 
 
+@pytest.mark.slow
 def test_directions_do_not_turn_over_within_a_chart():
     """A filter would average opposite directions to none."""
     instance = instance_of(torus(), 4, "curvature")

@@ -53,6 +53,7 @@ def test_the_first_line_is_horizontal_on_a_cylinder(degree):
         np.testing.assert_allclose(share[is_side], 1, atol=0.01)
 
 
+@pytest.mark.slow
 def test_lines_continue_where_the_field_turns():
     """A torus at a slant has a field without singularities: the first line goes round it everywhere.
 
@@ -73,6 +74,7 @@ def test_lines_continue_where_the_field_turns():
     assert share_of(mesh, np.abs(across[:, 2]) < 0.8 * np.abs(around[:, 2])) > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degree", mainly([4], [3, 4, 6]))
 def test_lines_swap_only_between_singularities(degree):
     """On a sphere they must, but on a small part of it."""
@@ -82,6 +84,7 @@ def test_lines_swap_only_between_singularities(degree):
     assert share.min() < 0.9
 
 
+@pytest.mark.slow
 def test_the_order_does_not_depend_on_the_size_of_triangles_or_of_the_mesh():
     """A cube of twelve triangles has one first line on each face, at any scale."""
     for scale in (1e-6, 1.0, 1e6):

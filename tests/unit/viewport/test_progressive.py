@@ -226,6 +226,7 @@ def test_what_the_helper_does_is_named(helper, view_input):
     assert view.texture == ((), 32) and view.progress is None and "drawing" in shown
 
 
+@pytest.mark.slow
 def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, monkeypatch):
     monkeypatch.setattr(progressive_module, "FRAME_BUDGET_SECONDS", 0.0)
     progressive = progressive_of(HelpedRenderer(), helper)
@@ -244,6 +245,7 @@ def test_previews_are_finished_and_final_pictures_abandoned(helper, view_input, 
     assert view.texture == ((), 32) and view.texture_key == "fourth"
 
 
+@pytest.mark.slow
 def test_meshes_that_change_faster_than_they_are_prepared_are_shown(helper, view_input):
     renderer = HelpedRenderer(len, ("ab",))
     progressive = progressive_of(renderer, helper)

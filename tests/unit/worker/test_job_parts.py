@@ -132,6 +132,7 @@ def test_runners_share_a_helper(helper):
     assert [finished(runner, helper) for runner in runners] == [1, 2, 3]
 
 
+@pytest.mark.slow
 def test_a_call_is_made_again_if_its_helper_is_killed(helper):
     runner = StepRunner(called(time.sleep, 30.0), helper)
     runner.advance()

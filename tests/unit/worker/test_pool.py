@@ -122,6 +122,7 @@ def test_a_picture_that_is_stopped_ends_busy_helpers():
     assert all(has_ended(pid, 0.2) for pid in pids if pid)
 
 
+@pytest.mark.slow
 def test_a_picture_with_nothing_in_view_is_refused():
     away = perspective_camera(look_at((0.0, -9.0, 0.0), (0, -90, 0)), WIDTH, HEIGHT, fov=0.9)
     with pytest.raises(NothingInViewError, match="outside the frame"):

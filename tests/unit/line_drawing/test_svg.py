@@ -1,0 +1,146 @@
+"""SVG files of strokes: layers, paths, outlines of lines, and the order of a plotter."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from harness.stroke_tracing import trace_strokes, turned, visible_strokes
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapes import icosphere, plane
+
+from rosy_addon.cli.parser import main
+from rosy_addon.core.errors import RosyError
+from rosy_addon.field.generate import axis_field
+from rosy_addon.line_drawing.svg import Pen, plotter_order, simplify_mask, svg_text
+from rosy_addon.line_drawing.visibility import project_to_pixels
+from rosy_addon.projection.camera import look_at, orthographic_camera
+from rosy_addon.projection.gbuffer import MeshInstance
+
+
+def svg_camera():
+    return orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 200, 100, scale=4.0)
+
+
+def svg_of(**pen_options):
+    """Return the root element of an SVG file, and its strokes."""
+    instance = turned(plane(), 4)
+    strokes = visible_strokes(trace_strokes(instance, 0.2).tapered(1.0), [instance], svg_camera())
+    return ElementTree.fromstring(svg_text(strokes, svg_camera(), Pen(**pen_options))), strokes
+
+
+def path_points(data):
+    """Return the (n, 2) points of SVG path data, without the radii of arcs."""
+    without_arcs = re.sub(r"A\S+ 0 0 1", "", data)
+    return np.array(re.findall(r"(-?[\d.]+),(-?[\d.]+)", without_arcs), dtype=float)
+
+
+@pytest.mark.parametrize("color", ["", "\x1b[31m", "blakc", "#12", "#gggggg", 'red" x="', "#00f\n"])
+def test_color_must_be_one_of_svg(color):
+    with pytest.raises(RosyError, match="is not a color"):
+        Pen(colors=("Navy", "#00F", color))
+
+
+def test_svg_has_one_layer_per_family_and_one_path_per_stroke():
+    root, strokes = svg_of(millimeters=100, colors=("red", "#00f"))
+    inkscape = "{http://www.inkscape.org/namespaces/inkscape}"
+    layers = root.findall("{http://www.w3.org/2000/svg}g")
+    assert [layer.get(inkscape + "label") for layer in layers] == ["paper", "family 1", "family 2"]
+    assert all(layer.get(inkscape + "groupmode") == "layer" for layer in layers)
+    assert [layer.get("stroke") for layer in layers[1:]] == ["red", "#00f"]
+    assert (root.get("width"), root.get("height")) == ("100mm", "50mm")
+    assert root.get("viewBox") == "0 0 200 100"
+    paths = list(root.iter("{http://www.w3.org/2000/svg}path"))
+    assert len(paths) == len(strokes)
+    for path in paths:
+        assert path.get("d").endswith("Z") == (path.get("stroke") == "none")
+        # An outline is half the width of the pen away from its stroke.
+        points = path_points(path.get("d"))
+        assert len(points) >= 2
+        assert (points >= -0.51).all() and (points <= (200.51, 100.51)).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("plotter", [False, True])
+def test_closed_strokes_are_closed_paths(plotter):
+    """Without their last point, which is the first one. Strokes that are cut are open."""
+    instance = MeshInstance(icosphere(4), np.eye(4), axis_field(icosphere(4), 4, (0, 0, 1)))
+    camera = orthographic_camera(look_at((0, 0, 5), (0, 0, 0), (0, 1, 0)), 300, 200, scale=3.3)
+    strokes = visible_strokes(trace_strokes(instance, 0.15), [instance], camera)
+    cut = strokes.runs_where(strokes.points[:, 0] > 0)
+    for part in (strokes.select(strokes.closed), strokes.select(~strokes.closed), cut):
+        text = svg_text(part, camera, Pen(plotter=plotter))
+        paths = [path.get("d") for path in ElementTree.fromstring(text).iter() if path.get("d")]
+        assert paths and all(data.endswith("Z") == part.closed.any() for data in paths)
+        for data in paths:
+            points = path_points(data)
+            assert not (points[0] == points[-1]).all()
+
+
+def test_outlines_hold_as_much_ink_as_their_strokes():
+    """The area of an outline is the mean width times the length, without the round ends."""
+    root, strokes = svg_of(width=3.0, paper=None)
+    pixels, _ = project_to_pixels(strokes.points, svg_camera())
+    length = np.hypot(*np.diff(pixels, axis=0).T) * (np.diff(strokes.stroke) == 0)
+    mean_width = (strokes.width[1:] + strokes.width[:-1]) / 2
+    expected = np.bincount(strokes.stroke[1:], 3.0 * mean_width * length)
+    areas = []
+    for path in root.iter("{http://www.w3.org/2000/svg}path"):
+        x, y = path_points(path.get("d")).T
+        areas.append(abs(x @ np.roll(y, 1) - y @ np.roll(x, 1)) / 2)
+    by_family = np.argsort(strokes.family, kind="stable")
+    assert np.allclose(areas, expected[by_family], rtol=0.03, atol=0.2)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(1, 60), st.integers(0, 10**6))
+def test_plotter_order_is_a_permutation_with_little_travel(count, seed):
+    random = np.random.default_rng(seed)
+    first, last = random.random((2, count, 2))
+    order, is_reversed = plotter_order(first, last)
+    assert sorted(order.tolist()) == list(range(count))
+    begin = np.where(is_reversed[:, None], last[order], first[order])
+    end = np.where(is_reversed[:, None], first[order], last[order])
+    travel = np.linalg.norm(begin[1:] - end[:-1], axis=1).sum()
+    unordered_travel = np.linalg.norm(first[1:] - last[:-1], axis=1).sum()
+    assert travel <= unordered_travel + 1e-9 or count < 6
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.integers(2, 40), min_size=1, max_size=4), st.integers(0, 10**6))
+def test_simplified_lines_stay_within_the_tolerance(sizes, seed):
+    random = np.random.default_rng(seed)
+    start = np.concatenate([[0], np.cumsum(sizes)])
+    points = np.cumsum(random.normal(size=(start[-1], 2)), axis=0)
+    kept = simplify_mask(points, start, 0.5)
+    assert kept[start[:-1]].all() and kept[start[1:] - 1].all()
+    for a, b in pairwise(start):
+        simplified = points[a:b][kept[a:b]]
+        chord = np.diff(simplified, axis=0)
+        delta = points[a:b, None] - simplified[:-1]
+        fraction = np.clip((delta * chord).sum(axis=2) / (chord**2).sum(axis=1), 0, 1)
+        distance = np.linalg.norm(delta - fraction[..., None] * chord, axis=2)
+        assert distance.min(axis=1).max() <= 0.5 + 1e-9
+
+
+@pytest.mark.slow
+def test_command_line(tmp_path):
+    mesh, out = tmp_path / "ball.obj", tmp_path / "ball.svg"
+    ball = icosphere(3)
+    rows = [f"v {x} {y} {z}" for x, y, z in ball.vertices]
+    mesh.write_text("\n".join(rows + [f"f {a} {b} {c}" for a, b, c in ball.triangle_vertex + 1]))
+    command = ["strokes", str(mesh), "--generate", "smoothest", "--spacing", "12", "-o", str(out)]
+    contents = []
+    for _ in range(2):
+        assert (
+            main([*command, "--size", "300x200", "--outline", "--gaps", "0.3", "--light", "lamp"])
+            == 0
+        )
+        contents.append(out.read_bytes())
+    assert contents[0] == contents[1]
+    root = ElementTree.fromstring(contents[0])
+    assert len(root.findall("{http://www.w3.org/2000/svg}g")) == 4

@@ -117,7 +117,7 @@ class _ClosestSearch:
         self.key, self.cell_triangle = cell_key[order], owner[order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) int64 cells that contain points; the nearest cell for a point outside of the grid."""
+        """Return the (n, 3) int64 cells that contain points, or are nearest to points outside of the grid."""
         return np.clip(np.floor(self._in_cells(points)), 0, self.shape - 1).astype(np.int64)
 
     def _in_cells(self, points: np.ndarray) -> np.ndarray:

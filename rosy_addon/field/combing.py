@@ -223,7 +223,7 @@ class GuideBrush:
     mirror: Sequence[bool] = (False, False, False)
 
     def falloff(self, distance: np.ndarray) -> np.ndarray:
-        """Return the strength of the effect at distances from the stroke, from 1 (on it) to 0 (at the radius).
+        """Return the strength of the effect at distances from the stroke: 1 on it, and 0 at the radius.
 
         If the brush combs exactly, the strength is 1 everywhere within the radius.
         """
@@ -394,7 +394,7 @@ class BrushStroke:
         dabs: Sequence[_Dab],
         located: np.ndarray,
     ) -> None:
-        """Apply the effect of the brush to the faces near the segment between two dabs, or near a single dab."""
+        """Apply the effect of the brush to faces near the segment between two dabs, or near a single dab."""
         brush, normal = self._brush, self._surface.face_normal
         on_face = located[located >= 0]
         if not len(on_face):

@@ -102,9 +102,9 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
     """Compute the Dirichlet energy of the directions of a field.
 
     The energy is the integral of ``|grad z|^2``, where z is the representation of the field, normalized to
-    modulus 1. It is discretized by two-point fluxes, as the sum over the interior edges (f, g) of ``w |z_f
-    - r z_g|^2``. Here r is the rotation that unfolds face g into the plane of face f. The weight w is the
-    length of the edge, divided by the sum of the distances of the two face centers from the edge.
+    modulus 1. It is discretized by two-point fluxes, as the sum over the edges between two faces f and g of
+    ``w |z_f - r z_g|^2``. Here r is the rotation that unfolds face g into the plane of face f. The weight w
+    is the length of the edge, divided by the sum of the distances of the two face centers from the edge.
 
     The energy has no unit, so it does not depend on the scale of the mesh. The smoothest field on a sphere
     has an energy of about 4 pi N. The contribution of each singularity grows slowly with the resolution of
@@ -283,7 +283,7 @@ def match_on_surface(
 
 
 def compare_fields(surface: Surface, field: RosyField, other: RosyField) -> FieldComparison:
-    """Compare two fields of the same degree on a surface."""
+    """Compare two fields of the same degree on a surface: their angles and their singularities."""
     report(0.0, "comparing the fields")
     angles = angle_errors(surface, field, other)
     with progress(0.2, 0.5):

@@ -62,7 +62,7 @@ class PhaseGraph:
 
     @cached_property
     def strength(self) -> np.ndarray:
-        """(m,) float64 weights of the entries."""
+        """(m,) float64: the weight |a| + |b| of each entry."""
         return np.abs(self.a) + np.abs(self.b)
 
     @cached_property
@@ -133,15 +133,14 @@ def _smoothed(graph: PhaseGraph, z: np.ndarray, inertia: np.ndarray) -> np.ndarr
 
 
 class _Clustering(NamedTuple):
-    """Clusters of nodes whose values determine each other.
+    """Clusters of nodes. The values of all nodes of a cluster follow from one value z of the cluster.
 
     Attributes
     ----------
     cluster : (n,) int ndarray
         Cluster of each node.
     p, q : (n,) complex128 ndarray
-        The value of a node is p z + q conj(z), with the value z of its cluster. One of them is 0,
-        the other has the modulus 1.
+        The value of a node is p z + q conj(z). One of p and q is 0, and the other has the modulus 1.
     count : int
         Number of clusters.
     """

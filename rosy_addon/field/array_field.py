@@ -38,7 +38,7 @@ _SYMMETRIC_ENTRIES = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 #: Largest difference between a tensor and its transpose, relative to the largest entry of the array.
 _ASYMMETRY_TOLERANCE = 1e-3
 
-#: Length of the tangential part of a vector, relative to its length, that is only rounding error.
+#: The tangential part of a vector is only a rounding error if it is shorter than this fraction of the vector.
 _NORMAL_VECTOR_SINE = 1e-6
 
 _LABEL = "reading the field"
@@ -144,7 +144,7 @@ def _all_arrays(arrays: SurfaceArrays) -> list[FieldArray]:
 
 
 def _array_of_name(arrays: SurfaceArrays, listed: list[FieldArray], name: str) -> FieldArray:
-    """Return the array with a name, which may have the prefix "point:" or "cell:"."""
+    """Return the array with this name. The name may have the prefix "point:" or "cell:"."""
     found = [array for array in listed if array.name == name]
     prefix, _, rest = name.partition(":")
     if not found and prefix in ("point", "cell"):

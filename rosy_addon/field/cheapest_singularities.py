@@ -92,9 +92,9 @@ def cheapest_singularities(
 
 
 def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """Distribute the sum of the given indices on each closed component over its nodes, by area.
+    """Return (n,) values at the nodes: the sum of the given indices on a component, distributed by area.
 
-    Returns (n,) values at the nodes. They are 0 on components with a border.
+    They are 0 on components with a border.
     """
     corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
     node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
@@ -107,9 +107,9 @@ def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndar
 
 
 def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
-    """Move added singularities to nodes where they add least energy, and away from the given singularities.
+    """Return the (n,) int64 indices of added singularities after moving them to where they add least energy.
 
-    Returns (n,) int64: the index of the added singularity at each node, or 0.
+    They are also moved away from the given singularities. The index is 0 at nodes without a singularity.
     """
     if not added.any():
         return added
@@ -156,8 +156,8 @@ class _Neighbors:
     ) -> np.ndarray:
         """Return (n,) indices of the added singularities after one round of moves.
 
-        A share of the singularities that would gain from a move are moved to their best neighbor. Those at a
-        given singularity must leave it, and go last.
+        A share of the singularities that would reduce the energy are moved to their best neighbor. Those at
+        a given singularity must leave it, and are moved first.
         """
         moves = []
         for node in np.flatnonzero(added).tolist():

@@ -16,7 +16,7 @@ CELLS_PER_TRIANGLE = 1.0
 #: against every point.
 MAX_CELLS_PER_AXIS = 8
 
-#: Pairs of points and triangles processed at once, to bound memory.
+#: Number of pairs of points and triangles that are processed at once, to bound memory.
 MAX_PAIRS = 1 << 18
 
 #: Text that is shown with the progress bar.

@@ -278,7 +278,7 @@ class BrushStroke:
         self._signs = signs
         self._start_arc_length = 0.0
         self._end: _Dab | None = None  # the last point, which need not be a dab
-        self._dabs: list[_Dab] = []  # the last two and new ones
+        self._dabs: list[_Dab] = []  # the last dabs that were drawn, and new ones
         # State of each face in the current pass of the stroke over it.
         count = self._surface.face_count
         self._last_arc_length = np.full(count, -np.inf)

@@ -32,8 +32,9 @@ def conjugate_gradient(
     Parameters
     ----------
     matrix : CSRMatrix
-        (n, n), Hermitian and positive definite.
+        The (n, n) matrix, Hermitian and positive definite.
     rhs : (n,) complex or float ndarray
+        Right-hand side.
     tolerance : float
         Residual norm at which the iteration stops, relative to the norm of `rhs`. The iteration stops earlier
         if rounding errors prevent progress.

@@ -30,7 +30,7 @@ from .surface import Surface
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
 MAX_COTANGENT = 1e3
 
-#: Triangles processed at once, to bound memory and fit in the CPU caches.
+#: Number of triangles that are processed at once, to bound memory and to fit in the CPU caches.
 BLOCK_TRIANGLES = 1 << 14
 
 
@@ -116,7 +116,7 @@ def build_connection(surface: Surface) -> Connection:
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
-    # Each edge once: from the tail corner to the next corner of its triangle.
+    # Take each edge once, from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
     # The direction of the reversed edge at its head is the direction of the twin halfedge or, at a

@@ -127,7 +127,7 @@ class Field(RosyField):
 
     @cached_property
     def directions(self) -> NDArray[np.float64]:
-        """(F, N, 3): all directions, counter-clockwise about the normals."""
+        """(F, N, 3): all N directions of each face in object space, counter-clockwise about the normal."""
         return field_directions(self.surface, self)
 
     @cached_property
@@ -151,7 +151,7 @@ class Field(RosyField):
 
     @cached_property
     def singularities(self) -> Singularities:
-        """The singular vertices and their indices, in units of 1/N."""
+        """The singular vertices of the field, and their indices in units of 1/N."""
         return Singularities(*find_singularities(self.surface, self))
 
     @cached_property

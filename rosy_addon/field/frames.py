@@ -52,8 +52,8 @@ def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np
     Returns
     -------
     (..., 3) ndarray
-        v - (v.t) / (1 + s.t) (s + t), for source s and target t. The vectors are perpendicular to
-        `target` and have their original lengths.
+        v - (v.t) / (1 + s.t) (s + t) for each vector v, source s and target t, where . is the dot product.
+        The vectors are perpendicular to `target` and have their original lengths.
 
     Notes
     -----

@@ -25,10 +25,10 @@ def interpolate_fields(
     Singularities move continuously if the magnitude of the fields vanishes at them.
 
     Where members turn by nearly pi / N, the shorter turn may be to the left on one face and to the right on
-    the next one. If angles were interpolated, the directions of these two faces would differ by up to pi /
-    N during most of the interpolation. With the linear interpolation of z, each face keeps nearly its first
-    direction, and then changes to the second one within a short range of s. For turns up to a quarter of 2
-    pi / N, the two interpolations differ by less than 4 / N degrees.
+    the next one. If angles were interpolated, the directions of these two faces would differ by up to
+    pi / N during most of the interpolation. With the linear interpolation of z, each face keeps nearly its
+    first direction, and then changes to the second one within a short range of s. For turns up to a quarter
+    of 2 pi / N, the two interpolations differ by less than 4 / N degrees.
 
     Magnitudes are interpolated linearly. They are reduced where the phase of z turns by more than pi / 2,
     because the direction is uncertain there.

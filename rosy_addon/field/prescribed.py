@@ -379,9 +379,10 @@ def _initial_angle(
     offset: np.ndarray,
     penalty: np.ndarray,
 ) -> np.ndarray:
-    """Return (F,) first values of N times the angle of `guided_rotation`.
+    """Return a first estimate of N times the (F,) angles that `guided_rotation` computes.
 
-    They are the least-squares phase unwrapping of the phases to the guides, after smoothing.
+    The phases by which z must be rotated to the guides are smoothed. The estimate is the least-squares phase
+    unwrapping of the result.
     """
     unit = unit_complex(offset)
     with progress(0.0, 0.3):

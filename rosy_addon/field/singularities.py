@@ -1,4 +1,4 @@
-"""Singularities of a field on faces, and their indices."""
+"""Find the singularities of a field on faces, and their indices."""
 
 from __future__ import annotations
 
@@ -68,7 +68,10 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
 
 
 def format_index(index: int, degree: int) -> str:
-    """Return an index, given in units of 1 / N, as a fraction: +1/4, -1, +3/2."""
+    """Return the text of a singularity index as a fraction, such as "+1/4", "-1" or "+3/2".
+
+    `index` is in units of 1 / `degree`.
+    """
     divisor = int(np.gcd(index, degree))
     numerator, denominator = index // divisor, degree // divisor
     return f"{numerator:+d}" if denominator == 1 else f"{numerator:+d}/{denominator}"

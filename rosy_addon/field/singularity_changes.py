@@ -132,9 +132,9 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 
 
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Return (P,) bool: which of (P, 2) pairs of vertices are nearest to some other vertices.
+    """Return (P,) bool: which of the (P, 2) pairs of vertices are nearest to the given other vertices.
 
-    The distance is the number of faces in between; all pairs with the smallest distance are marked.
+    Distances are counted in faces. All pairs with the smallest distance are marked.
     """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face

@@ -85,7 +85,7 @@ class CSRMatrix:
 
     @cached_property
     def diagonal(self) -> np.ndarray:
-        """(n,) float64: the real part of the diagonal."""
+        """(n,) float64: the real part of the diagonal of the matrix."""
         on_diagonal = self.indices == self.row_indices
         return np.bincount(self.row_indices[on_diagonal], self.data[on_diagonal].real, len(self))
 

@@ -283,7 +283,7 @@ class Surface:
 
     @cached_property
     def triangle_vertex(self) -> np.ndarray:
-        """(T, 3) int32: the vertex indices of the triangles."""
+        """(T, 3) int32: the three vertices of each triangle."""
         return self.corner_vertex.take(self.triangles)
 
     @cached_property

@@ -74,7 +74,7 @@ class SurfaceAverages:
 
     @cached_property
     def mass(self) -> np.ndarray:
-        """(n,) float64 masses of the nodes, all positive."""
+        """(n,) float64: the mass of each node (a third of the area of its triangles), always positive."""
         return self.connection.positive_mass
 
     def node_sums(
@@ -135,7 +135,7 @@ class SurfaceAverages:
         return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
 
     def laplacian(self, degree: int) -> CSRMatrix:
-        """Return the matrix of `connection.laplacian` as complex64; as float32 if the degree is 0."""
+        """Return the matrix of `connection.laplacian`, as complex64 (as float32 if the degree is 0)."""
         matrix = laplacian(self.connection, degree)
         if degree:
             return matrix.with_values(matrix.data.astype(np.complex64))

@@ -1,4 +1,4 @@
-"""The symmetry of a field: how many lines and covering sheets its N directions form."""
+"""The symmetry of a field: how many lines (pairs of opposite directions) its N directions form."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class FieldSymmetry:
 
     @property
     def line_count(self) -> int:
-        """M, the number of lines through a point: N / 2 with opposites, N otherwise."""
+        """M, the number of lines through a point: N / 2 if the field has opposites, N otherwise."""
         return self.degree // 2 if self.has_opposites else self.degree
 
     @property

@@ -116,7 +116,10 @@ def _fan_apexes(
 
 
 def _corner_sines(points: np.ndarray) -> np.ndarray:
-    """Return (F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
+    """Return the (F, k) sines of the exterior angles at the corners of (F, k, 3) polygons.
+
+    They are negative at reflex corners.
+    """
     edge = np.roll(points, -1, axis=1) - points
     previous_edge = np.roll(edge, 1, axis=1)
     relative = points - points[:, :1]

@@ -174,7 +174,7 @@ def least_angles(
 ) -> np.ndarray:
     """Return (I,) least-squares angles divided by the conductances of the edges, for a graph of triangles.
 
-    The parameters are those of `turning_angles`, and the result of `_loops`.
+    `loops` is the result of `_loops`. For the other parameters, see `turning_angles`.
     """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
@@ -255,10 +255,10 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:
     """Return (m,) coefficients c that make the energy c @ matrix @ c small, given the sums matrix @ c.
 
-    The sums are given up to multiples of `turn`. These multiples are first found by rounding.
-    They are then changed by 1, one by one and in pairs, as long as that reduces the energy. The search ends
-    because the inverse of the matrix is made positive definite, so that only finitely many multiples have
-    less energy than the first ones.
+    The sums are given up to multiples of `turn`. These multiples are first found by rounding. They are then
+    changed by 1, one by one and in pairs, as long as that reduces the energy. The search ends because the
+    inverse of the matrix is made positive definite, so that only finitely many multiples have less energy
+    than the first ones.
     """
     eigenvalue, vector = np.linalg.eigh((matrix + matrix.T) / 2)
     largest = max(float(np.abs(eigenvalue).max()), 1e-300)
@@ -290,7 +290,7 @@ def _loops(graph: FaceGraph, tree: SpanningForest) -> list[tuple[np.ndarray, np.
     spanning forest of the vertices. In the latter, all border nodes of a component count as one node.
     """
     rest = np.flatnonzero(~tree.has_edge)
-    # All border nodes of a component are the same node.
+    # All border nodes of a component count as the same node.
     node = np.arange(graph.node_count)
     component = graph.node_component
     border = np.flatnonzero(~graph.is_interior)

@@ -39,8 +39,8 @@ TOLERANCE_DEG = {"face": 5.0, "vertex": 20.0}
 #: faces whose normals are inaccurate.
 MAX_OUTLIER_FRACTION = 0.01
 
-#: Values of at least this modulus count as infinite. Otherwise products of the lengths of vectors would
-#: overflow, because pictures are computed in single precision.
+#: Values of at least this modulus count as infinite. Products of the lengths of longer vectors would
+#: overflow, and pictures are computed in single precision.
 MAX_COMPONENT = 1e30
 
 #: A vector counts as zero if all its components are smaller than this, because products would underflow.

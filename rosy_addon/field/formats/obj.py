@@ -19,8 +19,8 @@ from .text_rows import ROWS_PER_BLOCK, TextRows, read_rows
 def read_obj(path: Path) -> Polygons:
     """Read the vertices and faces (`v` and `f` lines) of an .obj file.
 
-    Corners may have the forms v, v/vt, v//vn and v/vt/vn. Negative indices are relative to the last
-    vertex above the line.
+    Corners may have the forms v, v/vt, v//vn and v/vt/vn. A negative index counts back from the last vertex
+    that is defined above the line.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def read_text(path: Path) -> RawField:
     Raises
     ------
     RosyError
-        If the file cannot be read, holds no numbers, or its rows differ in length.
+        If the file cannot be read or holds no numbers, or if its rows differ in length.
     """
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
     rows = read_rows(path, data=data)

@@ -63,8 +63,8 @@ def read_ply(path: Path) -> Polygons:
     Raises
     ------
     RosyError
-        If the file cannot be read, is malformed or truncated, has no vertices or faces, or an index
-        is out of range.
+        If the file cannot be read, is malformed or truncated, or has no vertices or faces, or if an index is
+        out of range.
     """
     columns, _ = _read_columns(path)
     try:
@@ -178,7 +178,7 @@ def _check_unique(
 
 
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
-    """Return the values of all elements of a text file."""
+    """Return the values of all elements of a text file, by element and property."""
     # Parse the header as well, so that rows have the line numbers of the file.
     rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1

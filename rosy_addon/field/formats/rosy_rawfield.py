@@ -1,4 +1,4 @@
-"""Read and write `.rosy` (a member vector per row) and `.rawfield` (N directions per row) files.
+"""Read and write `.rosy` files (one of the N vectors per row) and `.rawfield` files (N directions per row).
 
 `.rawfield` is a format of the library Directional.
 """

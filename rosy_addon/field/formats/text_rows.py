@@ -64,7 +64,7 @@ class TextRows:
         return self._parse(int, np.int64, f"a whole number ({label})")
 
     def points(self, label: str) -> np.ndarray:
-        """Parse the first three words of each row as a point.
+        """Parse the first three words of each row as a point; `label` is the name of a point in messages.
 
         Returns
         -------
@@ -89,7 +89,7 @@ class TextRows:
         return points
 
     def row_of_word(self, word: int) -> int:
-        """Return the row that holds a word, which is counted from 0 over all rows."""
+        """Return the index of the row that contains a word. Words are counted from 0 over all rows."""
         ends = list(accumulate(map(len, self.words)))
         return int(np.searchsorted(ends, word, side="right"))
 
@@ -135,7 +135,7 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
         If the file cannot be read or is not text.
     """
     data = read_bytes(path, reject_binary=True) if data is None else data
-    # Also accept a lone CR, but not the other separators of `splitlines`.
+    # Accept a lone CR as the end of a line, too, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lines = data.split(b"\n")

@@ -1,1 +1,1 @@
-"""RoSy fields and meshes: read, generate, convert, analyze and write them (numpy only)."""
+"""RoSy (N-way rotational symmetry) fields and meshes: read, generate, convert, analyze and write them."""

@@ -23,30 +23,33 @@ from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
 from .surface import Surface
 
-#: Singularities match if they are nearer than this fraction of the longest side of the mesh.
+#: Singularities match if their distance is at most this fraction of the longest side of the bounding box.
 DEFAULT_REACH = 0.05
 
-#: Distances that are computed at once.
+#: Number of distances that are computed at once, to bound memory.
 DISTANCES_PER_BLOCK = 2_000_000
 
-#: Part of the area of which `ErrorStatistics.p95` is the largest error.
+#: Fraction of the area on which the error is at most `ErrorStatistics.p95`.
 PERCENTILE = 0.95
 
 
 class ErrorStatistics(NamedTuple):
-    """Angular errors over a surface, in radians. All are 0 if no face has an error.
+    """Statistics of the angular errors on the faces of a surface, in radians.
+
+    Faces on which the error is NaN are ignored. If it is NaN on all faces, all statistics are 0.
 
     Attributes
     ----------
     mean, rms : float
-        Weighted by area.
+        Mean and root mean square of the error, weighted by area.
     p95 : float
-        The largest error on 95 % of the area.
+        95th percentile of the error, weighted by area.
     max : float
+        Largest error.
     worst_face : int
-        The face of the largest error, -1 without any.
+        The face with the largest error; -1 if the error is NaN on all faces.
     compared : float
-        Fraction of the faces that have an error.
+        Fraction of the faces on which the error is not NaN.
     """
 
     mean: float
@@ -63,9 +66,9 @@ class SingularityMatching(NamedTuple):
     Attributes
     ----------
     first, second : (M,) intp ndarray
-        Which singularities of each field, as indices into its list.
+        The singularities of each pair, as indices into the list of the first and of the second field.
     distance : (M,) float64 ndarray
-        Between the two, in Blender units.
+        Distance between the two singularities of each pair, in object space.
     """
 
     first: np.ndarray
@@ -74,7 +77,7 @@ class SingularityMatching(NamedTuple):
 
 
 class FieldComparison(NamedTuple):
-    """How two fields differ.
+    """The differences between two fields on the same surface.
 
     Attributes
     ----------
@@ -85,7 +88,7 @@ class FieldComparison(NamedTuple):
     singularity_count, other_count : int
         Number of singularities of each field.
     matched_count : int
-        Number of singularities that have the same index in both fields, at nearly the same place.
+        Number of singularities that occur in both fields with the same index and nearly the same position.
     """
 
     angles: np.ndarray
@@ -96,15 +99,15 @@ class FieldComparison(NamedTuple):
 
 
 def dirichlet_energy(surface: Surface, field: RosyField) -> float:
-    """Compute the Dirichlet energy of the representation of a field, normalized to modulus 1.
+    """Compute the Dirichlet energy of the directions of a field.
 
-    The energy is the integral of ``|grad z|^2``, discretized by two-point fluxes. It is the sum
-    over the interior edges of ``w |z_f - r z_g|^2``, where r is the rotation that unfolds face g
-    into the plane of face f. The weight w is the length of the edge divided by the summed distances
-    of the two face centers from it.
+    The energy is the integral of ``|grad z|^2``, where z is the representation of the field, normalized to
+    modulus 1. It is discretized by two-point fluxes, as the sum over the edges between two faces f and g of
+    ``w |z_f - r z_g|^2``. Here r is the rotation that unfolds face g into the plane of face f. The weight w
+    is the length of the edge, divided by the sum of the distances of the two face centers from the edge.
 
-    The energy has no unit, so it does not depend on the scale of the mesh. A smoothest field on a
-    sphere has about 4 pi N. The part around each singularity grows slowly with the resolution of
+    The energy has no unit, so it does not depend on the scale of the mesh. The smoothest field on a sphere
+    has an energy of about 4 pi N. The contribution of each singularity grows slowly with the resolution of
     the mesh. Faces where the field is undefined are ignored.
     """
     x, y = face_frames(surface)
@@ -120,19 +123,20 @@ def dirichlet_energy(surface: Surface, field: RosyField) -> float:
 
 
 def edge_lengths(surface: Surface, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Measure interior edges, for two-point fluxes across them.
+    """Return the lengths of interior edges, and the distances between the face centers on their two sides.
 
     Parameters
     ----------
     surface : Surface
     a, b : (I,) int ndarray
-        The columns of `Edges.halfedges`.
+        The columns of `Edges.halfedges`: for both faces of each edge, the corner at which the edge starts.
 
     Returns
     -------
     length : (I,) float64 ndarray
+        Length of each edge.
     center_distance : (I,) float64 ndarray
-        The summed distances of the centers of both faces from the edge.
+        Distance of the center of one face from the edge, plus that of the center of the other face.
     """
     start = surface.vertices[surface.corner_vertex[a]]
     edge = surface.vertices[surface.corner_vertex[b]] - start
@@ -156,9 +160,10 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians from a member to the nearest member of the other field, 0 to pi / N. If one of the
-        fields is not a RoSy, it is the mean angle between matched directions. N matchings keep the order of
-        the directions; the one with the least mean is used. NaN on faces where either field is undefined.
+        Angle in radians between a member of `field` and the nearest member of `other`, from 0 to pi / N. If
+        one of the fields is not a RoSy, its directions are matched with those of the other field, in their
+        order around the normal. There are N such matchings. The angle is then the least mean angle between
+        matched directions. NaN on faces where either field is undefined.
 
     Raises
     ------
@@ -181,7 +186,10 @@ def angle_errors(surface: Surface, field: RosyField, other: RosyField) -> np.nda
 
 
 def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyField) -> np.ndarray:
-    """Return (F,) mean angles between the directions of two fields, for the best of their N matchings."""
+    """Return (F,) mean angles between matched directions of two fields, in radians.
+
+    On each face, the best of the N matchings that keep the order around the normal is used.
+    """
     frames = face_frames(surface)
     z, other_z = (coordinates(field_directions(surface, f), *frames) for f in (field, other))
     best = np.full(surface.face_count, np.inf)
@@ -192,13 +200,13 @@ def _matched_direction_angles(surface: Surface, field: RosyField, other: RosyFie
 
 
 def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
-    """Summarize angular errors over the surface.
+    """Return statistics of angular errors over the surface, weighted by the areas of the faces.
 
     Parameters
     ----------
     surface : Surface
     error : (F,) float ndarray
-        Radians, as from `angle_errors`; NaN is ignored.
+        Errors in radians, such as the result of `angle_errors`. NaN is ignored.
     """
     defined = np.flatnonzero(np.isfinite(error))
     if not len(defined):
@@ -218,7 +226,7 @@ def error_statistics(surface: Surface, error: np.ndarray) -> ErrorStatistics:
 
 
 def format_degrees(degrees: float) -> str:
-    """Return an angle with three significant digits, and none below a thousandth of a degree."""
+    """Return an angle as text, rounded to three significant digits and at most three decimal places."""
     return f"{round(degrees, 3):.3g}"
 
 
@@ -235,15 +243,18 @@ def match_on_surface(
     other: tuple[np.ndarray, np.ndarray],
     reach: float = DEFAULT_REACH,
 ) -> SingularityMatching:
-    """Match singularities of the same index, the nearest pairs first, each at most once.
+    """Match singularities of two fields that have the same index and are near to each other.
+
+    The nearest pairs are matched first. Each singularity is in at most one pair.
 
     Parameters
     ----------
     surface : Surface
     singularities, other : (vertex, index)
-        The singularities of two fields of the same degree; see `singularities.find_singularities`.
+        The singularities of two fields of the same degree: results of `singularities.find_singularities`.
     reach : float
-        Largest distance of a pair, a straight line, as a fraction of the longest side of the mesh.
+        Largest straight-line distance between the singularities of a pair, as a fraction of the longest side
+        of the bounding box of the mesh.
 
     Returns
     -------
@@ -265,14 +276,14 @@ def match_on_surface(
         found.append((first + block.start, second, np.sqrt(squared[first, second])))
     first, second, distance = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort((second, first, distance))
-    # Numbers of the singularities of both fields.
+    # Positions of the candidates in the lists of both fields.
     chosen = order[first_pairs(np.stack([first, len(index) + second], axis=1)[order])]
     chosen = chosen[np.argsort(first[chosen])]
     return SingularityMatching(first[chosen], second[chosen], distance[chosen])
 
 
 def compare_fields(surface: Surface, field: RosyField, other: RosyField) -> FieldComparison:
-    """Compare two fields of the same degree on a surface."""
+    """Compare two fields of the same degree on a surface: their angles and their singularities."""
     report(0.0, "comparing the fields")
     angles = angle_errors(surface, field, other)
     with progress(0.2, 0.5):

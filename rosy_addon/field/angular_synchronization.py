@@ -1,8 +1,9 @@
-"""Angles at the nodes of a graph from their differences along its edges (angular synchronization).
+"""Find angles at the nodes of a graph, given their differences along its edges (angular synchronization).
 
-The unknowns are complex numbers of modulus 1, and the least squared error is sought. They are smoothed from
-coarse to fine, as the position fields of Jakob, Tarini, Panozzo and Sorkine-Hornung, "Instant
-Field-Aligned Meshes" (SIGGRAPH Asia 2015). Along some edges, the conjugate of the neighbor is meant.
+The unknowns are complex numbers of modulus 1 that minimize the squared error of these differences. They are
+smoothed on a hierarchy of graphs, from coarse to fine, like the position fields of Jakob, Tarini, Panozzo and
+Sorkine-Hornung, "Instant Field-Aligned Meshes" (SIGGRAPH Asia 2015). An edge may also relate a value to the
+complex conjugate of its neighbor's value.
 """
 
 from __future__ import annotations
@@ -17,31 +18,35 @@ from ..core.progress import report
 from .connectivity import sorted_with_order
 from .representation import unit_complex
 
-#: Label of the progress.
+#: Text that is shown with the progress bar.
 LABEL = "spacing lines"
 
-#: Smoothing steps on the finest level, factor for each coarser level, and their largest number.
+#: Number of smoothing steps on the finest level, its factor from a level to the next coarser one, and its
+#: largest value.
 SMOOTHING_STEPS, STEP_GROWTH, MAX_SMOOTHING_STEPS = 8, 1.5, 100
 
-#: Share of the old value in a smoothing step. It damps oscillations.
+#: Weight of the old value in a smoothing step, relative to that of all neighbors. It damps oscillations.
 INERTIA = 0.3
 
-#: Levels have at least this many nodes, and are coarsened by at least this factor.
+#: A level is coarsened only if it has more nodes than this, and if the number of nodes shrinks by at least
+#: this factor.
 MIN_LEVEL_NODES, MIN_COARSENING = 12, 1.1
 
 #: Factor of the multiplicative hash of two nodes: 2^64 divided by the golden ratio.
 HASH_FACTOR = 0x9E3779B97F4A7C15
 
-#: Rounds in which pairs of nodes are matched on a level.
+#: Number of rounds in which nodes are paired on a level.
 MATCHING_ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseGraph:
-    """A graph of n nodes with unknown values of modulus 1, and m entries that relate two of them.
+    """A graph of n nodes with unknown complex values of modulus 1, and m relations between two of them.
 
-    An entry says that the value at node `row` should be ``a z + b conj(z)``, with the value z at node
-    `column`. |a| + |b| is its weight. Entries are sorted by row, and come in both directions.
+    Each relation is an *entry*, one element of the arrays `row`, `column`, `a` and `b`, as in a sparse
+    matrix. It demands that the value at node `row` is ``a z + b conj(z)``, where z is the value at node
+    `column`. Its weight is |a| + |b|. Entries are sorted by row. For each pair of related nodes, there is
+    an entry in both directions.
     """
 
     node_count: int
@@ -52,17 +57,17 @@ class PhaseGraph:
 
     @cached_property
     def row_start(self) -> np.ndarray:
-        """The first entry of each node that has any."""
+        """Index of the first entry of each row, for the rows (nodes) that have entries."""
         return _run_starts(self.row)
 
     @cached_property
     def strength(self) -> np.ndarray:
-        """(m,) float64 weights of the entries."""
+        """(m,) float64: the weight |a| + |b| of each entry."""
         return np.abs(self.a) + np.abs(self.b)
 
     @cached_property
     def conjugating(self) -> np.ndarray:
-        """The entries in which b is not 0."""
+        """Indices of the entries in which b is not 0."""
         return np.flatnonzero(self.b)
 
 
@@ -76,7 +81,7 @@ def _run_starts(values: np.ndarray) -> np.ndarray:
 def phase_graph(
     node_count: int, row: np.ndarray, column: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> PhaseGraph:
-    """Return a graph of entries in any order. Entries between the same two nodes are added."""
+    """Return a `PhaseGraph`, given its entries in any order. Entries of the same row and column are added."""
     entry = np.flatnonzero(row != column)
     key = row[entry].astype(np.int64) * node_count + column[entry]
     key, order = sorted_with_order(key, max(node_count, 1) ** 2)
@@ -89,10 +94,10 @@ def phase_graph(
 
 
 def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
-    """Return (n,) complex128 values of modulus 1 that agree with their neighbors.
+    """Return (n,) complex128 values of modulus 1 at the nodes that nearly satisfy the entries of a graph.
 
-    Values of clusters of nodes come first, by recursion. Then all values are smoothed. `depth` counts the
-    coarser graphs.
+    First, the nodes are grouped into clusters, and this function is called for the graph of the clusters. Its
+    result is the initial value of the nodes, which are then smoothed. `depth` is the depth of this recursion.
     """
     clustering = _clustering(graph) if graph.node_count > MIN_LEVEL_NODES else None
     if clustering is None or clustering.count * MIN_COARSENING > graph.node_count:
@@ -112,7 +117,11 @@ def synchronize(graph: PhaseGraph, depth: int = 0) -> np.ndarray:
 
 
 def _smoothed(graph: PhaseGraph, z: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """Replace each value by the one that its neighbors and, with a weight of `inertia`, the value itself agree on."""
+    """Return the values after a smoothing step: weighted means, normalized to modulus 1.
+
+    Each mean is over the values that the neighbors of a node demand, and over its old value with the weight
+    `inertia`.
+    """
     neighbor = z.take(graph.column)
     terms = graph.a * neighbor
     conjugating = graph.conjugating
@@ -124,15 +133,14 @@ def _smoothed(graph: PhaseGraph, z: np.ndarray, inertia: np.ndarray) -> np.ndarr
 
 
 class _Clustering(NamedTuple):
-    """Clusters of nodes whose values determine each other.
+    """Clusters of nodes. The values of all nodes of a cluster follow from one value z of the cluster.
 
     Attributes
     ----------
     cluster : (n,) int ndarray
         Cluster of each node.
     p, q : (n,) complex128 ndarray
-        The value of a node is p z + q conj(z), with the value z of its cluster. One of them is 0,
-        the other has the modulus 1.
+        The value of a node is p z + q conj(z). One of p and q is 0, and the other has the modulus 1.
     count : int
         Number of clusters.
     """
@@ -144,9 +152,9 @@ class _Clustering(NamedTuple):
 
 
 def _clustering(graph: PhaseGraph) -> _Clustering:
-    """Group nodes into pairs and larger clusters along their strongest edges.
+    """Group the nodes of a graph into pairs along their strongest edges, and into larger clusters.
 
-    Nodes without a partner join a pair next to them.
+    A node that found no partner joins the pair of a neighbor.
     """
     count = graph.node_count
     # A random factor makes the strengths distinct, so that many nodes find a partner in each round.
@@ -168,7 +176,8 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
         mutual = choice[choice[chooser]] == chooser
         partner[chooser[mutual]] = choice[chooser[mutual]]
         link[chooser[mutual]] = chosen[mutual]
-    # The first node of a pair is the root. The second one and single neighbors of the root have its value.
+    # The first node of a pair is the root of its cluster. The values of the second node and of single
+    # neighbors of the root follow from the value of the root.
     is_root = (partner < 0) | (partner > nodes)
     root = np.where(is_root, nodes, partner)
     joins = np.flatnonzero((partner[graph.row] < 0) & (partner[graph.column] > graph.column))
@@ -188,7 +197,7 @@ def _clustering(graph: PhaseGraph) -> _Clustering:
 
 
 def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) -> np.ndarray:
-    """Return the strongest of some entries in each row. The entries are in ascending order."""
+    """Return, for each row, the strongest of the given entries. `entry` is in ascending order."""
     first = _run_starts(row[entry])
     largest = np.maximum.reduceat(strength[entry], first)
     is_largest = strength[entry] == np.repeat(largest, np.diff(first, append=len(entry)))
@@ -197,7 +206,10 @@ def _strongest_of_row(row: np.ndarray, strength: np.ndarray, entry: np.ndarray) 
 
 
 def _coarse_graph(graph: PhaseGraph, clustering: _Clustering) -> PhaseGraph:
-    """Return the graph of the clusters: the entries between different ones, in terms of their values."""
+    """Return the graph whose nodes are the clusters.
+
+    It has the entries between different clusters, changed so that they relate the values of the clusters.
+    """
     cluster, p, q, count = clustering
     row, column = cluster[graph.row], cluster[graph.column]
     entry = np.flatnonzero(row != column)

@@ -1,4 +1,4 @@
-"""Fields from the named arrays at the vertices and faces of a surface, as simulations store them."""
+"""Make fields from named arrays at the vertices or faces of a surface, such as the results of simulations."""
 
 from __future__ import annotations
 
@@ -25,19 +25,20 @@ from .validate import (
     tangent_normals,
 )
 
-#: Degree of an array of vectors, if the caller gives none.
+#: Degree of the field made from an array of vectors, if the caller gives none.
 VECTOR_DEGREE = 1
 
 #: Names of arrays that hold the normals of the surface, in lower case.
 _NORMAL_NAMES = ("normal", "normals")
 
-#: Order of the six numbers of a symmetric tensor in VTK, XX YY ZZ XY YZ XZ, as entries of the matrix.
+#: For the 9 elements of a symmetric 3 x 3 matrix, in row order: which of VTK's six components (XX YY ZZ XY YZ
+#: XZ) each is.
 _SYMMETRIC_ENTRIES = [0, 3, 5, 3, 1, 4, 5, 4, 2]
 
 #: Largest difference between a tensor and its transpose, relative to the largest entry of the array.
 _ASYMMETRY_TOLERANCE = 1e-3
 
-#: Length of the tangential part of a vector, relative to its length, that is only rounding error.
+#: The tangential part of a vector is only a rounding error if it is shorter than this fraction of the vector.
 _NORMAL_VECTOR_SINE = 1e-6
 
 _LABEL = "reading the field"
@@ -45,15 +46,16 @@ _LABEL = "reading the field"
 
 @dataclass(frozen=True, eq=False)
 class SurfaceArrays:
-    """A surface of V vertices and F faces, with named arrays.
+    """A surface of V vertices and F faces, with named arrays of values at the vertices and at the faces.
 
     Attributes
     ----------
     name : str
-        For messages, such as the path of the file.
+        Name of the data in error messages, such as the path of the file.
     surface : Surface
     vertex_data, face_data : mapping of str to array_like
-        Arrays of V and of F rows. Others, and those that do not hold real numbers, are ignored.
+        Arrays with V rows (`vertex_data`) and with F rows (`face_data`), by their names. Arrays with another
+        number of rows, and arrays that do not hold real numbers, are ignored.
     """
 
     name: str
@@ -63,13 +65,14 @@ class SurfaceArrays:
 
 
 class FieldArray(NamedTuple):
-    """An array at the points or the cells of a mesh: the vertices or the faces of its surface.
+    """A named array of values at the vertices or at the faces of a surface (points or cells in VTK's words).
 
     Attributes
     ----------
     name : str
     domain : {"vertex", "face"}
     values : (n, ...) ndarray
+        One row for each vertex or face.
     """
 
     name: str
@@ -78,7 +81,7 @@ class FieldArray(NamedTuple):
 
     @property
     def columns(self) -> int:
-        """Count of numbers at each point or cell."""
+        """Number of values at each vertex or face, such as 3 for vectors."""
         return int(np.prod(self.values.shape[1:]))
 
     def __str__(self) -> str:
@@ -93,14 +96,15 @@ def find_array(arrays: SurfaceArrays, name: str | None = None) -> FieldArray:
     ----------
     arrays : SurfaceArrays
     name : str, optional
-        Its name, or "point:NAME" or "cell:NAME" if both have one. If not given, there must be a
-        single array that can be a field: see `array_field`. Without a name, only arrays of
-        floating-point numbers count, as integers are usually labels or colors, and no normals.
+        Name of the array. If an array at the vertices and one at the faces have the same name, it is
+        "point:NAME" (vertices) or "cell:NAME" (faces). If no name is given, there must be exactly one
+        array from which a field can be made (see `array_field`). Arrays of integers are then ignored,
+        because they are usually labels or colors, and so are arrays of normals.
 
     Raises
     ------
     RosyError
-        If there is no such array, or several. The message lists the arrays that there are.
+        If there is no such array, or more than one. The message lists the arrays of the surface.
     """
     found = _all_arrays(arrays)
     if name is not None:
@@ -126,7 +130,7 @@ def find_array(arrays: SurfaceArrays, name: str | None = None) -> FieldArray:
 
 
 def _all_arrays(arrays: SurfaceArrays) -> list[FieldArray]:
-    """Return the arrays at the points, then those at the cells."""
+    """Return the arrays at the vertices, followed by the arrays at the faces."""
     found = []
     for domain, data, count in (
         ("vertex", arrays.vertex_data, len(arrays.surface.vertices)),
@@ -140,7 +144,7 @@ def _all_arrays(arrays: SurfaceArrays) -> list[FieldArray]:
 
 
 def _array_of_name(arrays: SurfaceArrays, listed: list[FieldArray], name: str) -> FieldArray:
-    """Return the array with a name, which may have the prefix "point:" or "cell:"."""
+    """Return the array with this name. The name may have the prefix "point:" or "cell:"."""
     found = [array for array in listed if array.name == name]
     prefix, _, rest = name.partition(":")
     if not found and prefix in ("point", "cell"):
@@ -157,12 +161,12 @@ def _array_of_name(arrays: SurfaceArrays, listed: list[FieldArray], name: str) -
 
 
 def _listed(arrays: list[FieldArray]) -> str:
-    """Return the names and shapes of arrays as text."""
+    """Return a text that lists the names and shapes of arrays, for error messages."""
     return ", ".join(map(str, arrays)) or "the mesh"
 
 
 def _can_be_field(arrays: SurfaceArrays, columns: int) -> bool:
-    """Return whether a field can be made from an array with this count of numbers per element."""
+    """Return whether a field can be made from an array with this number of values per vertex or face."""
     if columns == 2:
         return not np.ptp(arrays.surface.vertices[:, 2])
     return columns % 3 == 0 and 3 <= columns <= 3 * MAX_DEGREE
@@ -176,7 +180,7 @@ def array_field(
 ) -> RosyField:
     """Make a field from one of the arrays of a surface.
 
-    The count of numbers at each point or cell says what they are:
+    The number of values at each vertex or face determines what they mean:
 
     =======  ====================================================================================
     2        on a mesh with constant z: a member vector, z is 0
@@ -186,11 +190,12 @@ def array_field(
     12 ...   3 N numbers: all N directions
     =======  ====================================================================================
 
-    Vectors that are tangent to the surface are treated like vectors of a field file; see
-    `field.validate.validated_field`. Other vectors, such as velocities at the boundary of a volume,
-    are replaced by their tangential components. Those at points are projected to each face at the
-    point, and then averaged over the corners of the face as RoSys. Tensors are restricted to the
-    tangent planes; those at points are averaged over the corners.
+    If nearly all vectors are tangent to the surface, they are treated like vectors of a field file; see
+    `field.validate.validated_field`. Otherwise (velocities at the boundary of a volume, for example) all
+    vectors are replaced by their tangential components. A vector at a vertex is projected to the plane of
+    each face at that vertex. The projections at the corners of a face are then averaged in the RoSy
+    representation. Tensors are restricted to the tangent planes of the faces; tensors at vertices are first
+    averaged over the corners of each face.
 
     Parameters
     ----------
@@ -198,9 +203,10 @@ def array_field(
     name : str, optional
         See `find_array`.
     degree : int, optional
-        The degree N; `VECTOR_DEGREE` for member vectors if not given. Tensors have degree 4.
+        The degree N. If not given, it is `VECTOR_DEGREE` for member vectors. Tensors have degree 4.
     nonfinite : {"error", "zero"}
-        Raise an error if a number is not finite, or treat the vector or tensor as undefined.
+        What to do if a vector or tensor has a value that is not finite: raise an error, or treat it as
+        undefined.
 
     Returns
     -------
@@ -209,9 +215,9 @@ def array_field(
     Raises
     ------
     RosyError
-        If there is no such array, it holds scalars or tensors that are not symmetric, has another
-        degree, or has numbers that are not finite. For the deformation gradient or the gradient of a
-        velocity, use the symmetric tensor that is of interest, such as the rate of strain.
+        If there is no such array, or if the array holds scalars, tensors that are not symmetric, values
+        that are not finite, or data for another degree. A velocity gradient or deformation gradient is not
+        symmetric: use a symmetric tensor made from it, such as the rate of strain.
     """
     surface = arrays.surface
     found = find_array(arrays, name)
@@ -245,7 +251,7 @@ def array_field(
 
 
 def _raw_field(array: FieldArray, source: str) -> RawField:
-    """Return the rows of an array as vectors, directions or tensors."""
+    """Return the rows of an array as a `RawField` of vectors, directions or tensors."""
     count, columns = len(array.values), array.columns
     values = as_float64(array.values.reshape(count, columns))
     if columns == 2:
@@ -271,7 +277,7 @@ def _raw_field(array: FieldArray, source: str) -> RawField:
 def _tangential_on_faces(
     surface: Surface, vectors: np.ndarray, domain: str, degree: int
 ) -> np.ndarray | None:
-    """Return the (F, 3) tangential components of vectors on the faces; None if all are tangent already."""
+    """Return (F, 3) tangential vectors on the faces, or None if nearly all given vectors are tangent."""
     normal = tangent_normals(surface, domain)
     length = np.sqrt(dot(vectors, vectors))
     is_off = np.abs(dot(vectors, normal)) > np.sin(np.radians(TOLERANCE_DEG[domain])) * length
@@ -288,7 +294,10 @@ def _tangential_on_faces(
 
 
 def _tangential(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Return the components of (n, 3) vectors in the planes of (n, 3) unit normals."""
+    """Return the (n, 3) projections of vectors to the planes with these unit normals.
+
+    They are 0 for vectors that are parallel to the normal, and where the normal is zero.
+    """
     tangential = vectors - dot(vectors, normal)[:, None] * normal
     is_parallel = dot(tangential, tangential) <= _NORMAL_VECTOR_SINE**2 * dot(vectors, vectors)
     return np.where(is_parallel[:, None] | ~normal.any(axis=1)[:, None], 0.0, tangential)

@@ -1,8 +1,8 @@
 """Refine triangles by bisection, and find the refined triangle that contains a point.
 
-Edges that are too long are bisected in both of their triangles, so that neighbors keep sharing their edges.
-Each bisected triangle becomes the parent of two others in a binary tree, which finds the triangle of a
-point from its barycentric coordinates.
+An edge that is too long is bisected in both of its triangles, so that the refined mesh has no gaps or
+T-junctions. Each bisected triangle becomes the parent of its two halves in a binary tree. The tree is used to
+find the refined triangle that contains a point with given barycentric coordinates.
 """
 
 from __future__ import annotations
@@ -13,26 +13,29 @@ import numpy as np
 
 from .frames import dot
 
-#: Factor by which longer edges are allowed while there would be too many triangles.
+#: Factor by which the maximum edge length is raised until the number of triangles is small enough.
 LENGTH_STEP = 1.15
 
 
 @dataclass(frozen=True, eq=False)
 class BisectionTree:
-    """A forest of triangles: T roots, the given triangles, and the two halves of each bisected triangle.
+    """A forest of binary trees, whose nodes are triangles.
 
-    n is the number of all triangles, the nodes, and L is the number of leaves, which are not bisected.
+    The T roots are the given triangles. The children of a bisected triangle are its two halves. The leaves
+    are the triangles that are not bisected. n is the number of nodes (all triangles), and L the number of
+    leaves.
 
     Attributes
     ----------
     first_child : (n,) int32 ndarray
-        Node of the first half of a triangle; the second half is the next node. -1 for a leaf.
+        Node of the first half of each triangle; the second half is the node after it. -1 for a leaf.
     split_edge : (n,) int8 ndarray
-        The corner k at which the bisected edge starts; it ends at the next corner.
+        Corner (0, 1 or 2) at which the bisected edge of the triangle starts. The edge ends at the next
+        corner.
     leaf : (n,) int32 ndarray
-        Index of a leaf among the leaves. -1 for other nodes.
+        For a node that is a leaf, its index among the leaves; -1 for other nodes.
     leaf_root : (L,) int32 ndarray
-        The root that contains each leaf.
+        The root triangle that contains each leaf.
     leaf_vertex : (L, 3) int32 ndarray
         Vertices of the leaves. Midpoints of edges are numbered after the given vertices.
     leaf_weights : (L, 3, 3) float32 ndarray
@@ -50,19 +53,22 @@ class BisectionTree:
     vertices: np.ndarray
 
     def locate(self, root: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Find the leaves that contain points of the roots.
+        """Find the leaf that contains each of P points, and the barycentric coordinates of the point in it.
 
         Parameters
         ----------
         root : (P,) int ndarray
+            Root triangle of each point.
         weights : (P, 3) float32 ndarray
-            Barycentric coordinates in the root. Points outside of it are in the nearest leaf.
+            Barycentric coordinates of the point in the root. A point outside of the root belongs to a leaf
+            near it.
 
         Returns
         -------
         leaf : (P,) int32 ndarray
+            Index of the leaf.
         weights : (3, P) float32 ndarray
-            Barycentric coordinates in the leaf.
+            Barycentric coordinates of the point in the leaf.
         """
         node = root.astype(np.int32)
         result = np.ascontiguousarray(weights.T)
@@ -88,16 +94,20 @@ class BisectionTree:
 def bisect(
     vertices: np.ndarray, triangle_vertex: np.ndarray, max_length: float, max_triangles: int
 ) -> BisectionTree:
-    """Bisect triangles until their edges are short. Neighbors keep sharing their edges.
+    """Bisect triangles until no edge is longer than `max_length`.
+
+    An edge is bisected in both of its triangles, so neighbors still share their edges.
 
     Parameters
     ----------
     vertices : (V, 3) float64 ndarray
+        Positions of the vertices.
     triangle_vertex : (T, 3) int ndarray
+        Vertices of each triangle.
     max_length : float
-        Longer edges are bisected, in the units of the vertices.
+        Edges longer than this are bisected, in the units of the vertices.
     max_triangles : int
-        If there would be more triangles, longer edges are allowed.
+        Largest number of triangles. If there would be more, `max_length` is raised.
 
     Returns
     -------
@@ -107,7 +117,7 @@ def bisect(
     while True:
         lengths = _edge_lengths(leaves.vertices, leaves.vertex)
         is_long = lengths > max_length
-        # Each half of a long edge gets a triangle on either side.
+        # Bisecting an edge adds one triangle on each of its sides.
         while is_long.any() and len(lengths) + np.count_nonzero(is_long) > max_triangles:
             max_length *= LENGTH_STEP
             is_long = lengths > max_length
@@ -119,9 +129,9 @@ def bisect(
 
 
 class _Leaves:
-    """The leaves of a growing `BisectionTree`, with the arrays of the tree.
+    """The leaves of a growing `BisectionTree`, and the arrays of the tree.
 
-    A node is a leaf until it is split. `node` is (L,) int32, the node of each leaf.
+    A node is a leaf until it is split into two halves. `node` holds the (L,) int32 nodes of the leaves.
     """
 
     def __init__(self, vertices: np.ndarray, triangle_vertex: np.ndarray) -> None:
@@ -140,7 +150,8 @@ class _Leaves:
         Parameters
         ----------
         is_marked : (L, 3) bool ndarray
-            Edges from each corner to the next. Both triangles of an edge must mark it.
+            Whether the edge from each corner to the next is marked. An edge must be marked in both of its
+            triangles.
 
         Returns
         -------
@@ -160,15 +171,15 @@ class _Leaves:
         return midpoint
 
     def split_longest(self, midpoint: np.ndarray) -> np.ndarray:
-        """Split each leaf with midpoints on its edges, at the longest of these edges.
+        """Split each leaf that has midpoints on its edges in two halves, at the longest of these edges.
 
-        `midpoint` is from `add_midpoints`, or the result of the last call: the midpoints on the edges of the
-        new leaves. The halves of split edges have none.
+        `midpoint` is the result of `add_midpoints` or of the last call. The result is (L, 3) int32 for the
+        new leaves: the midpoint of each edge that is still to be split; -1 for all other edges.
         """
         parent = np.flatnonzero((midpoint >= 0).any(axis=1))
         lengths = _edge_lengths(self.vertices, self.vertex[parent])
         edge = np.where(midpoint[parent] >= 0, lengths, -1.0).argmax(axis=1)
-        # The split edge runs from corner a to b, and c is opposite.
+        # The split edge runs from corner a to corner b. Corner c is opposite to it.
         order = (edge[:, None] + np.arange(3)) % 3
         middle, on_bc, on_ca = np.take_along_axis(midpoint[parent], order, 1).T
         weights = np.take_along_axis(self.weights[parent], order[:, :, None], 1)
@@ -190,7 +201,7 @@ class _Leaves:
         return _replaced(midpoint, parent, first, second)
 
     def tree(self) -> BisectionTree:
-        """Return the tree with these leaves."""
+        """Return the `BisectionTree` with these leaves."""
         leaf = np.full(len(self.first_child), -1, dtype=np.int32)
         leaf[self.node] = np.arange(len(self.node), dtype=np.int32)
         return BisectionTree(
@@ -205,7 +216,10 @@ class _Leaves:
 
 
 def _halves(corner: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners (a, middle, c) and (middle, b, c), given (n, 3, ...) corners a, b, c."""
+    """Return the corners of both halves of triangles: (a, middle, c) and (middle, b, c).
+
+    `corner` holds the (n, 3, ...) corners a, b, c of the triangles.
+    """
     a, b, c = np.moveaxis(corner, 1, 0)
     return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
 
@@ -213,13 +227,20 @@ def _halves(corner: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _replaced(
     leaves: np.ndarray, parent: np.ndarray, first: np.ndarray, second: np.ndarray
 ) -> np.ndarray:
-    """Return values of the leaves where parents have become their first children, and the second ones follow."""
+    """Return an array of the leaves after a split, with one element for each new leaf.
+
+    In place of each parent leaf is the value of its first child. The values of the second children are
+    appended.
+    """
     leaves[parent] = first
     return np.concatenate([leaves, second])
 
 
 def _edge_lengths(vertices: np.ndarray, triangle_vertex: np.ndarray) -> np.ndarray:
-    """Return (T, 3) lengths of the edges from each corner to the next, equal in both triangles."""
+    """Return (T, 3) lengths of the edges from each corner to the next.
+
+    The length of an edge is exactly the same in both of its triangles.
+    """
     points = vertices.take(triangle_vertex, axis=0)
     edges = np.roll(points, -1, axis=1) - points
     return np.sqrt(dot(edges, edges))

@@ -1,4 +1,4 @@
-"""Rows of arrays in blocks, which bound memory, and in ranges."""
+"""Process the rows of arrays in blocks, which bounds memory, and work with ranges of rows."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-#: Rows of an array (faces, corners, edges) in a block. One takes hundredths of a second.
+#: Number of rows of an array (faces, corners, edges) in a block. A block takes hundredths of a second.
 ROWS_PER_BLOCK = 1 << 16
 
 
 def row_blocks(count: int, size: int | None = None) -> list[slice]:
-    """Split `count` rows into consecutive blocks of `size`; one empty block for no rows."""
+    """Return slices that split `count` rows into consecutive blocks of `size`; an empty slice for no rows."""
     size = ROWS_PER_BLOCK if size is None else size
     return [slice(start, min(start + size, count)) for start in range(0, max(count, 1), size)]
 
 
 def blocks_by_count(count: np.ndarray, limit: int) -> list[slice]:
-    """Split entries into consecutive slices whose counts sum up to at most a limit.
+    """Return slices that split an array of counts into consecutive parts with sums of at most `limit`.
 
-    A single entry with a larger count is a slice of its own.
+    A single count above the limit gets a slice of its own.
     """
     total = np.cumsum(count, dtype=np.int64)
     blocks, start, done = [], 0, 0
@@ -34,14 +34,15 @@ def by_rows(
     function: Callable[..., np.ndarray | tuple[np.ndarray, ...]],
     *arrays: np.ndarray,
 ) -> np.ndarray | tuple[np.ndarray, ...]:
-    """Apply a function of arrays to blocks of their rows, and join the results.
+    """Apply a function to blocks of the rows of arrays, and concatenate the results.
 
     Parameters
     ----------
     function : callable
-        Takes a block of each array and returns one array, or a tuple of arrays, with as many rows.
-        A row of the result depends on the same rows of the arrays alone.
+        Takes a block of each array, and returns one array or a tuple of arrays with the same number of rows.
+        Each row of its result must depend only on the same row of the given arrays.
     arrays : (n, ...) ndarray
+        Arrays with the same number of rows.
     """
     blocks = row_blocks(len(arrays[0]))
     parts = [function(*(array[block] for array in arrays)) for block in blocks]
@@ -51,7 +52,7 @@ def by_rows(
 
 
 def mask(count: int, index: np.ndarray) -> np.ndarray:
-    """Return (count,) bool, True at the indices."""
+    """Return a (count,) bool array that is True at the given indices."""
     result = np.zeros(count, dtype=bool)
     result[index] = True
     return result
@@ -60,7 +61,7 @@ def mask(count: int, index: np.ndarray) -> np.ndarray:
 def neighbors_of_nodes(
     node_count: int, first: np.ndarray, second: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sort the edges of a graph by their nodes.
+    """Return the neighbors of each node of a graph, as flat arrays (compressed sparse rows).
 
     Parameters
     ----------
@@ -71,10 +72,11 @@ def neighbors_of_nodes(
     Returns
     -------
     start : (n + 1,) intp ndarray
-        The neighbors of node i are ``start[i] .. start[i + 1] - 1``.
+        The neighbors of node i are at positions ``start[i] .. start[i + 1] - 1`` of the other two arrays.
     neighbor : (2 m,) int ndarray
+        The neighboring node.
     edge : (2 m,) intp ndarray
-        The edge to each neighbor, plus m if the neighbor is its first node.
+        Index of the edge to that neighbor. If the neighbor is the `first` node of the edge, m is added.
     """
     ends, others = np.concatenate([first, second]), np.concatenate([second, first])
     order = np.argsort(ends, kind="stable")
@@ -83,7 +85,7 @@ def neighbors_of_nodes(
 
 
 def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
-    """Return the concatenation of the ranges ``first[i]`` to ``first[i] + count[i] - 1``, intp.
+    """Return the concatenation of the integer ranges ``first[i]`` to ``first[i] + count[i] - 1``, as intp.
 
     Examples
     --------
@@ -99,6 +101,6 @@ def concatenated_ranges(first: np.ndarray, count: np.ndarray) -> np.ndarray:
 
 
 def as_float64(values: np.ndarray) -> np.ndarray:
-    """Return a copy of numbers as float64, without a warning for signalling NaN."""
+    """Return a copy of an array as float64, without numpy's warning for signaling NaN values."""
     with np.errstate(invalid="ignore"):
         return values.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Carry the vectors of faces along when a mesh is moved, turned or deformed."""
+"""Rotate the vectors on the faces of a mesh along with the faces, when the mesh is rotated or deformed."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from .polygon_arrays import mean_per_face
 from .representation import complex_bincount, unit_complex
 from .surface import Surface
 
-#: Largest sine of the angle between a vector and the plane of its face before the motion. Steeper
-#: vectors are not tangent to the face and stay as they are.
+#: Largest sine of the angle between a tangent vector and the plane of its face before the motion. Steeper
+#: vectors are not tangent to the face, and are not changed.
 MAX_SINE = 0.87
 
-#: Changes of a vector below this fraction of its length are rounding errors and are not made.
+#: A change of a vector that is smaller than this fraction of its length is a rounding error, and is not made.
 ROUNDING = 3e-6
 
 
 def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Rotate the vectors of faces as the faces were rotated.
+    """Return vectors on faces after they are rotated with the motion of their faces.
 
-    The rotation of a face is the one that takes its corners closest to their new positions, in the
-    plane of the face (least squares). Lengths are kept.
+    The rotation in the plane of a face is the one that takes the corners of the face closest to their new
+    positions (least squares). The lengths of vectors do not change.
 
     Parameters
     ----------
     surface : Surface
         The mesh after the motion.
     rest_vertices : (V, 3) array_like
-        The positions of its vertices before.
+        Positions of its vertices before the motion.
     vectors : (F, 3) or (F, N, 3) ndarray
         Tangent vectors before the motion.
 
     Returns
     -------
     ndarray
-        float64, in the shape of `vectors`. Vectors of faces that have not moved, or have no area
-        before or after, are the same as before.
+        float64, in the shape of `vectors`. Vectors do not change on faces that have not moved, and on faces
+        that have no area before or after the motion.
     """
     result = np.array(vectors, dtype=np.float64)
     rest_vertices = np.asarray(rest_vertices, dtype=np.float64)
@@ -69,34 +69,35 @@ def carried_vectors(surface: Surface, rest_vertices: np.ndarray, vectors: np.nda
 def vectors_on_rest_shape(
     surface: Surface, rest_vertices: np.ndarray, vectors: np.ndarray
 ) -> np.ndarray:
-    """Return vectors on a rest shape: renderers transport them to the given ones on the deformed faces.
+    """Return the vectors on the rest shape that renderers transport to given vectors on the deformed mesh.
 
-    The linear map from the corners w of a rest face to the corners u of the deformed face of least squared
-    error, u = a w + b conj(w), has the polar rotation a / |a|. Its inverse is applied.
+    Renderers rotate vectors with the faces. The least-squares linear map from the corners w of a rest face to
+    the corners u of the deformed face (complex numbers in the face planes) is u = a w + b conj(w). Its
+    rotation, by polar decomposition, is a / |a|. This function applies the inverse rotation.
 
     Parameters
     ----------
     surface : Surface
         The deformed mesh.
     rest_vertices : (V, 3) ndarray
-        The positions of its vertices in the rest shape.
+        Positions of its vertices in the rest shape.
     vectors : (F, 3) ndarray
         Tangent vectors on the deformed faces.
 
     Returns
     -------
     (F, 3) float64 ndarray
-        The lengths stay. Vectors are zero on faces without area in one of the shapes.
+        Vectors of the same lengths. They are zero on faces without area in one of the two shapes.
 
     See Also
     --------
-    rosy_addon.projection.face_values : The transport.
+    rosy_addon.projection.face_values : Transport to the deformed mesh.
     """
     rest = surface.with_vertices(rest_vertices)
     (rest_x, rest_y), w = _planar_corners(rest)
     (x, y), u = _planar_corners(surface)
     face, count = surface.corner_face, surface.face_count
-    # Relative to the first corner of the face, as in the transport.
+    # Rotations are relative to the first corner of the face, as in `projection.face_values`.
     w, u = (offset - offset[surface.face_start[:-1]][face] for offset in (w, u))
     squared_norm = np.bincount(face, np.abs(w) ** 2, count)
     ww, uw = (complex_bincount(face, product, count) for product in (w * w, u * w))
@@ -106,7 +107,7 @@ def vectors_on_rest_shape(
 
 
 def _planar_corners(surface: Surface) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    """Return the tangent frame of each face, and (C,) complex128 offsets of corners from its center."""
+    """Return the tangent frame of each face, and the (C,) complex128 offsets of corners from face centers."""
     x, y = tangent_frame(surface.face_normal)
     face = surface.corner_face
     points = surface.vertices[surface.corner_vertex]

@@ -1,9 +1,10 @@
-"""Add the singularities that a field needs besides given ones, where they add the least energy.
+"""Find the singularities that a field needs besides given ones, at vertices where they add least energy.
 
 First, a connection with the given singularities is computed. The smoothest field of this connection (Knöppel,
 Crane, Pinkall and Schröder, SIGGRAPH 2013) has the missing singularities. These are then moved from vertex to
-vertex, as long as the energy of all angles decreases (`turning_angles`). In this energy, singularities are
-charges: each lies in the potential of all others and of the curvature. Opposite ones vanish where they meet.
+neighboring vertex, as long as the sum of the squared turning angles of the field decreases
+(`turning_angles`). This energy is like that of electric charges: each singularity lies in the potential of
+all other singularities and of the curvature. Singularities of opposite indices vanish where they meet.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ from .sparse_multigrid import CSRMatrix, from_edges
 from .surface import Surface
 from .turning_angles import least_angles, potential_solver
 
-#: Largest number of steps to neighboring vertices.
+#: Largest number of rounds in which singularities move to neighboring vertices.
 MAX_STEPS = 60
 
-#: Residual norm of the potential, relative to the norm of the right-hand side.
+#: Residual norm at which the solver for the potential stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-8
 
 #: Effective resistance between two neighbors in a triangulation, relative to the resistance of their edge
 #: alone: the mean over all edges, by Foster's theorem.
 EDGE_RESISTANCE = 1 / 3
 
-#: Least share of the singularities that are moved at once.
+#: Smallest share of the singularities that are moved in one round.
 MIN_SHARE = 0.05
 
 
 def cheapest_singularities(
     surface: Surface, degree: int, vertex: np.ndarray, index: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the missing singularities at vertices where the field stays as smooth as possible.
+    """Add the singularities that a field needs in addition to given ones, where it stays smoothest.
 
     Parameters
     ----------
@@ -49,18 +50,18 @@ def cheapest_singularities(
     degree : int
         N.
     vertex, index : (K,) int ndarray
-        The given singularities, in units of 1 / N.
+        Vertices and indices (in units of 1 / N) of the given singularities.
 
     Returns
     -------
     vertex, index : (K + L,) int64 ndarray
-        The given singularities, then the added ones, at other vertices. On a closed surface, all indices add
-        up to N times the Euler characteristic.
+        The K given singularities, followed by the L added ones, which lie at other vertices. On a closed
+        surface, all indices add up to N times the Euler characteristic.
 
     Raises
     ------
     RosyError
-        If a vertex has no index (at a border, or not in the mesh), or no face has an area.
+        If a vertex cannot be singular (at a border, or not in the mesh), or if no face has an area.
     """
     degree = check_degree(degree)
     x, y = face_frames(surface)
@@ -91,7 +92,10 @@ def cheapest_singularities(
 
 
 def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndarray) -> np.ndarray:
-    """Return (n,) parts of the given indices on each closed component, spread over its nodes by area."""
+    """Return (n,) values at the nodes: the sum of the given indices on a component, distributed by area.
+
+    They are 0 on components with a border.
+    """
     corner_area = (area / np.diff(surface.face_start))[surface.corner_face]
     node_area = np.bincount(graph.corner_node, corner_area, graph.node_count)
     component = graph.node_component
@@ -103,7 +107,10 @@ def _spread(surface: Surface, graph: FaceGraph, area: np.ndarray, given: np.ndar
 
 
 def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray) -> np.ndarray:
-    """Return (n,) int64 indices of the added singularities, moved to where they cost least, off the given ones."""
+    """Return the (n,) int64 indices of added singularities after moving them to where they add least energy.
+
+    They are also moved away from the given singularities. The index is 0 at nodes without a singularity.
+    """
     if not added.any():
         return added
     with progress(0.0, 0.2):
@@ -116,7 +123,7 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
         charge = unit * (given + added) - graph.defect
         potential = potential_of(charge)
         energy = float(charge[graph.is_interior] @ potential[graph.is_interior])
-        # Those that are still at given singularities have to leave them, whatever it costs.
+        # Added singularities that are still at given ones have to leave them, even if that adds energy.
         if energy < least or (best[given != 0] != 0).any():
             best, best_potential, least = added, potential, energy
         else:
@@ -130,7 +137,7 @@ def _settled(graph: FaceGraph, degree: int, given: np.ndarray, added: np.ndarray
 
 
 class _Neighbors:
-    """The vertex nodes and their neighbors along edges."""
+    """The vertex nodes of a graph of faces, and the neighbors of each along edges."""
 
     def __init__(self, graph: FaceGraph) -> None:
         self._start, self._neighbor, edge = neighbors_of_nodes(
@@ -147,7 +154,11 @@ class _Neighbors:
         potential: np.ndarray,
         share: float,
     ) -> np.ndarray:
-        """Return (n,) indices after moving a share of the singularities to their best neighbors."""
+        """Return (n,) indices of the added singularities after one round of moves.
+
+        A share of the singularities that would reduce the energy are moved to their best neighbor. Those at
+        a given singularity must leave it, and are moved first.
+        """
         moves = []
         for node in np.flatnonzero(added).tolist():
             around = slice(self._start[node], self._start[node + 1])
@@ -171,7 +182,10 @@ class _Neighbors:
 
 
 def _energy(graph: FaceGraph, degree: int, angle: np.ndarray, diagonal: np.ndarray) -> CSRMatrix:
-    """Return the matrix of the Dirichlet energy of representations on faces, for a field that turns by angles."""
+    """Return the matrix of the Dirichlet energy of (F,) representations, relative to given turning angles.
+
+    The energy is 0 for a field that turns by `angle` across the edges.
+    """
     source, target, weight = graph.source, graph.target, 1 / graph.conductance
     transport = np.exp(1j * degree * (graph.unfolding + angle))
     ends = np.concatenate([source, target])

@@ -16,10 +16,10 @@ CELLS_PER_TRIANGLE = 1.0
 #: against every point.
 MAX_CELLS_PER_AXIS = 8
 
-#: Pairs of points and triangles processed at once, to bound memory.
+#: Number of pairs of points and triangles that are processed at once, to bound memory.
 MAX_PAIRS = 1 << 18
 
-#: Label of the progress.
+#: Text that is shown with the progress bar.
 LABEL = "finding the closest faces"
 
 
@@ -32,16 +32,17 @@ def closest_triangles(
     ----------
     surface : Surface
     points : (n, 3) float64 ndarray
-        Object space.
+        Positions in object space.
     max_distance : float
-        The results of points farther away than this are of any triangle, or of none.
+        Largest distance that matters. For a point that is farther away from the surface, the result may be
+        any triangle at its distance, or none.
 
     Returns
     -------
     triangle : (n,) int32 ndarray
-        Index into `surface.triangles`; the smallest one, if several are equally close.
+        Index into `surface.triangles`; the smallest index if several triangles are equally close.
     distance : (n,) float64 ndarray
-        Distance of the point from the triangle, Blender units; infinite if no triangle was found.
+        Distance of the point from the triangle, in object space; infinite if no triangle was found.
     """
     report(0.0, LABEL)
     search = _ClosestSearch(surface, np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3))
@@ -52,8 +53,8 @@ def closest_triangles(
     search.update(
         np.repeat(unfinished, large_count), np.tile(search.large_triangles, len(unfinished))
     )
-    # Search rings of cells around the cell of each point, until the next ring cannot hold a closer
-    # triangle, or only ones beyond the maximum distance.
+    # Search rings of cells around the cell of each point. Stop when all triangles of the next ring are
+    # farther away than the closest triangle so far, or farther than the maximum distance.
     ring = 0
     while len(unfinished):
         report(1 - len(unfinished) / len(points), LABEL)
@@ -66,17 +67,18 @@ def closest_triangles(
 
 
 class _ClosestSearch:
-    """The closest triangles of points so far, and a uniform grid of cubic cells to find others.
+    """State of the search for closest triangles: a uniform grid of cubic cells, and the results so far.
 
-    A cell has the triangles whose bounding boxes touch it.
+    Each cell lists the triangles whose bounding boxes touch the cell.
 
     Attributes
     ----------
     points : (n, 3) float64 ndarray
+        Points for which the closest triangle is searched.
     triangle : (n,) int32 ndarray
         Closest triangle of each point so far.
     distance : (n,) float64 ndarray
-        Its distance.
+        Distance of each point from that triangle; infinite before the first one is found.
     """
 
     def __init__(self, surface: Surface, points: np.ndarray) -> None:
@@ -88,8 +90,8 @@ class _ClosestSearch:
         self.origin, self.top = low.min(axis=0), high.max(axis=0)
         extent = self.top - self.origin
         longest = max(float(extent.max()), 1e-300)
-        # The surface passes through about T cells if T cell faces have the area of its bounding box,
-        # which has six sides.
+        # Choose the cell size so that the surface passes through about CELLS_PER_TRIANGLE * T cells. Its area
+        # is estimated as that of a cube with six sides around it.
         self.cell_size = longest / max(np.sqrt(CELLS_PER_TRIANGLE * len(self.corners) / 6), 1)
         self.shape = np.maximum((extent / self.cell_size).astype(np.int64) + 1, 1)
         self.max_ring = int(self.shape.max()) + 1
@@ -115,29 +117,32 @@ class _ClosestSearch:
         self.key, self.cell_triangle = cell_key[order], owner[order].astype(np.int32)
 
     def _cells_of(self, points: np.ndarray) -> np.ndarray:
-        """Return (n, 3) int64 cells of points; the nearest cell for points outside of the grid."""
+        """Return the (n, 3) int64 cells that contain points, or are nearest to points outside of the grid."""
         return np.clip(np.floor(self._in_cells(points)), 0, self.shape - 1).astype(np.int64)
 
     def _in_cells(self, points: np.ndarray) -> np.ndarray:
-        """Return (n, 3) positions of points in cells; points far outside of the grid are moved next to it."""
+        """Return (n, 3) positions of points in grid coordinates, in which cells have the size 1.
+
+        Points far outside of the grid are moved next to it.
+        """
         margin = self.cell_size
         points = np.clip(points, self.origin - margin, self.top + margin)
         return (points - self.origin) / self.cell_size
 
     def _keys_of(self, cell: np.ndarray) -> np.ndarray:
-        """Return (n,) int64, (n, 3) cells as single numbers, to sort by."""
+        """Return one int64 key for each of (n, 3) cells, for sorting."""
         return (cell[:, 0] * self.shape[1] + cell[:, 1]) * self.shape[2] + cell[:, 2]
 
     def distance_to_cell_border(self, selection: np.ndarray) -> np.ndarray:
-        """Return (k,) distances of (k,) points from the border of their cell; 0 outside of the grid."""
+        """Return (k,) distances of selected points from the sides of their cells; 0 outside of the grid."""
         points = self.points[selection]
         fraction = self._in_cells(points) - self._cells_of(points)
         return np.maximum(np.minimum(fraction, 1 - fraction).min(axis=1), 0) * self.cell_size
 
     def search_ring(self, selection: np.ndarray, ring: int) -> None:
-        """Test (k,) points against the triangles in one ring of cells around their own.
+        """Test the selected points against the triangles in one ring of cells around the cell of each point.
 
-        `ring` is the distance of the ring in cells, 0 for the cell of the point.
+        `ring` is the distance of the ring in cells; 0 is the cell of the point.
         """
         side = np.arange(-ring, ring + 1)
         offset = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -162,14 +167,17 @@ class _ClosestSearch:
     def _cell_distances(
         self, selection: np.ndarray, own_cell: np.ndarray, offset: np.ndarray
     ) -> np.ndarray:
-        """Return (k c,) distances of (k,) points from the c cells at the given offsets from their own."""
+        """Return the distances of the k selected points from c cells each, as a (k c,) array.
+
+        The cells are given by (c, 3) offsets from the cell of each point.
+        """
         size = self.cell_size
         position = (self.points[selection] - self.origin - own_cell * size)[:, None]
         gap = np.maximum(np.maximum(offset * size - position, position - (offset + 1) * size), 0)
         return np.sqrt(dot(gap, gap)).ravel()
 
     def update(self, owner: np.ndarray, candidate: np.ndarray) -> None:
-        """Update the closest triangles with (p,) pairs of points and candidate triangles."""
+        """Update the results, given pairs of a point (`owner`) and a candidate for its closest triangle."""
         for start in range(0, len(owner), MAX_PAIRS):
             block = slice(start, start + MAX_PAIRS)
             point, triangle = owner[block], candidate[block]
@@ -178,14 +186,14 @@ class _ClosestSearch:
                 (distance == self.distance[point]) & (triangle < self.triangle[point])
             )
             point, triangle, distance = point[is_closer], triangle[is_closer], distance[is_closer]
-            # The best candidate of a point is the last that is stored.
+            # Sort so that the best candidate of a point is stored last.
             order = np.lexsort((triangle, distance))[::-1]
             self.distance[point[order]] = distance[order]
             self.triangle[point[order]] = triangle[order]
 
 
 def point_triangle_distances(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return (n,) distances of (n, 3) points from (n, 3, 3) triangles."""
+    """Return the (n,) distances of (n, 3) points from one triangle each, with (n, 3, 3) corners."""
     a, b, c = (corners[:, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     size = np.sqrt(dot(normal, normal))

@@ -1,8 +1,9 @@
-"""Combing: a brush that changes guides along strokes, and the field that follows these guides.
+"""Combing: a brush that changes the guides of a field along strokes, and the field that follows these guides.
 
-A guide of a face is a representation (see `representation`) whose modulus is its firmness; see
-`guided_system.firmness_weights`. The field solves the system of its guides: near the brush at once, and everywhere
-after `Combing.settle`.
+The guide of a face is the RoSy that the field should have there, stored as a representation (see
+`representation`). Its modulus is the *firmness* of the guide: how strictly the field follows it, from 0 to
+1 (see `guided_system.firmness_weights`). The field is the solution of a linear system. During a stroke, it
+is solved near the brush only; `Combing.settle` solves it everywhere.
 """
 
 from __future__ import annotations
@@ -26,47 +27,52 @@ from .guided_system import (
 from .representation import to_representation, unit_complex
 from .rosy_field import RosyField
 
-#: Distance between dabs along a stroke, relative to the radius of the brush.
+#: Distance between dabs (the samples at which a brush takes effect) along a stroke, relative to the radius of
+#: the brush.
 DAB_SPACING = 1 / 6
 
-#: Least distance between dabs, relative to `Surface.extent`, and largest number of dabs between two points.
+#: Smallest distance between dabs, relative to `Surface.extent`, and largest number of dabs between two points
+#: of a stroke.
 MIN_SPACING, MAX_DABS = 2.0**-12, 100_000
 
 #: A face that a stroke reaches again is combed anew if the stroke was elsewhere for this arc length, relative
 #: to the radius.
 PASS_GAP = 2.0
 
-#: Firmness of a guide that is not exact, where the brush has its full effect.
+#: Firmness of a combed guide that is not exact, where the brush has its full effect.
 SOFT_FIRMNESS = 0.98
 
-#: Guides of less firmness are removed.
+#: Guides with a smaller firmness than this are removed.
 LEAST_FIRMNESS = 1e-6
 
-#: Shortest projection of the unit direction of a stroke to a face that combs it.
+#: A face is combed only if the unit direction of the stroke, projected to the face, has at least this length.
 MIN_PROJECTION = 0.2
 
-#: What a brush does.
+#: The effects of a brush, with the descriptions shown in the interface.
 EFFECTS = {
     "comb": "Turn the field along the stroke",
     "erase": "Remove guides",
     "smooth": "Average guides with those around them",
 }
 
-#: Nodes around changed guides that are solved at once, and the iterations of the solver.
+#: Number of nodes around changed guides for which the field is solved during a stroke, and largest number of
+#: iterations of the solver.
 NEAR_NODES, NEAR_ITERATIONS = 3000, 30
 
-#: Least reach in lengths of edges: the guides that keep the rest of the field stay weak.
+#: Smallest `reach` of `start_combing`, in mean edge lengths. It keeps the guides that preserve the rest of
+#: the field weak.
 MIN_REACH_EDGES = 2.0
 
 
 class Combing:
-    """A field and the guides that it follows; made by `start_combing`.
+    """A field that is being combed, and the guides that it follows. `start_combing` makes one.
 
     Attributes
     ----------
     system : GuidedSystem
+        The linear system for fields that follow guides.
     guides : (F,) complex128 ndarray
-        Representations of the guides, whose moduli are their firmness. Call `follow` after a change.
+        Representations of the guides, whose moduli are their firmness. Call `follow` after changing them.
     magnitude : (F,) float64 ndarray
         Magnitude of the field.
     """
@@ -83,7 +89,7 @@ class Combing:
 
     @property
     def vectors(self) -> np.ndarray:
-        """(F, 3) float64: the field."""
+        """(F, 3) float64: the current field, as one member vector for each face."""
         return self.system.to_vectors(self.magnitude * self._face_z)
 
     @property
@@ -93,7 +99,7 @@ class Combing:
 
     @property
     def representations(self) -> tuple[np.ndarray, np.ndarray]:
-        """(n,) complex128 at the nodes and (F,) complex128 on the faces: the state that is solved for."""
+        """Current solution: (n,) complex128 representations at the nodes and (F,) complex128 on the faces."""
         return self._z, self._face_z
 
     @representations.setter
@@ -101,7 +107,7 @@ class Combing:
         self._z, self._face_z = representations
 
     def follow(self, face: np.ndarray) -> None:
-        """Let the field follow changed guides on (m,) faces, near them."""
+        """Update the field near faces whose guides have changed; `face` holds these (m,) faces."""
         if not len(face):
             return
         node = self.system.nodes_of_faces(face)
@@ -113,7 +119,10 @@ class Combing:
         self._set_face_z(self.system.face_representations_at(self._z, changed), changed)
 
     def settle(self, tolerance: float = RELATIVE_TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
-        """Solve the whole system, and return `representations`. Without any guide, the field stays."""
+        """Solve the linear system for the whole surface, and return `representations`.
+
+        If there are no guides, the field does not change.
+        """
         if not self.guides.any():
             return self.representations
         self._node_guides = self._guides_at_nodes()
@@ -124,7 +133,7 @@ class Combing:
         return self.representations
 
     def _update_node_guides(self, node: np.ndarray) -> None:
-        """Bring the guides at nodes up to date."""
+        """Recompute the guides at the given nodes from the guides on the faces around them."""
         if self._node_guides is None:
             self._node_guides = self._guides_at_nodes()
             return
@@ -139,7 +148,7 @@ class Combing:
         return self.system.node_guides(unit_complex(self.guides), weight, is_exact, corner)
 
     def _set_face_z(self, z: np.ndarray, face: np.ndarray) -> None:
-        """Set the field from its representations on (m,) faces."""
+        """Set the field on (m,) faces to representations, normalized; exact guides take precedence."""
         z = unit_representations(z)
         guides = self.guides[face]
         is_exact = np.abs(guides) >= EXACT_FIRMNESS
@@ -150,19 +159,19 @@ class Combing:
 def start_combing(
     system: GuidedSystem, field: RosyField, guide_vectors: np.ndarray, reach: float
 ) -> Combing:
-    """Prepare a field for combing.
+    """Return a `Combing` with the given field and guides.
 
     Parameters
     ----------
     system : GuidedSystem
-        The system of the surface, for the degree of the field.
+        The linear system of the surface, for the degree of the field.
     field : RosyField
-        A RoSy.
+        A field whose directions are rotationally symmetric.
     guide_vectors : (F, 3) ndarray
-        Member vectors whose lengths are the firmness of guides. On faces without a guide, the field itself
-        becomes a weak one, so that it stays what it is away from the strokes.
+        Member vectors whose lengths are the firmness of the guides; zero on faces without a guide. On these
+        faces, the field itself becomes a weak guide, so that it does not change far from the strokes.
     reach : float
-        Distance from the strokes at which a field that had no guides is what it was. Object space.
+        Distance from a stroke over which the change of a field without guides falls off, in object space.
 
     Raises
     ------
@@ -187,22 +196,23 @@ def start_combing(
 
 @dataclass(frozen=True)
 class GuideBrush:
-    """The settings of a brush.
+    """The settings of a combing brush.
 
     Attributes
     ----------
     radius : float
-        Object space.
+        Radius in object space.
     strength : float
-        0 to 1.
+        Strength of the effect, from 0 to 1.
     effect : str
         One of `EFFECTS`.
     is_exact : bool
-        The field follows combed guides exactly, in the whole radius.
+        Whether the field follows combed guides exactly, in the whole radius of the brush.
     front_faces : bool
-        Leave out faces whose normals point away from the normal under the brush.
+        Whether to skip faces that face away from the surface under the brush: the angle between the normals
+        is at least 90 degrees.
     mirror : sequence of 3 bools
-        Repeat the stroke on the other sides of the planes x = 0, y = 0 and z = 0.
+        For each of the planes x = 0, y = 0 and z = 0, whether to repeat the stroke on its other side.
     """
 
     radius: float
@@ -213,7 +223,10 @@ class GuideBrush:
     mirror: Sequence[bool] = (False, False, False)
 
     def falloff(self, distance: np.ndarray) -> np.ndarray:
-        """Return the effect at distances from the stroke: 1 on the stroke, 0 at the radius."""
+        """Return the strength of the effect at distances from the stroke: 1 on it, and 0 at the radius.
+
+        If the brush combs exactly, the strength is 1 everywhere within the radius.
+        """
         if self.is_exact and self.effect == "comb":
             return (distance < self.radius).astype(np.float64)
         x = np.clip(1 - (distance / self.radius) ** 2, 0, 1)
@@ -222,7 +235,7 @@ class GuideBrush:
 
 @dataclass(frozen=True, eq=False)
 class _Dab:
-    """A sample of the stroke: a position (3,), the pressure there, and the arc length up to it."""
+    """A dab, one sample of a brush stroke: its (3,) position, pressure, and arc length from the start."""
 
     position: np.ndarray
     pressure: float
@@ -230,7 +243,7 @@ class _Dab:
 
 
 class BrushStroke:
-    """A stroke of a brush, which may be given point by point.
+    """A brush stroke, drawn point by point, that changes guides.
 
     The result does not depend on how the points are divided between calls of `extend`.
 
@@ -238,10 +251,10 @@ class BrushStroke:
     ----------
     system : GuidedSystem
     guides : (F,) complex128 ndarray
-        Representations in the frames of the system. They are changed in place.
+        Representations of the guides, in the face frames of the system. They are changed in place.
     brush : GuideBrush
     locate : callable
-        Returns the (n,) int faces closest to (n, 3) points in object space; -1 for no face.
+        Function that returns the (n,) int faces closest to (n, 3) points in object space; -1 for no face.
     """
 
     def __init__(
@@ -265,7 +278,7 @@ class BrushStroke:
         self._signs = signs
         self._start_arc_length = 0.0
         self._end: _Dab | None = None  # the last point, which need not be a dab
-        self._dabs: list[_Dab] = []  # the last two and new ones
+        self._dabs: list[_Dab] = []  # the last dabs that were drawn, and new ones
         # State of each face in the current pass of the stroke over it.
         count = self._surface.face_count
         self._last_arc_length = np.full(count, -np.inf)
@@ -274,24 +287,28 @@ class BrushStroke:
         self._base = np.zeros(count, dtype=np.complex128)
 
     def extend(self, points: np.ndarray, pressure: np.ndarray) -> np.ndarray:
-        """Go on to (n, 3) points in object space, with (n,) pressures from 0 to 1.
+        """Continue the stroke through (n, 3) points in object space, with (n,) pressures from 0 to 1.
 
         Returns
         -------
         (m,) intp ndarray
-            Faces whose guides may have changed. The last piece, up to two dabs long, waits for later points.
+            Faces whose guides may have changed. The last piece of the stroke, up to two dabs long, is drawn
+            by the next call or by `finish`.
 
         Raises
         ------
         RosyError
-            If a point is not finite, or so far away that there would be more than `MAX_DABS` up to it.
+            If a point is not finite, or if the way to it needs more than `MAX_DABS` dabs.
         """
         for point, value in zip(points, pressure, strict=True):
             self._add_dabs_to(np.asarray(point, dtype=np.float64), float(value))
         return self._draw()
 
     def finish(self) -> np.ndarray:
-        """Draw the end of the stroke. Return what `extend` does. Later points begin elsewhere."""
+        """Draw the last piece of the stroke, and return the (m,) intp faces whose guides may have changed.
+
+        Points that are added after this begin a new stroke.
+        """
         end = self._end
         if end is None:
             return np.empty(0, dtype=np.intp)
@@ -305,7 +322,7 @@ class BrushStroke:
         return changed
 
     def _add_dabs_to(self, point: np.ndarray, pressure: float) -> None:
-        """Add dabs at even distances on the way to a point."""
+        """Add dabs at equal distances on the straight line from the last point to this one."""
         if self._end is None:
             self._end = _Dab(point, pressure, self._start_arc_length)
             self._dabs = [self._end, self._end]  # the start has no earlier dab
@@ -327,7 +344,11 @@ class BrushStroke:
         self._end = _Dab(point, pressure, start.arc_length + length)
 
     def _draw(self) -> np.ndarray:
-        """Draw the segments whose ends both have an earlier and a later dab. Return the faces near the segments."""
+        """Draw the segments between dabs that are not drawn yet, and return the faces near these segments.
+
+        The tangent at a dab needs the dab before and the dab after it. So a segment is drawn as soon as
+        there are dabs before and after both of its ends.
+        """
         dabs = self._dabs
         if len(dabs) < 4 and not (len(dabs) == 3 and dabs[1] is dabs[2]):
             return np.empty(0, dtype=np.intp)
@@ -353,7 +374,11 @@ class BrushStroke:
         return np.unique(np.concatenate(near))
 
     def _near_faces(self, positions: np.ndarray, located: np.ndarray) -> np.ndarray:
-        """Return the faces that dabs at (n, 3) positions on (n,) located faces may reach."""
+        """Return the faces that may be within the radius of dabs.
+
+        The dabs have (n, 3) positions and lie on the (n,) faces `located`, which are included; -1 for no
+        face.
+        """
         low, high = positions.min(axis=0), positions.max(axis=0)
         center = self._surface.face_center
         excess = np.maximum(np.maximum(low - center, center - high), 0)
@@ -369,7 +394,7 @@ class BrushStroke:
         dabs: Sequence[_Dab],
         located: np.ndarray,
     ) -> None:
-        """Draw between two dabs, or at one."""
+        """Apply the effect of the brush to faces near the segment between two dabs, or near a single dab."""
         brush, normal = self._brush, self._surface.face_normal
         on_face = located[located >= 0]
         if not len(on_face):
@@ -409,7 +434,10 @@ class BrushStroke:
             self._comb(face, distance, direction[is_reached])
 
     def _begin_passes(self, face: np.ndarray, arc_length: float) -> None:
-        """Begin a new pass over faces that the stroke left some arc length ago, or has never reached."""
+        """Begin a new pass over faces that the stroke has never reached, or left `PASS_GAP` radii ago.
+
+        The effect of a pass is applied to the guides that the face had when the pass began.
+        """
         is_new = face[arc_length - self._last_arc_length[face] > PASS_GAP * self._brush.radius]
         self._last_arc_length[face] = arc_length
         self._base[is_new] = self.guides[is_new]
@@ -417,7 +445,7 @@ class BrushStroke:
         self._coverage[is_new] = 0
 
     def _comb(self, face: np.ndarray, distance: np.ndarray, direction: np.ndarray) -> None:
-        """Turn guides to directions of the stroke, unless a nearer part of it has done so."""
+        """Turn the guides of faces to the direction of the stroke, at its part nearest to the face so far."""
         is_closest = distance <= self._least_distance[face]
         face = face[is_closest]
         self._least_distance[face] = distance[is_closest]

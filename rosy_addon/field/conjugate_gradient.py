@@ -1,4 +1,4 @@
-"""Conjugate gradients for sparse Hermitian matrices, preconditioned by multigrid."""
+"""The conjugate gradient method for sparse Hermitian matrices, preconditioned by multigrid."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .sparse_multigrid import CSRMatrix, hierarchy, w_cycle
 #: Residual norm at which the iteration stops by default, relative to the norm of the right-hand side.
 RELATIVE_TOLERANCE = 1e-9
 MAX_ITERATIONS = 400
-#: The least residual norm relative to the first one.
+#: Smallest norm of the residual that is reached, relative to the norm of the first residual.
 ROUNDING_ERROR = float(np.finfo(float).eps)
 
 
@@ -27,37 +27,39 @@ def conjugate_gradient(
     is_fixed: np.ndarray | None = None,
     max_iterations: int = MAX_ITERATIONS,
 ) -> np.ndarray:
-    """Solve ``matrix @ solution = rhs`` by preconditioned conjugate gradients.
+    """Solve ``matrix @ solution = rhs`` by the preconditioned conjugate gradient method.
 
     Parameters
     ----------
     matrix : CSRMatrix
-        (n, n), Hermitian and positive definite.
+        The (n, n) matrix, Hermitian and positive definite.
     rhs : (n,) complex or float ndarray
+        Right-hand side.
     tolerance : float
-        Residual norm at which the iteration stops, relative to the norm of `rhs`. Rounding errors may stop
-        it before.
+        Residual norm at which the iteration stops, relative to the norm of `rhs`. The iteration stops earlier
+        if rounding errors prevent progress.
     precondition : callable, optional
-        Applies an approximate inverse of the matrix, Hermitian and positive definite, to a vector. A W-cycle
-        of multigrid by default.
+        Function that multiplies a vector by a Hermitian, positive definite approximation of the inverse of
+        the matrix. By default a multigrid W-cycle.
     label : str
-        Label of the progress.
+        Text that is shown with the progress bar.
     start : (n,) complex or float ndarray, optional
-        First approximation; 0 by default.
+        Estimate from which the iteration starts; 0 by default.
     is_fixed : (n,) bool ndarray, optional
-        Unknowns that keep the values of `start`. Their equations are left out.
+        Unknowns that keep their values in `start`. Their equations are left out.
     max_iterations : int
 
     Returns
     -------
     (n,) complex or float ndarray
-        The last iterate.
+        The solution: the last iterate.
     """
     if precondition is None:
         with progress(0.0, 0.5):
             levels = hierarchy(matrix)
         precondition = partial(w_cycle, levels)
-    # Squares of scaled numbers stay in range. A power of two, in range itself, keeps all their digits.
+    # Scale all numbers so that their squares stay in the range of floating-point numbers. A power of two
+    # changes no digits.
     scale = 0.5 ** np.clip(np.frexp(_largest_part(rhs, start))[1], -1000, 1000)
     rhs = scale * rhs
     if start is None:
@@ -94,7 +96,7 @@ def conjugate_gradient(
 
 
 def _largest_part(*vectors: np.ndarray | None) -> float:
-    """Return the largest absolute value of a real or an imaginary part."""
+    """Return the largest absolute value of all real and imaginary parts of some vectors; None is skipped."""
     return max(
         float(np.abs(part).max(initial=0))
         for vector in vectors
@@ -104,11 +106,11 @@ def _largest_part(*vectors: np.ndarray | None) -> float:
 
 
 def _norm(vector: np.ndarray) -> float:
-    """Return the Euclidean norm."""
+    """Return the Euclidean norm of a real or complex vector."""
     return float(np.sqrt(_real_inner_product(vector, vector)))
 
 
 def _real_inner_product(a: np.ndarray, b: np.ndarray) -> float:
-    """Return the real part of the inner product a* b."""
+    """Return the real part of the inner product a* b of two vectors."""
     product = np.sum(a.real * b.real)
     return float(product + np.sum(a.imag * b.imag) if np.iscomplexobj(a) else product)

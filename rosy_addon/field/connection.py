@@ -4,9 +4,10 @@ An *umbrella* is a set of triangles around a vertex that are connected by shared
 *node* is a vertex together with one of its umbrellas. A vertex with several umbrellas (a
 nonmanifold vertex, or one on a nonmanifold edge) becomes several nodes.
 
-Tangent vectors at a node are complex numbers in a polar map of its umbrella. Around interior
-vertices the angles of this map are scaled to add up to 2 pi. Transport along an edge keeps the
-angle between the vector and the edge.
+Tangent vectors at a node are complex numbers in polar coordinates of its umbrella (its *polar map*): a
+direction is the sum of the corner angles up to it, counter-clockwise from the first edge. At interior
+vertices these angles are scaled so that a full turn is 2 pi. Transport along an edge keeps the angle between
+the vector and the edge.
 
 Reference: Knöppel, Crane, Pinkall and Schröder, "Globally Optimal Direction Fields", SIGGRAPH 2013,
 section 6. Here, weights are cotangents and masses are lumped.
@@ -29,7 +30,7 @@ from .surface import Surface
 #: Largest absolute value of a cotangent. Without a limit, slivers would dominate the energy.
 MAX_COTANGENT = 1e3
 
-#: Triangles processed at once, to bound memory and fit in the CPU caches.
+#: Number of triangles that are processed at once, to bound memory and to fit in the CPU caches.
 BLOCK_TRIANGLES = 1 << 14
 
 
@@ -37,7 +38,8 @@ BLOCK_TRIANGLES = 1 << 14
 class Connection:
     """The nodes of a triangulated surface, and the transport and weights along its edges.
 
-    T is the number of triangles, n of nodes and E of edges.
+    A node is a vertex with a set of triangles around it that are connected by edges; see the module
+    docstring. T is the number of triangles, n the number of nodes and E the number of edges.
 
     Attributes
     ----------
@@ -46,11 +48,12 @@ class Connection:
     node_count : int
         n.
     edge_direction : (3 T,) float64 ndarray
-        Direction of the edge from each corner to the next, in the polar map of the node, radians.
+        Direction of the edge from each corner to the next corner of its triangle, as an angle in radians
+        in the polar map of the corner's node.
     bisector_direction : (3 T,) float64 ndarray
-        Direction of the angle bisector of each corner, in the same map, radians.
+        Direction of the angle bisector of each corner, as an angle in radians in the polar map of its node.
     corner_angle : (3 T,) float64 ndarray
-        Interior angle of the triangle at each corner, radians.
+        Interior angle of the triangle at each corner, in radians.
     area : (T,) float64 ndarray
         Areas of the triangles.
     mass : (n,) float64 ndarray
@@ -82,12 +85,12 @@ class Connection:
 
     @property
     def positive_mass(self) -> np.ndarray:
-        """(n,) float64: `mass`, with a small positive value at nodes without area."""
+        """(n,) float64: `mass`, but a small positive value at nodes where the mass is 0."""
         return np.maximum(self.mass, 1e-12 * max(float(self.mass.mean()), 1e-300))
 
 
 def build_connection(surface: Surface) -> Connection:
-    """Build the connection of the triangles of a surface, at `Surface.vertices`."""
+    """Build the connection of the triangles of a surface, with the positions in `Surface.vertices`."""
     report(0.0, "building the connection Laplacian")
     vertex = surface.triangle_vertex.ravel()
     start = np.arange(0, len(vertex) + 1, 3, dtype=np.int32)
@@ -113,7 +116,7 @@ def build_connection(surface: Surface) -> Connection:
     edge_direction = offset * angle_scale[corner_node]
     bisector_direction = (offset + 0.5 * corner_angle) * angle_scale[corner_node]
 
-    # Each edge once: from the tail corner to the next corner of its triangle.
+    # Take each edge once, from the tail corner to the next corner of its triangle.
     is_edge = (twin < 0) | (corner < twin)
     tail_corner, head_corner = corner[is_edge], next_corner[corner[is_edge]]
     # The direction of the reversed edge at its head is the direction of the twin halfedge or, at a
@@ -145,7 +148,7 @@ def build_connection(surface: Surface) -> Connection:
 
 
 def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMatrix:
-    """Return the matrix of the Dirichlet energy of representations z, plus `shift` times the masses.
+    """Return the connection Laplacian L for RoSy representations z, plus `shift` times the mass matrix.
 
     Parameters
     ----------
@@ -153,13 +156,14 @@ def laplacian(connection: Connection, degree: int, shift: float = 0.0) -> CSRMat
     degree : int
         N.
     shift : float
-        Factor of the diagonal mass matrix that is added.
+        Factor by which the diagonal mass matrix is multiplied before it is added.
 
     Returns
     -------
     (n, n) CSRMatrix
-        Hermitian L. Without a shift, z* L z is the sum over all edges of w |z_i - r^N z_j|^2, where
-        r transports from node j to node i.
+        The Hermitian matrix. Without a shift, z* L z is the Dirichlet energy of z: the sum over all edges
+        (i, j) of w |z_i - r^N z_j|^2. Here w is the weight of the edge, and r, of modulus 1, transports
+        tangent vectors from node j to node i.
     """
     c = connection
     # Negative weights (of obtuse triangles) would make the matrix indefinite.
@@ -199,24 +203,27 @@ def _corner_geometry(
 def umbrella_order(
     corner_vertex: np.ndarray, twin: np.ndarray, next_corner: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the corners in order around each umbrella.
+    """Find the order of the corners around each umbrella (the connected triangles around a vertex).
 
-    A closed umbrella begins with its corner of smallest index.
+    A closed umbrella, which surrounds its vertex, begins with its corner of smallest index.
 
     Parameters
     ----------
     corner_vertex : (C,) int ndarray
+        Vertex of each corner.
     twin : (C,) int ndarray
-        For the edge from each corner to the next, the corner at which it starts in the neighboring triangle.
-        -1 if there is none.
+        For the halfedge that starts at each corner, the corner at which the opposite halfedge starts, in the
+        neighboring triangle; -1 if there is no neighbor.
     next_corner : (C,) int ndarray
+        The following corner of the same triangle.
 
     Returns
     -------
     previous : (C,) int ndarray
-        The previous corner in counter-clockwise order; the corner itself if an umbrella begins with it.
+        The previous corner around the vertex, in counter-clockwise order. The first corner of an umbrella
+        has its own index.
     is_closed : (C,) bool ndarray
-        Whether the umbrella of a corner is closed.
+        Whether the umbrella that contains the corner is closed.
     """
     corner = np.arange(len(twin), dtype=twin.dtype)
     # The previous corner lies across the edge that leaves from this corner.
@@ -229,21 +236,22 @@ def umbrella_order(
 
 
 def sums_in_umbrellas(previous: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sum values from the first corner of each umbrella up to each corner.
+    """Compute the cumulative sum of values along each umbrella (the ordered corners around a vertex).
 
     Parameters
     ----------
     previous : (C,) int ndarray
         Result of `umbrella_order`.
     value : (C,) ndarray
-        Amount that each corner adds to the sum of the previous corner. The values of first corners are
-        ignored.
+        Amount that each corner adds to the sum of the previous corner. The value of the first corner of an
+        umbrella is ignored.
 
     Returns
     -------
     first_corner : (C,) int ndarray
-        The first corner of the umbrella that the corner belongs to.
+        The first corner of the umbrella that contains each corner.
     total : (C,) ndarray
+        The sum at each corner; 0 at the first corner of an umbrella.
     """
     total = np.where(previous == np.arange(len(previous)), 0, value)
     while True:

@@ -1,4 +1,4 @@
-"""How the faces of polygon meshes are connected: edges, smooth fans, and components of graphs."""
+"""Find how the faces of polygon meshes are connected: edges, smooth fans, and components of graphs."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ class Edges:
     corner_edge : (C,) int32 ndarray
         The edge from each corner to the next corner of its face.
     ends : (E, 2) int32 ndarray
-        Vertex pairs, the smaller first.
+        The two vertices of each edge, the smaller index first.
     face_count : (E,) int32 ndarray
-        Number of faces at the edge: 1 at a boundary, 2 inside, more at nonmanifold edges.
+        Number of faces at the edge: 1 at a boundary, 2 inside, more at a nonmanifold edge.
     interior : (I,) int32 ndarray
-        Edges with exactly two faces that are oriented consistently. Fields do not continue across other edges.
+        Indices of the interior edges: those with exactly two faces, which are oriented consistently. Fields
+        do not continue across other edges.
     halfedges : (I, 2) int32 ndarray
-        For each interior edge, the corner in either face where the edge starts. Consistently oriented faces
-        run along the edge in opposite directions.
+        For both faces of each interior edge, the corner at which the edge starts in that face. The edge
+        runs in opposite directions in the two faces.
     """
 
     corner_edge: np.ndarray
@@ -70,13 +71,14 @@ def smooth_fans(
     sharp_angle: float | None = None,
     flat_faces: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return (C,) int32, the smooth fan of each corner: `Surface.corner_fan`.
+    """Return (C,) int32, the index of the smooth fan of each corner (see `Surface.corner_fan`).
+
+    The corners of a smooth fan share a vertex, and their faces are connected by edges that are not sharp.
 
     Parameters
     ----------
     vertices, corner_vertex, face_start, sharp_edges, sharp_angle, flat_faces
-        As in `surface.build_surface`. Without a sharp angle, the result does not depend on the positions of
-        the vertices.
+        See `surface.build_surface`. If no sharp angle is given, the positions of the vertices do not matter.
     """
     edges = build_edges(corner_vertex, face_start)
     corner_face, next_corner = corner_faces(face_start), next_corners(face_start)
@@ -98,14 +100,16 @@ def smooth_fans(
 
 
 def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> np.ndarray:
-    """Return (C,) int32, the components of corners that meet at the ends of some edges.
+    """Return (C,) int32, a label for each corner that is equal for corners connected across the given edges.
+
+    The two faces of an edge have a corner each at both ends of the edge. These two corners are connected.
 
     Parameters
     ----------
     a, b : (n,) int ndarray
-        The corners at which each edge starts in the faces on its two sides.
+        For the two faces of each edge, the corner at which the edge starts in that face.
     next_corner : (C,) int ndarray
-        From `next_corners`.
+        Result of `next_corners`.
     """
     ends = np.stack([a, next_corner[b]], axis=1), np.stack([next_corner[a], b], axis=1)
     return connected_components(len(next_corner), np.concatenate(ends))
@@ -114,8 +118,8 @@ def connected_corners(a: np.ndarray, b: np.ndarray, next_corner: np.ndarray) -> 
 def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
     """Label the connected components of a graph.
 
-    Each node points to a root: the smallest node known to be in its component. Each round links the
-    roots of connected nodes, then flattens the trees by pointer jumping.
+    Each node points to a root: the smallest node that is known to be in its component. Each round links the
+    roots of connected nodes, and then flattens the trees by pointer jumping.
 
     Parameters
     ----------
@@ -146,9 +150,9 @@ def connected_components(count: int, pairs: np.ndarray) -> np.ndarray:
 
 
 def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
-    """Do the same as ``np.minimum.at(values, index, limits)``, faster, for limits below the values.
+    """Do the same as ``np.minimum.at(values, index, limits)``, but faster, for limits below the values.
 
-    Two assignments suffice for indices that occur once or twice, and most do.
+    Two plain assignments are enough for indices that occur once or twice, and most indices do.
     """
     for _ in range(2):
         values[index] = limits
@@ -158,9 +162,10 @@ def _lower(values: np.ndarray, index: np.ndarray, limits: np.ndarray) -> None:
 
 
 def sorted_with_order(key: np.ndarray, limit: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return keys from 0 to `limit` - 1 in ascending order, and the stable order that sorts them.
+    """Return sorted keys, and the indices that sort them: a stable `argsort`.
 
-    Keys and indices are sorted as one number if they fit into it, which is faster than `argsort`.
+    Keys must be from 0 to `limit` - 1. If a key and its index fit into one 64-bit integer, these integers are
+    sorted, which is faster than `argsort`.
     """
     index_bits = len(key).bit_length()
     if limit.bit_length() + index_bits > 63:

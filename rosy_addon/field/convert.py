@@ -1,4 +1,4 @@
-"""Convert a field: change its degree, rotate or smooth it, cancel singularities, or replace its magnitudes."""
+"""Convert a field: change its degree, rotate or smooth it, cancel singularities or replace magnitudes."""
 
 from __future__ import annotations
 
@@ -25,21 +25,23 @@ from .surface_averages import SurfaceAverages
 
 @dataclass(frozen=True, eq=False)
 class Conversion:
-    """The steps of a conversion, applied in the order of the attributes.
+    """The steps of the conversion of a field, applied in the order of the attributes.
 
     Attributes
     ----------
     degree : int or None
         The new degree, a multiple or a divisor of the old one; None to keep it.
     rotation : float
-        Counter-clockwise rotation about the normals, radians.
+        Counter-clockwise rotation about the normals, in radians.
     smoothing_length : float
-        Distance of the diffusion relative to `Surface.extent`; 0 for none.
+        Distance over which the field is smoothed by diffusion, relative to `Surface.extent`; 0 for no
+        smoothing.
     pair_distance : float
-        Distance relative to `Surface.extent` up to which singularities with opposite indices are cancelled; 0
-        for none.
+        Pairs of singularities with opposite indices are removed if they are at most this far apart, relative
+        to `Surface.extent`; 0 to keep all pairs.
     magnitude : str, (F,) ndarray or None
-        One of `curvature.MAGNITUDES`, or values; None to keep the magnitudes.
+        Name of a new magnitude, one of `curvature.MAGNITUDES`, or its values on the faces. None to keep the
+        magnitudes.
     """
 
     degree: int | None = None
@@ -82,7 +84,7 @@ def convert(surface: Surface, field: RosyField, conversion: Conversion) -> RosyF
 
 
 def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
-    """Change the degree of a field to a multiple or a divisor.
+    """Return the field with its degree N changed to a multiple or a divisor of N.
 
     For a multiple, members are added between the existing ones. For a divisor, a subset of the
     members is selected on each face so that the subsets match from face to face. If the subsets do
@@ -92,14 +94,14 @@ def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
     ----------
     surface : Surface
     field : RosyField
-        A RoSy.
+        A field whose directions are rotationally symmetric.
     degree : int
         The new degree.
 
     Raises
     ------
     RosyError
-        If the degree is neither a multiple nor a divisor, or the directions are not a RoSy.
+        If the new degree is neither a multiple nor a divisor of N, or the directions are not a RoSy.
     """
     degree = check_degree(degree)
     field.check_rosy(surface.name)
@@ -113,14 +115,14 @@ def change_degree(surface: Surface, field: RosyField, degree: int) -> RosyField:
 
 
 def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
-    """Choose a member on each face so that the members of neighboring faces match (combing).
+    """Choose a member vector on each face so that the members of neighboring faces match (combing).
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
     period : int
-        Members whose indices are equal modulo this are equivalent; a divisor of N.
+        A divisor of N. Members k and l of a face are equivalent if k - l is a multiple of it.
 
     Returns
     -------
@@ -129,7 +131,7 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
     """
     faces, matching = field_matching(surface, field)
     defined = field.vectors.any(axis=1)[faces].all(axis=1)
-    # Member k of the first face of an edge matches member k + matching of the second.
+    # Member k of the first face of an edge matches member k + matching of the second face.
     tree = spanning_forest(surface.face_count, *faces[defined].T)
     member_index = tree.sums_from_root(matching[defined]) % period
     angle = 2 * np.pi * member_index / field.degree
@@ -137,14 +139,14 @@ def comb_members(surface: Surface, field: RosyField, period: int) -> np.ndarray:
 
 
 def rotate_field(surface: Surface, field: RosyField, angle: np.ndarray | float) -> RosyField:
-    """Rotate a field counter-clockwise about the face normals.
+    """Return the field rotated counter-clockwise about the face normals.
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
     angle : (F,) ndarray or float
-        Radians.
+        Angle in radians, for each face or the same for all faces.
     """
     angle = np.broadcast_to(angle, (len(field.vectors),))[:, None]
     perpendicular = np.cross(surface.face_normal, field.vectors)
@@ -160,16 +162,16 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
 
     This is one implicit Euler step, ``(M + t L) z = M z_0``, with the mass matrix M and the
     connection Laplacian L. Opposite values cancel, so magnitudes decrease where the field varies,
-    and singularities of opposite index merge.
+    and singularities of opposite index cancel.
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
-        A RoSy.
+        A field whose directions are rotationally symmetric.
     time : float
-        Diffusion time t in square Blender units. Details smaller than about its square root are
-        removed.
+        Diffusion time t, the square of a length in object space. Details smaller than about this length
+        are removed.
 
     Returns
     -------
@@ -209,13 +211,13 @@ def diffuse_field(surface: Surface, field: RosyField, time: float) -> RosyField:
 
 
 def with_magnitude(field: RosyField, magnitude: np.ndarray | float) -> RosyField:
-    """Replace the magnitudes of a field; faces where it is undefined stay undefined.
+    """Return the field with other magnitudes. Faces where it is undefined stay undefined.
 
     Parameters
     ----------
     field : RosyField
     magnitude : (F,) ndarray or float
-        The new magnitudes, not negative.
+        The new magnitudes, at least 0.
     """
     magnitude = np.broadcast_to(magnitude, (len(field.vectors),))[:, None]
     return replace(field, vectors=normalize(field.vectors) * magnitude, source_directions=None)

@@ -1,4 +1,7 @@
-"""Transport face values to corners, average them over smooth fans, and transport them back."""
+"""Smooth face values: transport them to corners, average them over smooth fans, and transport them back.
+
+A smooth fan is a set of corners at a vertex that share a normal.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +38,7 @@ def corner_rotations(
     Returns
     -------
     (C,) complex ndarray
-        Numbers of modulus 1; 0 for the corners of faces without a frame.
+        Numbers of modulus 1; 0 at the corners of faces without a frame (faces without area).
     """
 
     def rotations(face: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -50,21 +53,21 @@ def corner_rotations(
 def average_over_fans(
     values: np.ndarray, weights: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
-    """Return the weighted mean of corner values over the fan of each corner.
+    """Return, for each corner, the weighted mean of the values of all corners in its smooth fan.
 
-    The corners of a fan must have the same normal, and so the same frame.
+    The corners of a fan must have the same normal, and therefore the same frame.
 
     Parameters
     ----------
     values : (C,) complex ndarray
     weights : (C,) float ndarray
     corner_fan : (C,) int ndarray
-        `Surface.corner_fan`.
+        Index of the fan of each corner: `Surface.corner_fan`.
 
     Returns
     -------
     (C,) complex ndarray
-        0 in fans whose weights sum to 0.
+        Means; 0 in fans with a total weight of 0.
     """
     fan_count = int(corner_fan.max()) + 1
     weight_sum = np.bincount(corner_fan, weights, fan_count)
@@ -75,7 +78,7 @@ def average_over_fans(
 
 
 def corner_angles(surface: Surface) -> np.ndarray:
-    """Return (C,) float64 angles between the two edges at each corner of the faces, radians from 0 to pi."""
+    """Return (C,) float64 angles between the two edges at each corner of a face, in radians from 0 to pi."""
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)
@@ -96,13 +99,13 @@ def smooth_face_values(
     surface : Surface
         Its corner normals must agree within each fan.
     z : (F,) complex ndarray
-        Representations in the face frames that `rotation` was computed from.
+        Representations, in the same face frames from which `rotation` was computed.
     rotation : (C,) complex ndarray
         Result of `corner_rotations`.
     degree : int
         N of the representations.
     weights : (C,) float ndarray
-        Weights of the corners in the fan averages, for example their angles.
+        Weights of the corners in the averages over fans, for example their angles.
 
     Returns
     -------

@@ -1,8 +1,8 @@
 """Find creases of a surface: chains of sharp edges that are not caused by noise or coarse faces.
 
-As in the edge detector of Canny, "A Computational Approach to Edge Detection", PAMI 1986, a chain with enough
-strong edges may also contain weak ones (hysteresis). The result does not depend on the view, so creases do not
-flicker in animations.
+A chain with enough strong edges may also contain weak edges. This is hysteresis, as in the edge detector of
+Canny, "A Computational Approach to Edge Detection", PAMI 1986. The result does not depend on the view, so
+creases do not flicker in animations.
 """
 
 from __future__ import annotations
@@ -18,46 +18,49 @@ from .frames import angle_between, dot, normalize
 from .polygon_arrays import face_area_vectors
 from .surface import Surface
 
-#: Rounds of the bilateral filter of the normals, and its width: a difference of unit normals.
+#: Number of rounds of the bilateral filter of the normals, and its width: the length of the difference of two
+#: unit normals.
 FILTER_ROUNDS, FILTER_WIDTH = 8, 0.35
 
-#: Edges with an angle above the second one (radians) are salient. Between the two angles, an edge is salient
-#: if its angle is at least `MIN_RATIO` times the angle of each other edge of its two faces.
+#: An edge is salient if the angle between its faces is at least `SHARP_ANGLE` radians. If the angle is
+#: between `MIN_ANGLE` and `SHARP_ANGLE`, the edge is salient if its angle is at least `MIN_RATIO` times the
+#: angle of each other edge of its two faces.
 MIN_ANGLE, SHARP_ANGLE = np.pi / 6, np.pi / 3
 MIN_RATIO = 2.0
 
-#: Both angles are at least this multiple of the median angle by which noise rotates the normals.
+#: Both angles are raised to at least this multiple of the median angle by which noise rotates the normals.
 NOISE_MULTIPLE = 5.0
 
-#: Shortest line of salient edges, relative to `Surface.extent`.
+#: Shortest chain of salient edges, relative to `Surface.extent`.
 MIN_LINE_LENGTH = 0.05
 
 
-#: A chain may contain edges with this share of the crease angle.
+#: An edge is weak, and may belong to a chain, if its angle is at least this fraction of the crease angle.
 WEAK_SHARE = 0.5
 
-#: At least this share of the length of a chain has the full crease angle.
+#: A chain is kept if its edges with the full crease angle make up at least this fraction of its length.
 MIN_STRONG_SHARE = 0.25
 
-#: Smallest angle between the filtered normals of a crease, relative to the angle between its normals.
+#: Smallest angle between the filtered normals at a crease, relative to the angle between the unfiltered
+#: normals.
 MIN_FILTERED_SHARE = 0.1
 
-#: Shortest chain on a noisy mesh: its number of mean edges, for each radian of noise.
+#: Shortest chain on a noisy mesh, in mean edge lengths per radian of noise.
 MIN_EDGES_PER_NOISE = 100.0
 
-#: Mean edge length, relative to `Surface.extent`, above which the thresholds for noise are reduced: sharp edges
-#: of a coarse mesh are intended.
+#: Mean edge length, relative to `Surface.extent`, above which the thresholds for noise are reduced: sharp
+#: edges of a coarse mesh are intended.
 NOISY_EDGE_LENGTH = 0.02
 
-#: Rings of faces around sharp edges in which normals are filtered.
+#: Number of rings of faces around sharp edges in which normals are filtered.
 FILTER_RINGS = 4
 
-#: Smallest crease angle in radians, below which normals differ by rounding only.
+#: Smallest crease angle in radians. Smaller angles between normals may be rounding errors.
 MIN_CREASE_ANGLE = 1e-3
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    """Return the value at which half of the total weight is reached; 0 without any weight."""
+    """Return the weighted median of values; 0 if the total weight is 0."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     if not len(total) or not total[-1] > 0:
@@ -68,21 +71,23 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
 def filtered_normals(
     surface: Surface, edges: Edges, region: np.ndarray | None = None
 ) -> tuple[np.ndarray, float]:
-    """Smooth the face normals over edges, but not across large angles.
+    """Return face normals after bilateral filtering, which smooths noise and keeps sharp edges.
 
     Parameters
     ----------
     surface : Surface
     edges : Edges
     region : (F,) bool ndarray, optional
-        The faces to smooth, without regard to the others. All by default.
+        The faces to smooth. Other faces keep their normals and do not influence the result. By default all
+        faces.
 
     Returns
     -------
     normals : (F, 3) float64 ndarray
-        Unit, or zero.
+        Unit normals; zero on faces without area.
     noise_angle : float
-        The median angle, by area, between the normals before and after, in radians; of the region.
+        The median angle in radians between the normals before and after filtering, over the faces of the
+        region, weighted by area.
 
     References
     ----------
@@ -122,10 +127,10 @@ def filtered_normals(
 def salient_edges(
     surface: Surface, edges: Edges, normals: np.ndarray, noise_angle: float
 ) -> np.ndarray:
-    """Find the borders and the edges at which the surface bends more sharply than around them.
+    """Find the salient edges: border edges, and edges that are clearly sharper than the edges around them.
 
-    On a coarse mesh of a smooth surface, neighboring edges have similar angles, and none of them is
-    salient unless it is very sharp.
+    On a coarse mesh of a smooth surface, neighboring edges have similar angles, so only very sharp edges are
+    salient.
 
     Parameters
     ----------
@@ -140,7 +145,7 @@ def salient_edges(
         Pairs of vertices.
     """
     face_a, face_b = (surface.corner_face[side] for side in edges.halfedges.T)
-    # Faces without area have no normal, so their edges have no angle.
+    # Faces without area have no normal, so no angle is computed at their edges.
     interior = angle_between(normals[face_a], normals[face_b])
     others = _largest_of_others(surface, edges, interior)
     noise = NOISE_MULTIPLE * noise_angle
@@ -159,7 +164,10 @@ def salient_edges(
 
 
 def _largest_of_others(surface: Surface, edges: Edges, angle: np.ndarray) -> np.ndarray:
-    """Return (I,) largest angle of the other edges of the two faces at each interior edge, from (I,) angles."""
+    """Return, for each interior edge, the largest angle of all other edges of its two faces.
+
+    `angle` holds the (I,) angles of the interior edges. The result is (I,).
+    """
     all_angles = np.zeros(len(edges.ends))
     all_angles[edges.interior] = angle
     corner_angle = all_angles[edges.corner_edge]
@@ -179,9 +187,9 @@ class Creases(NamedTuple):
     Attributes
     ----------
     ends : (n, 2) int32 ndarray
-        Pairs of vertices, the smaller first.
+        The two vertices of each edge, the smaller index first.
     chain : (n,) int32 ndarray
-        Chain of each edge, numbered from 0 without gaps. The edges of a chain are connected.
+        The chain of connected edges to which each edge belongs, numbered from 0 without gaps.
     """
 
     ends: np.ndarray
@@ -191,28 +199,29 @@ class Creases(NamedTuple):
 def find_creases(surface: Surface, crease_angle: float) -> Creases:
     """Find the creases of a mesh.
 
-    An edge is strong if the angle between the normals of its faces is at least the crease angle, and
-    weak if it is at least half of that. The angle between the filtered normals must exceed the noise.
-    Where normals are interpolated across an edge, the edge must also bend more than those around it,
-    or by `SHARP_ANGLE`. A chain of connected edges is kept if enough of it is strong, and if it is
-    long enough for the noise of the mesh.
+    An edge is strong if the angle between the normals of its faces is at least the crease angle, and weak
+    if it is at least half of the crease angle. Two more conditions apply to both. The angle between the
+    filtered normals must exceed the noise. If shading normals are interpolated across the edge, its angle
+    must also be at least `SHARP_ANGLE`, or clearly larger than the angles of the edges around it. A chain
+    of connected edges is kept if enough of it is strong, and if it is long compared to the noise of the
+    mesh.
 
     Parameters
     ----------
     surface : Surface
     crease_angle : float
-        Radians.
+        Angle in radians.
 
     Returns
     -------
     Creases
-        Borders and edges with more than two faces are not creases.
+        The creases. Border edges and edges with more than two faces are not creases.
     """
     none = Creases(np.empty((0, 2), np.int32), np.empty(0, np.int32))
     report(0.0, "finding creases")
     edges = build_edges(surface.corner_vertex, surface.face_start)
     sides = surface.corner_face[edges.halfedges].T
-    # Smaller angles have no effect.
+    # Smaller crease angles have no effect.
     crease_angle = max(crease_angle, MIN_CREASE_ANGLE)
     angle = _large_angles(surface.face_normal, sides, WEAK_SHARE / MIN_RATIO * crease_angle)
     if angle.max(initial=0.0) < crease_angle:
@@ -245,7 +254,10 @@ def find_creases(surface: Surface, crease_angle: float) -> Creases:
 
 
 def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.ndarray:
-    """Return (I,) angles in radians between the normals of pairs (2, I) of faces; 0 below the least."""
+    """Return the (I,) angles in radians between the normals of pairs of faces; 0 for angles below `least`.
+
+    `sides` holds the pairs of faces and is (2, I).
+    """
     angle = np.zeros(sides.shape[1])
     a, b = sides
     is_large = sum(x[a] * x[b] for x in np.ascontiguousarray(normals.T)) < np.cos(least)
@@ -254,7 +266,10 @@ def _large_angles(normals: np.ndarray, sides: np.ndarray, least: float) -> np.nd
 
 
 def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
-    """Return (F,) bool, the faces within `FILTER_RINGS` rings of edges, given as pairs of vertices."""
+    """Return (F,) bool: whether each face is within `FILTER_RINGS` rings of edges.
+
+    `ends` holds the edges, as pairs of vertices.
+    """
     is_near = mask(len(surface.vertices), ends)
     for _ in range(FILTER_RINGS):
         faces = np.logical_or.reduceat(is_near[surface.corner_vertex], surface.face_start[:-1])
@@ -263,7 +278,10 @@ def _faces_near(surface: Surface, ends: np.ndarray) -> np.ndarray:
 
 
 def _is_between_fans(surface: Surface, halfedges: np.ndarray) -> np.ndarray:
-    """Return (n,) bool, whether normals are discontinuous across edges, given as rows of `Edges.halfedges`."""
+    """Return (n,) bool: whether shading normals are discontinuous across edges.
+
+    `halfedges` holds the edges, as rows of `Edges.halfedges`.
+    """
     fan, following = surface.corner_fan, surface.next_corner
     a, b = halfedges.T
     return (fan[a] != fan[following[b]]) | (fan[following[a]] != fan[b])

@@ -1,4 +1,4 @@
-"""Principal directions and curvatures of the faces of a surface."""
+"""Compute principal directions and curvatures on the faces of a surface."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from .representation import face_frames, from_representation
 from .rosy_field import RosyField, check_degree
 from .surface import Surface, build_surface
 
-#: The smallest number whose inverse is finite.
+#: The smallest normal floating-point number. Its inverse is finite.
 TINY = float(np.finfo(np.float64).tiny)
 
-#: Kinds of magnitudes of a field, with the descriptions shown in the interface.
+#: Names of the magnitudes that can be computed for a field, with the descriptions shown in the interface.
 MAGNITUDES = {
     "unit": "1 on all faces",
     "confidence": "How well the principal directions are defined, from 0 to 1",
     "curvature": "The larger principal curvature, multiplied by the size of the mesh",
 }
 
-#: Rounds of averaging over vertices, which reduce noise of the mesh in curvature fields.
+#: Number of rounds of averaging over vertices, which reduces the effect of mesh noise on curvature fields.
 CURVATURE_SMOOTHING_ROUNDS = 2
 
 
 def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
-    """Compute magnitudes of one of the kinds in `MAGNITUDES`.
+    """Compute the magnitude for a field on each face; `kind` is a name in `MAGNITUDES`.
 
-    "curvature" is the larger absolute principal curvature times `Surface.extent`, so it has no
-    unit.
+    "unit" is 1, "confidence" is the magnitude of `curvature_field`, and "curvature" is the larger absolute
+    principal curvature times `Surface.extent`, which has no unit.
 
     Returns
     -------
@@ -56,7 +56,10 @@ def face_magnitude(surface: Surface, kind: str) -> np.ndarray:
 
 
 def with_smooth_normals(surface: Surface, corner_fan: np.ndarray | None = None) -> Surface:
-    """Return the surface with normals that are smooth within the given fans, or else everywhere."""
+    """Return the surface with shading normals that are averaged over the given fans.
+
+    If no fans are given, normals are smooth everywhere. `corner_fan` is as in `Surface`.
+    """
     return build_surface(
         surface.vertices,
         surface.corner_vertex,
@@ -76,10 +79,10 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
     follows the direction of degree 2. Principal directions have no sign, so odd degrees are not
     possible.
 
-    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``. It is 0 at
-    umbilics and in planes, which have no principal directions, and about 1 on cylinders and
-    saddles. k0 is 0.02 divided by the root mean square radius of the mesh. It suppresses rounding
-    errors in nearly flat regions.
+    The magnitude is a confidence from 0 to 1, ``|k1 - k2| / (|k1| + |k2| + k0)``, where k1 and k2 are the
+    principal curvatures. It is 0 at umbilics and in planes, which have no principal directions, and about 1
+    on cylinders and saddles. The constant k0 is 0.02 divided by the root mean square radius of the mesh. It
+    suppresses rounding errors in nearly flat regions.
 
     Returns
     -------
@@ -128,10 +131,10 @@ def curvature_field(surface: Surface, degree: int) -> RosyField:
 
 
 def face_curvature(surface: Surface, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fit the second fundamental form of each face.
+    """Compute the curvature of each face, by a least-squares fit of its second fundamental form.
 
-    The symmetric matrix [[a, b], [b, c]] maps each edge (u, v) of the face to the difference (p, q)
-    of the normals at its ends, in the least squares sense.
+    The second fundamental form is the symmetric matrix [[a, b], [b, c]] in the frame x, y of the face. It
+    maps each edge (u, v) of the face to the difference (p, q) of the normals at the ends of the edge.
 
     Returns
     -------

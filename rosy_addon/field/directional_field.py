@@ -1,20 +1,21 @@
-"""Fields of N arbitrary directions, as RoSy fields with deviations.
+"""Fields of N arbitrary directions, stored as the nearest RoSy field and deviations from it.
 
 The directions of polyvector, frame and conjugate fields may have any angles and lengths, so these
-fields are not RoSys. But N directions, sorted around the normal, have a nearest RoSy: the
-differences in angle between direction k and member k average to zero. Its representation is, up to
-sign and length, the product of all directions. This is the constant coefficient of the polynomial
-whose roots are the directions (Diamanti, Vaxman, Panozzo and Sorkine-Hornung 2014). So it does not
-depend on the order of the directions, and it is smooth where they are.
+fields are not rotationally symmetric. But N directions, sorted around the normal, have a nearest RoSy.
+Its N vectors, the *members*, are rotations of each other by 2 pi / N, and the angles between direction k
+and member k have the mean 0. The representation z of this RoSy is, up to sign and length, the product of
+all directions as complex numbers. This product is the constant coefficient of the polynomial that has the
+directions as roots (Diamanti, Vaxman, Panozzo and Sorkine-Hornung 2014). Therefore z does not depend on
+the order of the directions, and it is smooth where they are.
 
-Direction k is member k times a complex number delta_k. These numbers are the values of a
+Direction k is member k times a complex number delta_k. The numbers delta_k are the values of a
 trigonometric polynomial at the angles of the members,
 
     delta_k = sum_j C_j exp(i j theta_k),   theta_k = t + 2 pi k / N,
 
-where t is the angle of the stored member. The coefficients C_j do not depend on which member is the
-first. Like z, they can be transported between frames, averaged and interpolated. For a RoSy C_0 is
-1 and the others are 0.
+where t is the angle of the stored member. The coefficients C_j are called *harmonics* here. They do not
+depend on which member is the first. Like z, they can be transported between frames, averaged and
+interpolated. For a RoSy, C_0 is 1 and all other harmonics are 0.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ ANGLE_TOLERANCE_DEG, LENGTH_TOLERANCE = 1.0, 0.01
 #: errors of text files.
 MIN_HARMONIC = 1e-4
 
-#: Smallest fraction of the edges across which the stored member must match one on the same line,
-#: for the lines to count as separate families.
+#: A direction and its opposite form one line. The lines of a field count as separate families if the stored
+#: members of neighboring faces lie on matching lines, at least across this fraction of the edges.
 MIN_FAMILY_AGREEMENT = 0.98
 
 
@@ -52,17 +53,17 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
     Parameters
     ----------
     surface : Surface
-        In the shape that the directions belong to: its rest shape, if it is deformed.
+        The shape on which the directions are tangent: the rest shape of a deformed mesh.
     directions : (F, N, 3) float64 ndarray
-        In the planes of the faces, in any order. The field is undefined on faces where one of them
-        is zero.
+        Vectors in the planes of the faces, in any order. The field is undefined on faces where one of
+        the vectors is zero.
 
     Returns
     -------
     RosyField
-        With `direction_ratios`, unless the directions are a RoSy within `ANGLE_TOLERANCE_DEG` and
-        `LENGTH_TOLERANCE`; then the first direction is stored unchanged. `family_count` is the
-        number of lines if the first direction is on the same line over the whole surface.
+        If the directions are a RoSy within `ANGLE_TOLERANCE_DEG` and `LENGTH_TOLERANCE`, its `vectors` are
+        the first directions, unchanged. Otherwise it is the nearest RoSy with `direction_ratios`. For
+        `family_count`, see `detect_families`.
 
     See Also
     --------
@@ -83,21 +84,21 @@ def field_from_directions(surface: Surface, directions: np.ndarray) -> RosyField
 
 
 def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the nearest RoSy of N directions, and the ratios of the directions to its members.
+    """Find the RoSy nearest to N directions, and the ratios of the directions to the members of this RoSy.
 
     Parameters
     ----------
     w : (n, N) complex ndarray
-        Directions as complex numbers in tangent frames, in any order.
+        Each row holds N directions as complex numbers in a tangent frame, in any order.
 
     Returns
     -------
     first_angle : (n,) float64 ndarray
-        Angle of the member that corresponds to the first direction, radians.
+        Angle of the member that corresponds to the first direction of the row, in radians.
     rho : (n,) float64 ndarray
-        Mean length of the directions; 0 where one of them is zero.
+        Length of the members, the mean length of the directions; 0 where a direction is zero.
     direction_ratios : (n, N) complex128 ndarray
-        Ratios of directions to members, in counter-clockwise order from the first direction.
+        Each direction divided by its member. The order is counter-clockwise from the first direction.
     """
     degree = check_degree(w.shape[1])
     member_angles = 2 * np.pi * np.arange(degree) / degree
@@ -116,9 +117,9 @@ def closest_rosy(w: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def is_rosy(w: np.ndarray) -> bool:
-    """Return whether all rows of (n, N) directions are RoSys within the tolerances.
+    """Return whether all rows of N directions (complex numbers) are rotationally symmetric.
 
-    Rows that contain a zero are ignored.
+    The tolerances are `ANGLE_TOLERANCE_DEG` and `LENGTH_TOLERANCE`. Rows that contain a zero are ignored.
     """
     w = w[(w != 0).all(axis=1)]
     if not len(w):
@@ -136,7 +137,7 @@ def is_rosy(w: np.ndarray) -> bool:
 
 
 def _relative_angles(w: np.ndarray) -> np.ndarray:
-    """Return (n, N) counter-clockwise angles from the first direction, radians from 0 to 2 pi."""
+    """Return (n, N) counter-clockwise angles from the first direction of a row, in radians from 0 to 2 pi."""
     angle = np.angle(w)
     relative = (angle - angle[:, :1]) % (2 * np.pi)
     relative[:, 0] = 0
@@ -144,10 +145,11 @@ def _relative_angles(w: np.ndarray) -> np.ndarray:
 
 
 def detect_families(surface: Surface, field: RosyField) -> RosyField:
-    """Set the `family_count` of a field.
+    """Return the field with a `family_count` that says whether its lines form separate families.
 
-    It becomes the number of lines if the stored members are on matching lines across at least
-    `MIN_FAMILY_AGREEMENT` of the edges. Otherwise the field is returned unchanged.
+    A direction and its opposite form one line. If the stored members of neighboring faces lie on matching
+    lines, across at least the fraction `MIN_FAMILY_AGREEMENT` of the edges, `family_count` becomes the number
+    of lines. Otherwise the field is returned unchanged.
     """
     line_count = field_symmetry(field).line_count
     if line_count == 1:
@@ -165,8 +167,8 @@ def field_directions(surface: Surface, field: RosyField) -> np.ndarray:
     Returns
     -------
     (F, N, 3) float64 ndarray
-        In object space, counter-clockwise about the normal. The first corresponds to the stored
-        member; for a RoSy it is that member.
+        Vectors in object space, counter-clockwise about the normal. The first direction is the one that
+        corresponds to the stored member; for a RoSy it is the stored member.
     """
     perpendicular = np.cross(surface.face_normal, field.vectors)
     factor = np.exp(2j * np.pi * np.arange(field.degree) / field.degree)
@@ -177,19 +179,20 @@ def field_directions(surface: Surface, field: RosyField) -> np.ndarray:
 
 
 def field_harmonics(field: RosyField) -> dict[int, np.ndarray]:
-    """Compute the harmonics of a field relative to its stored members.
+    """Compute the harmonics C_j of a field, which describe how its directions deviate from a RoSy.
 
     Returns
     -------
     dict of int to (F,) complex128 ndarray
-        C_j exp(i j t) by the order j, from -((N - 1) // 2) to N // 2. Orders other than 0 are left
-        out if no face exceeds `MIN_HARMONIC`. Empty for a RoSy.
+        For each order j, from -((N - 1) // 2) to N // 2, the value C_j exp(i j t) on each face, where t is
+        the angle of the stored member (see the module docstring). An order other than 0 is left out if its
+        modulus is at most `MIN_HARMONIC` on all faces. Empty for a RoSy.
     """
     return {} if field.direction_ratios is None else ratio_harmonics(field.direction_ratios)
 
 
 def ratio_harmonics(direction_ratios: np.ndarray) -> dict[int, np.ndarray]:
-    """Return the harmonics of (n, N) `direction_ratios`, as `field_harmonics` does for a field."""
+    """Return the harmonics of (n, N) `direction_ratios`, in the format of `field_harmonics`."""
     degree = direction_ratios.shape[1]
     member_angles = 2 * np.pi * np.arange(degree) / degree
     coefficients = {}
@@ -207,25 +210,28 @@ def ratios_from_harmonics(coefficients: dict[int, np.ndarray], degree: int) -> n
 
 
 def field_symmetry(field: RosyField) -> FieldSymmetry:
-    """Return the `FieldSymmetry` of a field: its degree and the orders of its harmonics."""
+    """Return the degree of a field, and the orders j of its harmonics, as a `FieldSymmetry`.
+
+    The harmonics C_j describe how the directions deviate from a RoSy; a RoSy field has none.
+    """
     return FieldSymmetry(field.degree, tuple(field_harmonics(field)))
 
 
 def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
-    """Make a field of degree 4 from the eigenvectors of tensors restricted to the faces.
+    """Make a field of degree 4 from the eigenvectors of tensors, restricted to the planes of the faces.
 
     Parameters
     ----------
     surface : Surface
     tensors : (F, 3, 3) float64 ndarray
-        Symmetric, object space.
+        Symmetric tensors in object space.
 
     Returns
     -------
     RosyField
-        The stored member lies along the major eigenvector, which has the greater signed eigenvalue.
-        The directions have the absolute eigenvalues as lengths. `family_count` is 2. The field is
-        zero where the two eigenvalues are equal.
+        The stored member lies along the major eigenvector: the one with the greater signed eigenvalue.
+        The lengths of the directions are the absolute eigenvalues. `family_count` is 2. The field is
+        undefined (zero) where the two eigenvalues are equal.
     """
     frames = face_frames(surface)
     vectors, ratios = by_rows(_tensor_directions, tensors, *frames)
@@ -235,7 +241,7 @@ def tensor_field(surface: Surface, tensors: np.ndarray) -> RosyField:
 def _tensor_directions(
     tensors: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stored members and the `direction_ratios` of `tensor_field`, in the frames x, y."""
+    """Return (F, 3) stored members and (F, 4) `direction_ratios` for `tensor_field`; x, y: face frames."""
     a = np.einsum("fi,fij,fj->f", x, tensors, x)
     b = np.einsum("fi,fij,fj->f", x, tensors, y)
     c = np.einsum("fi,fij,fj->f", y, tensors, y)
@@ -263,9 +269,9 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
     faces : (I, 2) int32 ndarray
         The two faces of each interior edge.
     matching : (I,) int32 ndarray
-        Member k of the first face matches member (k + matching) modulo N of the second, the nearest
-        one when the two faces are unfolded into a plane. Members are counted counter-clockwise from
-        the stored ones. The same holds for directions.
+        Member k of the first face matches member (k + matching) modulo N of the second face: the nearest
+        one when the two faces are unfolded into a plane. Members are counted counter-clockwise from the
+        stored member of each face. The directions of a field that is not a RoSy match in the same way.
     """
     x, y = face_frames(surface)
     edges = build_edges(surface.corner_vertex, surface.face_start)
@@ -284,17 +290,18 @@ def field_matching(surface: Surface, field: RosyField) -> tuple[np.ndarray, np.n
 def evaluate_harmonics(
     coefficients: Sequence[tuple[int, np.ndarray]], member: np.ndarray
 ) -> np.ndarray:
-    """Evaluate delta, the ratio of direction to member, from harmonics.
+    """Return the ratios delta of directions to members: sum over j of C_j times `member` to the power j.
 
     Parameters
     ----------
     coefficients : sequence of (int, (...) complex ndarray)
-        Pairs of an order j and C_j.
+        Pairs of an order j and the harmonic C_j.
     member : (...) complex ndarray
         Members as complex numbers of modulus 1, in the same frames as the C_j.
 
     Returns
     -------
     (...) complex ndarray
+        A direction is its member times this ratio.
     """
     return sum(values * signed_power(member, j) for j, values in coefficients)

@@ -1,13 +1,14 @@
 """The faces and the triangles of a surface as graphs, and spanning forests of graphs.
 
 The angles by which a field turns across edges follow from a potential that is linear on triangles
-(`turning_angles`). Across an edge, the angle is the difference of the potential along the edge, times half the
-sum of the cotangents of the two opposite angles (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and
-Their Conjugates*, 1993). Cotangents are right for triangles of any shape. The distance between two face centers
-divided by the length of the edge is the same factor only if the line between the centers is perpendicular to
-the edge.
+(`turning_angles`). The angle across an edge is the difference of the potential along the edge, times a
+factor, the *conductance* of the edge. The exact factor is half the sum of the cotangents of the two
+opposite angles (Pinkall and Polthier, *Computing Discrete Minimal Surfaces and Their Conjugates*, 1993). A
+simpler factor is the distance between the two face centers, divided by the length of the edge. It equals
+the exact factor only if the line between the centers is perpendicular to the edge.
 
-A face with more corners is a fan of triangles. Its direction is the mean direction of its triangles.
+A face with more than three corners is divided into a fan of triangles. Its direction is the mean direction of
+its triangles.
 """
 
 from __future__ import annotations
@@ -26,41 +27,45 @@ from .representation import edge_unfolding
 from .singularities import signed_corner_angles
 from .surface import Surface
 
-#: Smallest and largest conductance of an edge, relative to the median.
+#: Smallest and largest conductance of an edge, relative to the median of all edges.
 MAX_CONDUCTANCE_RATIO = 1e4
 
-#: Least area of a triangle in its cotangents, relative to the square of its longest edge.
+#: Cotangents are computed as if each triangle had at least this area, relative to the square of its longest
+#: edge.
 MIN_AREA = 1e-4
 
-#: Label of the progress.
+#: Text that is shown with the progress bar.
 LABEL = "placing the singularities"
 
 
 @dataclass(frozen=True, eq=False)
 class FaceGraph:
-    """The faces of a surface as nodes of a graph, with an edge where a field continues.
+    """The faces of a surface as a graph that connects the two faces of each interior edge.
 
-    A *vertex node* is a vertex with some of its corners: a set that is connected by such edges.
+    Edges across which a field cannot continue are left out: border edges, nonmanifold edges, edges between
+    faces of opposite orientation, and edges of faces where the field is undefined. A *vertex node* is a
+    vertex together with some of its corners: those that are connected by edges of this graph.
 
     Attributes
     ----------
     halfedges : (I, 2) int32 ndarray
-        The corners where each edge starts, in the face on either side.
+        For the source and the target face of each edge, the corner at which the edge starts in that face.
     source, target : (I,) int32 ndarray
         The two faces of each edge.
     unfolding : (I,) float64 ndarray
-        Angle in radians to add to a direction in the frame of the source, to transport it to the frame of the
-        target.
+        Angle in radians to add to a direction in the frame of the source face, to transport it to the frame
+        of the target face.
     tail, head : (I,) int32 ndarray
-        The vertex nodes at the start and at the end of the edge, as the source runs along it.
+        The vertex nodes at the start and at the end of the edge, in the direction in which the corners of the
+        source face run.
     conductance : (I,) float64 ndarray
         Distance between the centers of both faces, divided by the length of the edge.
     corner_node : (C,) int32 ndarray
         Vertex node of each corner.
     is_interior : (n,) bool ndarray
-        Whether edges surround the vertex node.
+        Whether faces of the graph surround the vertex node completely.
     defect : (n,) float64 ndarray
-        2 pi minus the angles of its corners.
+        Angle defect of each vertex node: 2 pi minus the sum of the angles of its corners.
     component : (F,) int32 ndarray
         Connected component of each face.
     node_component : (n,) int32 ndarray
@@ -86,12 +91,12 @@ class FaceGraph:
         return len(self.is_interior)
 
     def turn_around_nodes(self, angle: np.ndarray) -> np.ndarray:
-        """Return (n,) float64: how much (I,) angles at the edges add up to, counter-clockwise."""
+        """Return (n,) float64 sums of (I,) angles at the edges, counter-clockwise around each vertex node."""
         count = self.node_count
         return np.bincount(self.head, angle, count) - np.bincount(self.tail, angle, count)
 
     def drop(self, potential: np.ndarray) -> np.ndarray:
-        """Return (I,) float64: by how much an (n,) potential grows along the edges."""
+        """Return (I,) float64 differences of an (n,) potential along the edges: head minus tail."""
         return potential[self.head] - potential[self.tail]
 
 
@@ -104,9 +109,9 @@ def face_graph(
     ----------
     surface : Surface
     x, y : (F, 3) ndarray
-        The frames of the faces.
+        Tangent frames of the faces.
     is_defined : (F,) bool ndarray, optional
-        Where there is a field. By default on all faces with an area.
+        Faces on which the field is defined. By default all faces with an area.
     """
     report(0.0, LABEL)
     edges = build_edges(surface.corner_vertex, surface.face_start)
@@ -151,16 +156,17 @@ def face_graph(
 
 @dataclass(frozen=True, eq=False)
 class SpanningForest:
-    """A spanning tree of each component of a graph.
+    """Spanning trees of a graph of n nodes and m edges: one tree for each connected component.
 
     Attributes
     ----------
     parent : (n,) intp ndarray
-        The node above each node; the node itself at a root.
+        The parent of each node in its tree. The parent of a root is the root itself.
     parent_edge : (n,) intp ndarray
-        The edge from there; -1 at a root.
+        The edge between each node and its parent; -1 for a root.
     parent_sign : (n,) float64 ndarray
-        1 if that edge leads from the parent to the node, -1 if from the node; 0 at a root.
+        1 if that edge leads from the parent to the node, -1 if it leads from the node to the parent; 0 for a
+        root.
     has_edge : (m,) bool ndarray
         Whether each edge of the graph is in the forest.
     """
@@ -171,7 +177,10 @@ class SpanningForest:
     has_edge: np.ndarray
 
     def sums_from_root(self, value: np.ndarray) -> np.ndarray:
-        """Return (n,) float64: the sums of (m,) values along the edges from the root to each node."""
+        """Return (n,) float64 sums of (m,) edge values along the path from the root to each node.
+
+        Values of edges that the path runs along in the opposite direction are subtracted.
+        """
         total = self.parent_sign * value[self.parent_edge] if len(value) else self.parent_sign * 0
         pointer = self.parent
         while True:
@@ -182,7 +191,7 @@ class SpanningForest:
             total, pointer = total + total[pointer], following
 
     def path_to_root(self, node: int) -> np.ndarray:
-        """Return the nodes from a node up to the one below its root."""
+        """Return the nodes on the path from a node to its root, with the node and without the root."""
         path = []
         while self.parent_edge[node] >= 0:
             path.append(node)
@@ -191,7 +200,7 @@ class SpanningForest:
 
 
 def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> SpanningForest:
-    """Find spanning trees, breadth first.
+    """Find a spanning tree of each component of a graph by breadth-first search.
 
     Parameters
     ----------
@@ -225,19 +234,20 @@ def spanning_forest(node_count: int, first: np.ndarray, second: np.ndarray) -> S
 
 @dataclass(frozen=True, eq=False)
 class TriangleGraph:
-    """The graph of the faces, where each face is a fan of triangles around its first corner.
+    """The graph of the triangles of a surface, where each face is a fan of triangles around its first corner.
 
     Attributes
     ----------
     graph : FaceGraph
-        The graph of the T triangles. Its M edges are the I edges between faces, followed by the edges within
-        faces. Its conductance is half the sum of the cotangents. It may be negative, but the matrix of the potential
-        is positive semidefinite.
+        The graph with the T triangles as its faces. Its M edges are the I edges between faces, followed by
+        the edges within faces. The conductance of an edge is half the sum of the cotangents of the two
+        opposite angles. It may be negative, but the matrix of the potential is positive semidefinite.
     weight : (M, 2) float64 ndarray
-        Half the cotangent opposite each edge, in the source and in the target.
+        Half the cotangent of the angle opposite each edge, in the source and in the target triangle.
     triangle_face : (T,) intp ndarray
-        Face of each triangle, ascending.
+        Face of each triangle, in ascending order.
     area : (T,) float64 ndarray
+        Areas of the triangles.
     face_edge_count : int
         I.
     """
@@ -249,25 +259,26 @@ class TriangleGraph:
     face_edge_count: int
 
     def on_triangles(self, angle: np.ndarray | float) -> np.ndarray:
-        """Return (M,) angles from (I,) angles at the edges between faces; they are 0 within faces."""
+        """Return (M,) angles: the given (I,) angles at edges between faces, and 0 at edges within faces."""
         result = np.zeros(len(self.graph.source))
         result[: self.face_edge_count] = angle
         return result
 
     def turns_to_centers(self, drop: np.ndarray) -> np.ndarray:
-        """Return (T,) angles from the circumcenter of each triangle to its center.
+        """Return (T,) angles by which the field turns from the circumcenter of each triangle to its centroid.
 
-        `drop` is (M,) differences of the potential along the edges. Angles between triangles lead from
-        circumcenter to circumcenter, across the middles of edges. The mean of these is the center.
+        `drop` holds the (M,) differences of the potential along the edges. An angle between two triangles is
+        the turn from circumcenter to circumcenter, through the midpoint of their edge. The centroid is the
+        mean of the three midpoints, so the turn to the centroid is the mean of the turns to the midpoints.
         """
         graph, count = self.graph, len(self.triangle_face)
         total = np.bincount(graph.source, self.weight[:, 0] * drop, count)
         return (total - np.bincount(graph.target, self.weight[:, 1] * drop, count)) / 3
 
     def on_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
-        """Return (I,) angles between faces from (M,) angles between triangles.
+        """Return (I,) turning angles between faces, computed from (M,) turning angles between triangles.
 
-        `to_center` is (T,) angles that are added to the directions of triangles; see `turns_to_centers`.
+        `to_center` holds (T,) angles that are added to the directions of triangles; see `turns_to_centers`.
         """
         turn, outer = self._turns_in_faces(angle, to_center), slice(self.face_edge_count)
         return angle[outer] + turn[self.graph.source[outer]] - turn[self.graph.target[outer]]
@@ -275,12 +286,15 @@ class TriangleGraph:
     def directions_of_faces(
         self, direction: np.ndarray, angle: np.ndarray, to_center: np.ndarray
     ) -> np.ndarray:
-        """Return (F,) directions from (T,) directions of triangles; the rest is as in `on_faces`."""
+        """Return the (F,) directions of faces, computed from the (T,) directions of their triangles.
+
+        All directions are angles in radians. For `angle` and `to_center`, see `on_faces`.
+        """
         first = np.flatnonzero(np.diff(self.triangle_face, prepend=-1))
         return (direction - self._turns_in_faces(angle, to_center))[first]
 
     def _turns_in_faces(self, angle: np.ndarray, to_center: np.ndarray) -> np.ndarray:
-        """Return (T,) angles from the direction of each triangle's face to the direction of the triangle."""
+        """Return, for each of T triangles, the angle from the direction of its face to its own direction."""
         face, inner = self.triangle_face, slice(self.face_edge_count, None)
         step = np.zeros(len(face))
         step[self.graph.target[inner]] = angle[inner]
@@ -289,10 +303,11 @@ class TriangleGraph:
         return turn - mean[face]
 
     def with_resistance(self, factor: np.ndarray) -> TriangleGraph:
-        """Return a graph in which angles across edges between faces cost more, by (I,) factors of at least 1.
+        """Return a graph in which squared turning angles at edges between faces have greater weights.
 
-        Edges within faces get the largest factor of the edges around their face. Negative conductances are
-        raised, because the matrix might become indefinite.
+        `factor` holds (I,) factors of at least 1 by which the weights grow. Edges within a face get the
+        largest factor of the edges around the face. Negative conductances are replaced by small positive
+        ones, because they could make the matrix indefinite.
         """
         graph, face, outer = self.graph, self.triangle_face, slice(self.face_edge_count)
         face_factor = np.ones(len(np.bincount(face)))
@@ -306,7 +321,7 @@ class TriangleGraph:
 
 
 def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
-    """Split the graph of the faces of a surface into the graph of their triangles."""
+    """Return the graph of the triangles of a surface, given the graph of its faces."""
     size = np.diff(surface.face_start)
     face = np.repeat(np.arange(len(size)), size - 2)
     first_triangle = np.cumsum(size - 2) - (size - 2)
@@ -314,7 +329,8 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
     apex = surface.face_start[face]
     corner = np.stack([apex, apex + rank + 1, apex + rank + 2], axis=1)
     cotangent, area = _cotangents(surface.vertices[surface.corner_vertex[corner]])
-    # The edges between faces: those at the apex belong to the first and to the last triangle.
+    # Edges between faces. An edge at the first corner of its face, the apex of the fan, belongs to the
+    # first or to the last triangle.
     triangles, weights = [], []
     for start in faces.halfedges.T:
         owner = surface.corner_face[start]
@@ -324,7 +340,7 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
         opposite = np.where(place == 0, 2, np.where(place == last, 1, 0))
         triangles.append(triangle)
         weights.append(cotangent[triangle, opposite] / 2)
-    # The edges within faces, from each triangle to the next one.
+    # Edges within faces, between each triangle of a fan and the next one.
     inner = np.flatnonzero(rank > 0)
     triangles = [np.concatenate(pair) for pair in zip(triangles, (inner - 1, inner), strict=True)]
     inner_weights = cotangent[inner - 1, 1] / 2, cotangent[inner, 2] / 2
@@ -345,10 +361,10 @@ def triangle_graph(surface: Surface, faces: FaceGraph) -> TriangleGraph:
 
 
 def _cotangents(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (T, 3) cotangents of the angles, and (T,) areas, of triangles with (T, 3, 3) points.
+    """Return the (T, 3) cotangents of the angles of triangles, and their (T,) areas.
 
-    Areas are enlarged to `MIN_AREA`. That scales the cotangents of a triangle, so that their matrix stays
-    positive semidefinite.
+    `points` is (T, 3, 3). Areas smaller than `MIN_AREA` are enlarged. This scales all cotangents of a
+    triangle by the same factor, so their matrix stays positive semidefinite.
     """
     sides = np.roll(points, -1, axis=1) - points
     squared = dot(sides, sides)

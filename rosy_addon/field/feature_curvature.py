@@ -1,4 +1,4 @@
-"""Measure the curvature of the features of a surface, and how noise of the vertices changes it."""
+"""Measure the curvature of a surface between its sharp edges, and how noise of the vertices changes it."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .representation import face_frames
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
-#: Length over which curvature is averaged, relative to `Surface.extent`.
+#: Distance over which curvature is averaged, relative to `Surface.extent`.
 SCALE = 0.01
 
-#: Ratio of curvature and noise below which there is no feature.
+#: Ratio of curvature to the curvature of noise below which a part of the surface has no feature.
 MIN_NOISE_RATIO = 2.0
 
-#: Seed of the sample of noise.
+#: Seed of the random numbers for the noise sample.
 SEED = 777
 
 #: Displacement at which the effect of noise on the normals is measured, relative to the square root
@@ -32,20 +32,23 @@ PROBE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class NoisyCurvature:
-    """The curvature of a surface between its salient edges, and how much noise changes it.
+    """The curvature of a surface between its salient edges (sharp edges and borders), and its noise.
 
-    See `curvature.face_curvature` for the mean and the deviator.
+    Mean curvature and deviator are explained in `curvature.face_curvature`.
 
     Attributes
     ----------
     salient_ends : (E, 2) int32 ndarray
-        The salient edges: pairs of vertices.
+        The salient edges, as pairs of vertices.
     averages : SurfaceAverages
-        Averages in the frames of the faces.
+        Averages between faces and vertices, in the frames of the faces.
     mean : (F,) float64 ndarray
+        Mean curvature of each face.
     deviator : (F,) complex128 ndarray
+        Deviator of each face: half the difference of the principal curvatures, and their directions.
     mean_noise, deviator_noise : (F,) ndarray
-        Changes of the mean and of the deviator if as much noise is added again.
+        By how much the mean curvature and the deviator change if random displacements as strong as the noise
+        of the mesh are added to the vertices.
     """
 
     salient_ends: np.ndarray
@@ -57,7 +60,10 @@ class NoisyCurvature:
 
 
 def of_unit_extent(surface: Surface) -> Surface:
-    """Return a surface of extent 1 around the origin, so that no number is very large or small."""
+    """Return the surface, scaled to the extent 1 and centered at the origin.
+
+    This avoids very large and very small numbers.
+    """
     used = surface.used_vertices
     vertices = np.zeros_like(surface.vertices)
     low, high = surface.vertices[used].min(axis=0), surface.vertices[used].max(axis=0)
@@ -66,7 +72,7 @@ def of_unit_extent(surface: Surface) -> Surface:
 
 
 def noisy_curvature(surface: Surface) -> NoisyCurvature:
-    """Measure the curvature of a surface, without and with a sample of its noise."""
+    """Measure the curvature of a surface, and its change by random noise; see `NoisyCurvature`."""
     edges = build_edges(surface.corner_vertex, surface.face_start)
     normals, noise_angle = filtered_normals(surface, edges)
     ends = salient_edges(surface, edges, normals, noise_angle)
@@ -89,9 +95,10 @@ def noisy_curvature(surface: Surface) -> NoisyCurvature:
 def _bounded_curvature(
     surface: Surface, corner_fan: np.ndarray, x: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean curvature and the deviator of each face; normals are smooth within the given fans.
+    """Return the mean curvature and the deviator of each face; see `curvature.face_curvature`.
 
-    Curvature is limited to the inverse size of the face, because slivers cannot resolve more.
+    Normals are averaged over the fans of `corner_fan`. The curvature is limited to the inverse of the square
+    root of the face area, because a face cannot resolve more.
     """
     mean, deviator = face_curvature(with_smooth_normals(surface, corner_fan), x, y)
     vectors = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
@@ -102,12 +109,12 @@ def _bounded_curvature(
 
 
 def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarray:
-    """Sample white noise as strong as the noise of the vertices along their normals.
+    """Return random displacements of the vertices along their normals, as strong as the noise of the mesh.
 
-    Two effects of the noise are compared with the effects of white noise of unit amplitude: the angle by
-    which it rotates the face normals, and the difference of vertices from the mean of their neighbors. The
-    form of the surface adds to the first effect on coarse meshes and to the second one at creases, so the
-    smaller result is used.
+    The noise is white. Its amplitude is estimated in two ways, by comparing the mesh with a mesh that has
+    white noise of unit amplitude: from the angle by which noise rotates the face normals, and from the
+    difference of vertices from the mean of their neighbors. The form of the surface increases the first
+    estimate on coarse meshes, and the second one at creases. So the smaller estimate is used.
 
     Parameters
     ----------
@@ -119,7 +126,7 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
     Returns
     -------
     (V, 3) float64 ndarray
-        Displacements of the vertices, in Blender units.
+        Displacements of the vertices, in object space.
     """
     count = len(surface.vertices)
     normal = np.stack(
@@ -143,7 +150,7 @@ def noise_sample(surface: Surface, edges: Edges, noise_angle: float) -> np.ndarr
 
 
 def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Return (V,) the bi-Laplacian of points along the normals, with weights of 1 for all edges."""
+    """Return the (V,) components along the normals of the bi-Laplacian of points, with equal edge weights."""
     tail, head = ends.T
     degree = np.maximum(np.bincount(ends.ravel(), minlength=len(points)), 1)
 
@@ -157,11 +164,11 @@ def _roughness(points: np.ndarray, normal: np.ndarray, ends: np.ndarray) -> np.n
 
 
 def feature_curvature(surface: Surface) -> np.ndarray:
-    """Compute the curvature of the features at the corners of the triangles.
+    """Compute the curvature of the features of a surface at the corners of its triangles.
 
-    It is the larger absolute principal curvature, averaged over `SCALE`. The curvature of noise is
-    subtracted, and sharp edges have none. The rest shape is used if there is one, so that a
-    deformation does not change the result.
+    It is the larger absolute principal curvature, averaged over the distance `SCALE`. The curvature of
+    noise is subtracted, and the bend at sharp edges does not count. The rest shape is used if there is one,
+    so that a deformation does not change the result.
 
     Parameters
     ----------
@@ -170,7 +177,7 @@ def feature_curvature(surface: Surface) -> np.ndarray:
     Returns
     -------
     (T, 3) float32 ndarray
-        Units of 1 / length in object space. 0 is flat.
+        Curvature in units of 1 / length, in object space; 0 where the surface is flat.
     """
     if surface.rest_vertices is not None:
         surface = with_smooth_normals(surface.in_rest_shape())

@@ -1,4 +1,4 @@
-"""`Field`: an N-RoSy field with its surface, for scripts and notebooks."""
+"""`Field`: an N-RoSy (N-way rotational symmetry) field with its surface, for scripts and notebooks."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ from .surface import Surface
 
 
 class Singularities(NamedTuple):
-    """The K singular vertices of a field.
+    """The K singular vertices of a field, and their indices.
 
     Attributes
     ----------
     vertex : (K,) int32 ndarray
-        In ascending order.
+        Numbers of the vertices, in ascending order.
     index : (K,) int32 ndarray
-        In units of 1/N; never 0. On a closed surface they sum to N times the Euler characteristic.
+        Singularity index of each vertex in units of 1/N; never 0. On a closed surface, the sum of all
+        indices is N times the Euler characteristic.
     """
 
     vertex: NDArray[np.int32]
@@ -38,23 +39,24 @@ class Singularities(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """The angle between two fields of the same degree.
+    """The angle between two fields of the same degree on each face, and statistics of it.
 
     Attributes
     ----------
     angle : (F,) float64 ndarray
-        From a member to the nearest member of the other field, in radians, 0 to pi/N. NaN where
-        either field is undefined.
+        Angle between a vector of one field and the nearest vector of the other, in radians from 0 to
+        pi/N. It is the same for all N vectors of a face. NaN where either field is undefined. For
+        directions that are not rotationally symmetric, see `Field.difference`.
     mean, rms : float
         Mean and root mean square of the angle in radians, weighted by area.
     p95 : float
-        The largest angle on 95 % of the area, radians.
+        95th percentile of the angle in radians, weighted by area.
     max : float
-        Radians.
+        Largest angle, in radians.
     worst_face : int
-        The face of the largest angle; -1 if there is nothing to compare.
+        The face with the largest angle; -1 if there is no face on which both fields are defined.
     compared : float
-        Fraction of the faces on which both fields are defined.
+        Fraction of the faces on which both fields are defined, from 0 to 1.
     """
 
     angle: NDArray[np.float64]
@@ -68,22 +70,23 @@ class Difference:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Field(RosyField):
-    """An N-RoSy field on the faces of a surface.
+    """An N-way rotational symmetry (N-RoSy) field on the F faces of a surface.
 
-    Make one with a generator, such as `smoothest`, or with `from_vectors`, `from_angles`,
-    `from_directions`, `from_tensors`, `from_array` or `read_field`. Numeric functions take a `RosyField`
-    and its surface; a `Field` is one that knows its surface.
+    It has N vectors, its *members*, on each face: rotations of each other by 2 pi / N about the normal.
+    Make a field with a generator, such as `smoothest`, or with `from_vectors`, `from_angles`,
+    `from_directions`, `from_tensors`, `from_array` or `read_field`. A `Field` is a `RosyField` that also
+    holds its surface, so that methods need no surface as an argument.
 
     Attributes
     ----------
     degree : int
         N, the number of directions.
     vectors : (F, 3) float64 ndarray
-        One member vector for each face; zero where the field is undefined.
+        One member vector for each face, in object space; zero where the field is undefined.
     direction_ratios, family_count, source_directions
         See `RosyField`.
     surface : Surface
-        On whose faces the field is.
+        The surface on which the field is defined.
 
     Examples
     --------
@@ -103,7 +106,7 @@ class Field(RosyField):
 
     @classmethod
     def of(cls, surface: Surface, field: RosyField) -> Field:
-        """Return a field with its surface."""
+        """Return a `Field` with the values of a `RosyField` and this surface."""
         return cls(
             field.degree,
             field.vectors,
@@ -119,17 +122,17 @@ class Field(RosyField):
 
     @property
     def is_rosy(self) -> bool:
-        """Whether the directions are rotationally symmetric, on all faces."""
+        """Whether the directions are rotationally symmetric on all faces."""
         return self.direction_ratios is None
 
     @cached_property
     def directions(self) -> NDArray[np.float64]:
-        """(F, N, 3): all directions, counter-clockwise about the normals."""
+        """(F, N, 3): all N directions of each face in object space, counter-clockwise about the normal."""
         return field_directions(self.surface, self)
 
     @cached_property
     def angles(self) -> NDArray[np.float64]:
-        """(F,): angle of the stored member from x of `Surface.face_frames`, in radians, -pi to pi."""
+        """(F,): counter-clockwise angle from x of `Surface.face_frames` to `vectors`, -pi to pi radians."""
         x, y = self.surface.face_frames
         vectors = self.vectors
         angles: NDArray[np.float64] = np.arctan2(
@@ -139,30 +142,31 @@ class Field(RosyField):
 
     @cached_property
     def representation(self) -> NDArray[np.complex128]:
-        """(F,): r exp(i N t) for the magnitude r and the angle t of a member; see `angles`.
+        """(F,): the representation r exp(i N t) for member vectors of length r and angle t (see `angles`).
 
-        It is the same for all members. `from_representation` makes a field of it.
+        All N members of a face give the same value. `from_representation` makes a field from it.
         """
         z: NDArray[np.complex128] = self.magnitude * np.exp(1j * self.degree * self.angles)
         return z
 
     @cached_property
     def singularities(self) -> Singularities:
-        """The singular vertices and their indices, in units of 1/N."""
+        """The singular vertices of the field, and their indices in units of 1/N."""
         return Singularities(*find_singularities(self.surface, self))
 
     @cached_property
     def energy(self) -> float:
-        """The Dirichlet energy of the directions; see `field.analysis.dirichlet_energy`."""
+        """The Dirichlet energy of the directions, without unit; see `field.analysis.dirichlet_energy`."""
         return dirichlet_energy(self.surface, self)
 
     def to_degree(self, degree: int) -> Field:
-        """Return the field with another degree, a multiple or a divisor of its own.
+        """Return the field converted to another degree, which is a multiple or a divisor of its own degree.
 
         Raises
         ------
         RosyError
-            If it is neither, or the field is not a RoSy.
+            If `degree` is neither a multiple nor a divisor, or if the directions of the field are not
+            rotationally symmetric.
         """
         return self._converted(Conversion(degree=degree))
 
@@ -171,27 +175,34 @@ class Field(RosyField):
         return self._converted(Conversion(rotation=angle))
 
     def smoothed(self, reach: float) -> Field:
-        """Return the field diffused over a distance, a fraction of the longest side of the mesh.
+        """Return the field diffused over a distance.
 
-        Magnitudes decrease where directions vary, and singularities of opposite index merge.
+        Magnitudes decrease where directions vary, and singularities of opposite index cancel.
+
+        Parameters
+        ----------
+        reach : float
+            The distance, as a fraction of the longest side of the bounding box of the mesh.
         """
         return self._converted(Conversion(smoothing_length=reach))
 
     def without_pairs(self, reach: float) -> Field:
         """Return the field without pairs of singularities that are near to each other.
 
-        The singularities of a pair have opposite indices. Other singularities and directions far from the pairs
-        do not change. A pair stays if the field would turn too fast for the size of the faces without it.
+        The singularities of a pair have opposite indices, so they cancel. Other singularities, and
+        directions far from the pairs, do not change. A pair is kept if the faces near it are too large to
+        remove it: the field would then turn by pi / N or more from one face to the next.
 
         Parameters
         ----------
         reach : float
-            Largest distance of a pair along edges, as a fraction of the longest side of the mesh.
+            Largest distance between the singularities of a pair, along edges, as a fraction of the longest
+            side of the bounding box of the mesh.
 
         Raises
         ------
         RosyError
-            If the field is not a RoSy.
+            If the directions of the field are not rotationally symmetric.
 
         Examples
         --------
@@ -204,26 +215,29 @@ class Field(RosyField):
     def with_moved_singularity(
         self, source: int, target: int, index: int = 0, *, reach: float = 0.1
     ) -> Field:
-        """Return the field with a singularity at another vertex; all others stay.
+        """Return the field with a singularity moved to another vertex; all other singularities stay.
 
-        If the target is singular, the indices are added: opposite ones cancel. If the source is not
-        singular, a pair is created. If only a part of an index moves, the rest stays at the source.
+        If the target is already singular, the moved index is added to its index: opposite indices cancel.
+        If the source is not singular, a pair with indices `-index` and `index` is created. If only a part
+        of the index of the source moves, the rest of it stays there.
 
         Parameters
         ----------
         source, target : int
-            Vertices. -1 stands for none: the singularity enters or leaves over a border.
+            Vertices. A `source` of -1 means that the singularity enters the surface over its border, and a
+            `target` of -1 that it leaves over the border.
         index : int
             Index to move, in units of 1/N; 0 for the whole index of `source`.
         reach : float
-            Distance over which directions change, as a fraction of the longest side of the mesh. They
-            change at least as far as the singularity moves.
+            Distance over which directions change, as a fraction of the longest side of the bounding box
+            of the mesh. They change at least as far as the singularity moves.
 
         Raises
         ------
         RosyError
-            If the field is not a RoSy, a vertex can have no index or has none to move, or the field would
-            turn too fast for the size of the faces.
+            If the directions of the field are not rotationally symmetric, if one of the vertices cannot be
+            singular (such as a border vertex), if `source` has no index to move, or if the faces are too
+            large: the field would turn by pi / N or more from one face to the next.
 
         Examples
         --------
@@ -239,11 +253,12 @@ class Field(RosyField):
         )
 
     def with_magnitude(self, magnitude: str | ArrayLike) -> Field:
-        """Return the field with other magnitudes.
+        """Return the field with the same directions and other magnitudes.
 
         Parameters
         ----------
         magnitude : {"unit", "confidence", "curvature"} or (F,) array_like
+            The magnitudes, or how to compute them; see `field.convert.Conversion`.
         """
         if not isinstance(magnitude, str):
             values = np.asarray(magnitude, dtype=np.float64)
@@ -257,11 +272,12 @@ class Field(RosyField):
         return self._converted(Conversion(magnitude=magnitude))
 
     def difference(self, other: Field) -> Difference:
-        """Return the angle to another field of the same degree on the same surface.
+        """Return the angle to another field of the same degree on the same surface, and statistics of it.
 
-        If the directions of one of them are not rotationally symmetric, it is the mean angle between the
-        directions of their best matching, and may be larger than pi/N. Two smoothest fields of a closed
-        surface may differ by a constant angle, which costs no energy.
+        If the directions of either field are not rotationally symmetric, the directions of the two fields are
+        matched on each face, in their order around the normal. There are N such matchings. The angle is then
+        the least mean angle between matched directions, and it may be larger than pi/N. Two smoothest fields
+        of a closed surface may differ by a constant angle: such a rotation does not change the energy.
 
         Raises
         ------
@@ -278,8 +294,8 @@ class Field(RosyField):
         Parameters
         ----------
         path : path-like
-            ``.rosy``, ``.rawfield``, ``.obj`` (of fieldgen), ``.txt`` or ``.npy``; or ``.sings`` for
-            the singularities alone.
+            The suffix selects the format: ``.rosy``, ``.rawfield``, ``.obj`` (in the format of the program
+            fieldgen), ``.txt`` or ``.npy``; or ``.sings`` for the singularities alone.
 
         Raises
         ------
@@ -293,7 +309,7 @@ class Field(RosyField):
 
 
 def check_same_surface(surface: Surface, field: Field) -> None:
-    """Raise an error if a field is on another surface."""
+    """Raise a `RosyError` if the surface of a field is not this `Surface` object."""
     if field.surface is not surface:
         raise RosyError(
             f"{surface.name}: the field is on another surface, {field.surface.name}: make it on this one"

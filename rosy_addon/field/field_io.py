@@ -39,15 +39,14 @@ from .validate import (
     validated_field,
 )
 
-#: Limits for a target face to get the field of the closest source face: the distance relative to
-#: `Surface.extent` of the source, and the angle between the normals in radians.
+#: A face of the target mesh gets the field of the closest source face only within these limits: the distance
+#: relative to `Surface.extent` of the source, and the angle between the normals in radians.
 MAX_DISTANCE, MAX_NORMAL_ANGLE = 0.02, np.radians(60)
 
-#: Largest fraction of the target faces that may exceed these limits. The field is undefined on
-#: them.
+#: Largest fraction of the target faces that may exceed these limits. On these faces the field is undefined.
 MAX_UNMATCHED_FRACTION = 0.05
 
-#: The reader of each file name extension.
+#: The function that reads files with each file name extension.
 _READERS: dict[str, Callable[[Path], RawField]] = {
     ".rosy": read_rosy,
     ".rawfield": read_rawfield,
@@ -58,10 +57,10 @@ _READERS: dict[str, Callable[[Path], RawField]] = {
 READ_SUFFIXES = tuple(_READERS)
 WRITE_SUFFIXES = (".rosy", ".rawfield", ".obj", ".txt", ".npy", *SINGULARITY_SUFFIXES)
 
-#: Degree of files that do not state one, if the caller gives none.
+#: Degree of fields from files that do not state a degree, if the caller gives none.
 DEFAULT_DEGREE = 4
 
-#: Bytes of memory that a byte of an .npy file takes until its field is made.
+#: Peak memory in bytes per byte of an .npy file, until its field is made.
 NPY_MEMORY = 4
 
 
@@ -82,32 +81,32 @@ def load_field(
     """Read a field from a file and fit it to a mesh.
 
     ============  ==================================================================
-    `.rosy`       a count, N, and rows x y z with one member each
-    `.rawfield`   N, a count, and rows of all N directions, which need not be a RoSy
+    `.rosy`       row count, degree N, then rows x y z with one member vector each
+    `.rawfield`   N, row count, then rows of all N directions, which need not be a RoSy
     `.obj`        a mesh with the field in comments, as written by the program fieldgen
-    `.txt`        rows of 3 numbers (a member each), of 3 N (all directions), or of 9
-                  that are symmetric 3 x 3 tensors
-    `.npy`        the same as an array, (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
+    `.txt`        rows of 3 numbers (one member vector), 3 N numbers (all N
+                  directions), or 9 numbers (a symmetric 3 x 3 tensor)
+    `.npy`        the same data as an array: (n, 3), (n, 3 N), (n, N, 3) or (n, 3, 3)
     ============  ==================================================================
 
-    Any white space separates numbers. Rows belong to faces or to vertices. Vertex values are
-    averaged onto the faces. Tensors must be on faces.
+    Numbers are separated by white space. There is a row for each face, or for each vertex. Values at
+    vertices are averaged onto the faces. Tensors must be on faces.
 
     Parameters
     ----------
     path : path-like
     surface : Surface
-        The mesh of the field.
+        The mesh to which the field is fitted.
     degree : int, optional
-        The required degree N; any if not given. Plain files with one member per row do not state a
-        degree. They get this one, or `DEFAULT_DEGREE`.
+        The required degree N; by default any degree. Files with one member vector per row may not state a
+        degree. Their field then has this degree, or `DEFAULT_DEGREE`.
     nonfinite : {"error", "zero"}
-        Raise an error if a vector is not finite, or treat it as undefined.
+        What to do if a vector is not finite: raise an error, or treat it as undefined.
     mesh : path-like, optional
-        The mesh file that the rows refer to, if its faces differ from the faces of `surface`, for
-        example because one of the meshes was triangulated or reordered. The field is then transferred by
-        position. If not given, and the counts differ, a mesh file of the same name in the same
-        folder is used.
+        The mesh file to which the rows of the field belong, if its faces differ from the faces of `surface`,
+        for example because one of the meshes was triangulated or reordered. The field is then transferred by
+        position. If `mesh` is not given and the number of rows does not fit, a mesh file of the same name in
+        the same folder is used.
 
     Returns
     -------
@@ -116,8 +115,8 @@ def load_field(
     Raises
     ------
     RosyError
-        If the file is missing, has another extension, is malformed, has another degree or belongs
-        to another mesh, or its vectors are not tangent to the surface.
+        If the file is missing or malformed, has an unknown extension, has another degree, belongs to another
+        mesh, or has vectors that are not tangent to the surface.
     """
     path = Path(path)
     reader = _READERS.get(path.suffix.lower())
@@ -154,17 +153,19 @@ def load_field(
 def field_from_raw(
     raw: RawField, surface: Surface, degree: int | None, source: str, nonfinite: str
 ) -> RosyField:
-    """Make a field from raw rows, on the surface that the rows refer to.
+    """Make a field from the unchecked rows of a file, on the surface to which the rows belong.
 
     Parameters
     ----------
     raw : RawField
     surface : Surface
     degree : int or None
-        Degree of rows with one member that state none; `DEFAULT_DEGREE` if None.
+        Degree N for rows with one member vector, if the file does not state a degree; `DEFAULT_DEGREE` if
+        None.
     source : str
         Name of the file, for messages.
     nonfinite : {"error", "zero"}
+        What to do if a vector is not finite: raise an error, or treat it as undefined.
 
     Raises
     ------
@@ -187,7 +188,7 @@ def field_from_raw(
 
 
 def _check_count(raw: RawField, surface: Surface, source: str) -> None:
-    """Raise an error if the number of rows fits neither the header nor the surface.
+    """Raise a `RosyError` if the number of rows is not that in the header, or does not fit the surface.
 
     Some programs write the number of vertices in the header of a field on faces. This is accepted.
     """
@@ -210,7 +211,10 @@ def _check_count(raw: RawField, surface: Surface, source: str) -> None:
 def _source_surface(
     path: Path, raw: RawField, surface: Surface, mesh: str | os.PathLike[str] | None
 ) -> Surface | None:
-    """Return the surface that the rows of a file refer to, if it is not `surface`; None if it is."""
+    """Return the surface of the mesh file to which the rows of a field file belong.
+
+    The result is None if the rows belong to `surface` itself.
+    """
     if mesh is not None:
         return Surface(mesh)
     count = len(raw.values)
@@ -228,7 +232,7 @@ def _source_surface(
     if mesh_path is None:
         return None
     source = Surface(mesh_path)
-    # The rows may match the vertices of `surface`, but belong to the faces of the mesh file.
+    # The number of rows may fit the vertices of `surface` although the rows belong to faces of the mesh file.
     return source if count == source.face_count or infer_domain(surface, count) is None else None
 
 
@@ -238,9 +242,9 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
     `.obj` files contain the mesh and one row for each vertex. `.sings` and `.sing` files contain
     only the singularities of the field.
 
-    Numbers are written so that reading gives exactly the same float64; the field in an `.obj` file
-    differs, because it is averaged onto the vertices. Fields made from directions are written with
-    their `source_directions`, if the format stores all directions.
+    Numbers are written with all digits, so reading the file gives exactly the same float64 values. Only the
+    field in an `.obj` file differs, because it is averaged onto the vertices. For a field made from
+    directions, the `source_directions` are written if the format stores all directions.
 
     Raises
     ------
@@ -250,13 +254,13 @@ def write_field(path: str | os.PathLike[str], field: RosyField, surface: Surface
 
     See Also
     --------
-    load_field : The formats.
+    load_field : Description of the formats.
     """
     write_bytes(path, field_file(path, field, surface))
 
 
 def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface) -> bytes:
-    """Return the contents of the file that `write_field` writes.
+    """Return the contents of the file that `write_field` writes, as bytes.
 
     Raises
     ------
@@ -270,7 +274,7 @@ def field_file(path: str | os.PathLike[str], field: RosyField, surface: Surface)
 
 
 def _check_storable(path: Path, field: RosyField) -> None:
-    """Raise an error if the format of a file cannot store a field."""
+    """Raise a `RosyError` if the format of a file (given by its suffix) cannot store a field."""
     suffix = path.suffix.lower()
     if suffix not in WRITE_SUFFIXES:
         raise RosyError(
@@ -284,7 +288,7 @@ def _check_storable(path: Path, field: RosyField) -> None:
 
 
 def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
-    """Return the contents of a field file."""
+    """Return the contents of a field file in the format with this suffix, as bytes."""
     if suffix == ".rosy":
         return rosy_text(field).encode("ascii")
     if suffix == ".obj":
@@ -303,7 +307,7 @@ def _contents(suffix: str, field: RosyField, surface: Surface) -> bytes:
 
 
 def _join_names(names: tuple[str, ...]) -> str:
-    """Join names as in "a, b or c"."""
+    """Return names joined as in "a, b or c"."""
     return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
@@ -318,16 +322,15 @@ def transfer_field(
     field : RosyField
         The field on the faces of `source`.
     target : Surface
-        The same shape in the same space with different faces, for example triangulated or
-        reordered.
+        The same shape in the same space, with different faces: for example triangulated or reordered.
     field_name : str
         Name of the field in messages.
 
     Returns
     -------
     RosyField
-        On the faces of `target`; zero on faces beyond `MAX_DISTANCE` or `MAX_NORMAL_ANGLE`, and on
-        faces without area.
+        Field on the faces of `target`. It is zero on faces that exceed `MAX_DISTANCE` or `MAX_NORMAL_ANGLE`,
+        and on faces without area.
 
     Raises
     ------
@@ -360,7 +363,7 @@ def transfer_field(
 
 
 def _face_points(surface: Surface) -> np.ndarray:
-    """Return (F, 3) a point on each face: the centroid of its largest triangle."""
+    """Return one (F, 3) point on each face: the centroid of its largest triangle."""
     points = np.empty((surface.face_count, 3))
     for faces in row_blocks(surface.face_count):
         limits = np.searchsorted(surface.triangle_face, [faces.start, faces.stop])

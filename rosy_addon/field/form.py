@@ -1,8 +1,8 @@
-"""Fields that follow the form of a surface, as an illustrator's hatching does.
+"""Generate fields that follow the form of a surface, as an illustrator's hatching does.
 
-The field follows salient edges, and principal directions where they are clear: where the curvature
-differs between the directions, and by more than the noise of the mesh makes it differ. It is smooth
-between them.
+The field follows salient edges, and it follows principal directions where they are clear. They are clear
+where the two principal curvatures differ by more than the noise of the mesh could cause. Elsewhere the
+field is smooth.
 """
 
 from __future__ import annotations
@@ -19,40 +19,43 @@ from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .surface import Surface
 
-#: Lengths over which curvature is averaged, relative to `Surface.extent`.
+#: Distances over which curvature may be averaged, relative to `Surface.extent`.
 SCALES = (0.01, 0.02, 0.04, 0.08)
 
-#: The scale is the smallest one at which noise rotates half of the directions by less than this angle, in
-#: radians. It is measured by adding as much noise again.
+#: The smallest of these distances is used at which noise rotates half of the directions by less than this
+#: angle, in radians. The rotation is measured by adding random noise as strong as that of the mesh.
 MAX_TURN = np.radians(6)
 
-#: Ratio of curvature and noise at which the confidence in a direction is half.
+#: Ratio of curvature to the curvature of noise at which the confidence in a direction is 1/2.
 CLEAR_RATIO = 3.0
 
 #: Confidence below which directions are ignored, as on spheres.
 MIN_CONFIDENCE = 0.05
 
-#: Curvature below which a surface is flat, relative to the inverse of `Surface.extent`.
+#: Curvature below which a surface counts as flat, relative to the inverse of `Surface.extent`.
 FLAT_CURVATURE = 0.05
 
-#: Distance over which directions of full confidence spread, relative to `Surface.extent`.
+#: Distance over which the influence of directions with confidence 1 falls off, relative to `Surface.extent`.
 REACH = 0.04
 
-#: Relative residual norm at which conjugate gradients stop. The directions that the field follows are
-#: not more exact.
+#: Relative norm of the residual at which the solver for the field stops. The directions that the field
+#: follows are not more exact than that.
 FIELD_TOLERANCE = 1e-4
 
 
 def follows_curvature(degree: int) -> bool:
-    """Return whether the rotations of a degree map the lines or crosses of curvature to themselves."""
+    """Return whether a field of this degree can follow principal directions: degree 2 and multiples of 4.
+
+    Degree 2 follows one principal direction, and multiples of 4 follow both of them equally.
+    """
     return degree == 2 or degree % 4 == 0
 
 
 def form(surface: Surface, degree: int) -> RosyField:
     """Generate a field that follows the form of a surface.
 
-    Fields of degree 2 and of multiples of 4 follow principal directions. Other degrees cannot, and give the
-    smoothest field.
+    Fields of degree 2 and of multiples of 4 follow principal directions. For other degrees, which cannot
+    follow them, the result is the smoothest field.
 
     Parameters
     ----------
@@ -63,7 +66,7 @@ def form(surface: Surface, degree: int) -> RosyField:
     Returns
     -------
     RosyField
-        A field of magnitude 1; 0 on faces without area.
+        A field of magnitude 1; zero on faces without area.
 
     Raises
     ------
@@ -99,12 +102,12 @@ def form(surface: Surface, degree: int) -> RosyField:
 
 
 def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Find principal directions, and how clear they are.
+    """Compute principal directions on the faces, and the confidence in them.
 
     Returns
     -------
     guides : (F, 3) float64 ndarray
-        Unit vectors, or zero.
+        Unit vectors along principal directions; zero where there is none.
     confidence : (F,) float64 ndarray
         Confidence in each guide, from 0 to 1.
     """
@@ -117,8 +120,8 @@ def _curvature_guides(measured: NoisyCurvature, degree: int) -> tuple[np.ndarray
         area = scale**2
         z = averages.smooth(matrix, area, deviators[0], z)
         z_noise = averages.smooth(matrix, area, deviators[1], z_noise)
-        # The phase of a deviator is twice the angle of a line, so its square has four times the angle of a
-        # cross.
+        # The phase of a deviator is twice the angle of the principal direction. The pair of both principal
+        # directions has a symmetry of four, so the phase is doubled again, and divided by 4 to get the angle.
         turn = np.abs(np.angle(((z + z_noise) * z.conj()) ** 2)) / 4
         modulus = np.abs(z)
         clear = averages.mass * modulus / (modulus + 1)

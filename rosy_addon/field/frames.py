@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return (...) dot products of the vectors of two (..., 3) arrays."""
+    """Return the (...) dot products of corresponding vectors in two (..., 3) arrays."""
     return np.einsum("...i,...i->...", a, b)
 
 
 def coordinates(vectors: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return (F, N) complex coordinates of (F, N, 3) vectors in (F, 3) frames x, y."""
+    """Return the (F, N) complex coordinates v.x + i v.y of (F, N, 3) vectors v in (F, 3) frames x, y."""
     return dot(vectors, x[:, None]) + 1j * dot(vectors, y[:, None])
 
 
@@ -25,15 +25,16 @@ def normalize(vectors: np.ndarray) -> np.ndarray:
 
 
 def unit_direction(vector: ArrayLike) -> np.ndarray | None:
-    """Return a (3,) vector of length 1; None if a vector of any shape is no direction.
+    """Return a vector scaled to length 1, or None if it is not a direction.
 
-    Its length may be anything that a number can hold.
+    A direction has three finite components that are not all 0. They may be as large or as small as a
+    floating-point number can be.
     """
     values = np.asarray(vector, dtype=np.float64).reshape(-1)
     largest = np.abs(values).max(initial=0.0)
     if values.shape != (3,) or not np.isfinite(largest) or largest == 0:
         return None
-    # Scaled exactly to about 1, so that its square neither overflows nor vanishes.
+    # Scale by a power of 2 to about 1 (exactly), so that squares neither overflow nor underflow.
     values = np.ldexp(values, -np.frexp(largest)[1])
     return values / np.linalg.norm(values)
 
@@ -51,8 +52,8 @@ def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np
     Returns
     -------
     (..., 3) ndarray
-        v - (v.t) / (1 + s.t) (s + t), for source s and target t. The vectors are perpendicular to
-        `target` and have their original lengths.
+        v - (v.t) / (1 + s.t) (s + t) for each vector v, source s and target t, where . is the dot product.
+        The vectors are perpendicular to `target` and have their original lengths.
 
     Notes
     -----
@@ -64,7 +65,10 @@ def transport(vectors: np.ndarray, source: np.ndarray, target: np.ndarray) -> np
 
 
 def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the `dot` of vectors given as three component arrays: faster, because each is contiguous."""
+    """Return dot products of vectors that are given as three arrays, of x, y and z.
+
+    This is faster than `dot`, because each array is contiguous.
+    """
     product = a[0] * b[0]
     product += a[1] * b[1]
     product += a[2] * b[2]
@@ -74,7 +78,7 @@ def dot_components(a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarr
 def transport_components(
     vectors: Sequence[np.ndarray], source: Sequence[np.ndarray], target: Sequence[np.ndarray]
 ) -> list[np.ndarray]:
-    """Return the `transport` of vectors given as three component arrays."""
+    """Return the result of `transport` for vectors that are given as three arrays, of x, y and z."""
     factor = dot_components(vectors, target)
     factor /= np.maximum(1 + dot_components(source, target), np.finfo(factor.dtype).eps)
     return [v - factor * (s + t) for v, s, t in zip(vectors, source, target, strict=True)]
@@ -83,14 +87,14 @@ def transport_components(
 def transform_components(
     vectors: Sequence[np.ndarray], matrix: np.ndarray, offset: np.ndarray | None = None
 ) -> np.ndarray:
-    """Multiply vectors given as three component arrays by a matrix, in the vectors' precision.
+    """Multiply vectors that are given as three arrays, of x, y and z, by a matrix.
 
     Parameters
     ----------
-    vectors : 3 (n,) ndarrays
+    vectors : sequence of three (n,) ndarrays
     matrix : (m, 3) ndarray
     offset : (m,) ndarray, optional
-        Added to the products.
+        Vector that is added to each product.
 
     Returns
     -------
@@ -99,8 +103,8 @@ def transform_components(
 
     Notes
     -----
-    This avoids numpy's matrix product: the BLAS library would start its threads on all cores for a
-    small product, and their waiting slows down the code that follows.
+    This avoids numpy's matrix product. Even for a small product, the BLAS library would start threads on all
+    cores, and these threads, while they wait, slow down the code that follows.
     """
     dtype = vectors[0].dtype
     result = np.empty((len(matrix), len(vectors[0])), dtype=dtype)
@@ -116,7 +120,8 @@ def transform_components(
 def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two unit tangents x, y for each normal, with x cross y = normal.
 
-    The frames vary smoothly over normals with z > 0 and over those with z < 0.
+    The frames vary smoothly with the normal on each of the two half-spheres, z > 0 and z < 0, but not
+    across z = 0.
 
     Parameters
     ----------
@@ -141,11 +146,11 @@ def tangent_frame(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Transport the camera's x and y axes to the plane perpendicular to each pixel's ray.
+    """Return the camera's x and y axes, transported to the plane perpendicular to the ray of each pixel.
 
     The axes (1, 0, 0) and (0, 1, 0) of camera space are rotated by the minimal rotation from
-    (0, 0, 1), the direction to the eye on the optical axis, to `toward_eye`. This frame is
-    continuous over the whole image. For an orthographic camera it is the same at every pixel.
+    (0, 0, 1), the direction to the eye on the optical axis, to `toward_eye`. The resulting frames are
+    continuous over the whole image. For an orthographic camera the frame is the same at every pixel.
 
     Parameters
     ----------
@@ -155,7 +160,7 @@ def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     x, y : (..., 3) ndarray
-        Unit, in camera space.
+        Unit vectors in camera space.
     """
     wx, wy, wz = toward_eye[..., 0], toward_eye[..., 1], toward_eye[..., 2]
     a = 1 / (1 + wz)
@@ -166,6 +171,6 @@ def view_frame(toward_eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the angles between rows of vectors, in radians; 0 where a vector is zero."""
+    """Return the angles between corresponding vectors of two arrays, in radians; 0 where a vector is zero."""
     cross = np.cross(a, b)
     return np.arctan2(np.sqrt(dot(cross, cross)), dot(a, b))

@@ -1,7 +1,7 @@
 """Generate a field on a surface, by the name of a method.
 
-`GeneratorSettings` describes the options of all methods. Fields are cut along edges whose faces disagree
-on orientation; see `surface.count_inconsistent_edges`.
+`GeneratorSettings` describes the options of all methods. A field is not continuous across edges whose faces
+have opposite orientations; see `surface.count_inconsistent_edges`.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from .rosy_field import RosyField, check_degree
 from .smoothest import smoothest_field
 from .surface import Surface
 
-#: Smallest distance of smoothing, relative to `Surface.extent`. Shorter ones change nothing.
+#: Smallest smoothing distance, relative to `Surface.extent`. Shorter distances have no effect.
 MIN_SMOOTHING_LENGTH = 1e-6
 
-#: Kinds of generated fields, with the descriptions shown in the interface.
+#: Names of the methods that generate fields (the *kind* of a field), with the descriptions in the interface.
 GENERATORS = {
     "form": "Along the form: clear curvature and sharp edges, and smooth between them",
     "smoothest": "The smoothest field, with few singularities",
@@ -49,47 +49,50 @@ GENERATORS = {
     "uv": "Along the axes of a UV map",
 }
 
-#: Shorter projections of a unit axis are rounding errors: the face is perpendicular to the axis.
+#: A projection of a unit axis that is shorter than this is a rounding error: the face is perpendicular to the
+#: axis.
 MIN_PROJECTION = 1e-12
 
-#: Bytes of memory for each triangle at the peak, measured with the most expensive options of each kind.
-#: The other kinds take little.
+#: Peak memory in bytes per triangle, measured with the most expensive options of each kind of field. Kinds
+#: that are not listed need little memory.
 BYTES_PER_TRIANGLE = dict(
     form=1200, smoothest=640, curvature=950, features=1000, guided=950, prescribed=1600
 )
 
 
 def _only_for(*kinds: str) -> Callable[[Any], bool]:
-    """Return the predicate `Setting.applies` of an option of some kinds of fields."""
+    """Return a predicate for `Setting.applies`: true if the settings have one of these kinds of fields."""
     return lambda settings: settings.kind in kinds
 
 
 @dataclass(frozen=True)
 class GeneratorSettings:
-    """The kind of a generated field, its options and its inputs.
+    """The method that generates a field, its options and its inputs.
 
-    The first fields are options that describe themselves (`core.settings`). The properties of the operator,
-    its panel, the options of the command line and the checks are derived from the descriptions. Inputs are
-    read from the scene, from files or from the arguments of a script.
+    The first dataclass fields are options with descriptions (`core.settings`). The properties of the
+    operator, its panel, the options of the command line and the checks of values are derived from these
+    descriptions. The other dataclass fields, listed below, are inputs: they are read from the scene, from
+    files or from the arguments of a script.
 
     Attributes
     ----------
     edges : (E, 2) int ndarray or None
-        For "features" and "guided": pairs of vertices, the edges to follow. For "features", they
-        replace the border and sharp edges.
+        For "features" and "guided": the edges to follow, as pairs of vertices. For "features", they replace
+        the border edges and sharp edges, which are used by default.
     strokes : sequence of (n, 3) float ndarray
         For "guided": polylines drawn on the surface, in object space.
     axis_guides : sequence of (point, axis, radius)
-        For "guided": see `guides.guides_from_axes`; object space.
+        For "guided": axes that guide the field within a radius around points, all in object space; see
+        `guides.guides_from_axes`.
     uv : (C, 2) float ndarray or None
         For "guided" and "uv": texture coordinates of the corners.
     vectors : (F, 3) float ndarray or None
         For "guided" and "prescribed": a member vector for each face, zero where there is no guide.
     vectors_have_firmness : bool
-        For "guided": whether the lengths of `vectors` are the firmness of the guides; see
-        `guided_system.firmness_weights`.
+        For "guided": whether the lengths of `vectors` are the firmness of the guides, from 0 to 1 (how
+        strictly the field follows them); see `guided_system.firmness_weights`.
     singularities : ((K,) int ndarray, (K,) int ndarray) or None
-        For "prescribed": vertices, and their indices in units of 1 / N.
+        For "prescribed": the singular vertices, and their indices in units of 1 / N.
 
     Raises
     ------
@@ -149,7 +152,7 @@ class GeneratorSettings:
 
 
 def options_of(kind: str) -> list[str]:
-    """Return the names of the options of a kind of field."""
+    """Return the names of the options that apply to a kind of field, such as "curvature"."""
     settings = GeneratorSettings(kind)
     described = settings_of(GeneratorSettings)
     return [name for name in described if name != "kind" and described[name].applies(settings)]
@@ -162,7 +165,7 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
     ----------
     surface : Surface
     settings : GeneratorSettings or str
-        A string is a kind, with the default settings.
+        A string is the name of a kind in `GENERATORS`; its options then have their default values.
     degree : int
         N.
 
@@ -173,8 +176,8 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
     Raises
     ------
     RosyError
-        If the kind is unknown, cannot make a field of this degree on this surface, or needs more
-        memory than there is.
+        If the kind is unknown, if its method cannot make a field of this degree on this surface, or if it
+        needs more memory than the computer has.
     """
     settings = GeneratorSettings(settings) if isinstance(settings, str) else settings
     check_memory(
@@ -204,13 +207,17 @@ def generate(surface: Surface, settings: GeneratorSettings | str, degree: int) -
 
 
 def _curvature(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
-    """Return a field along principal directions, which clear ones extend into the other parts."""
+    """Return a field along principal curvature directions.
+
+    Where they are not well defined, as on flat parts, the field extends smoothly from the parts where they
+    are.
+    """
     split = 0.4 if settings.reach else 1.0
     with progress(0.0, split):
         field = curvature_field(surface, degree)
     if not settings.reach or not field.vectors.any():
         return field
-    # The extent is zero if all faces are points; then so is the magnitude.
+    # The extent is zero if all faces are points. The magnitude is then zero as well.
     weight = (field.magnitude / max(settings.reach * surface.extent, TINY)) ** 2
     with progress(split, 1.0):
         return guided_field(surface, degree, normalize(field.vectors), weight)
@@ -233,7 +240,7 @@ def _prescribed(surface: Surface, settings: GeneratorSettings, degree: int) -> R
 
 
 def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
-    """Return a field along the given edges or, without any, along border and sharp edges."""
+    """Return a field along the edges in the settings or, if there are none, along border and sharp edges."""
     degree = check_degree(degree)
     ends = settings.edges
     if ends is None:
@@ -253,7 +260,10 @@ def _features(surface: Surface, settings: GeneratorSettings, degree: int) -> Ros
 
 
 def _guided(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyField:
-    """Return a field along the mean of all guides in the settings."""
+    """Return a field that follows all guides in the settings (edges, strokes, axes, UV map and vectors).
+
+    On a face with several guides, it follows their mean.
+    """
     degree = check_degree(degree)
     report(0.0, "finding guides")
     guide_sets = []
@@ -289,17 +299,17 @@ def _guided(surface: Surface, settings: GeneratorSettings, degree: int) -> RosyF
 def axis_field(
     surface: Surface, degree: int, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
 ) -> RosyField:
-    """Make a field whose stored member is an axis projected to each face.
+    """Make a field along an axis: its stored member vectors are the projections of the axis to the faces.
 
     The magnitude is the length of the projection of the unit axis: 1 where the surface is parallel
-    to the axis and 0 where it is perpendicular to it. There the field is undefined.
+    to the axis. Where it is perpendicular to the axis, the magnitude is 0 and the field is undefined.
 
     Parameters
     ----------
     surface : Surface
     degree : int
     axis : 3 floats
-        Object space, of any nonzero length.
+        Vector in object space, of any nonzero length.
 
     Raises
     ------

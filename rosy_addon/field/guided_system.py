@@ -1,10 +1,12 @@
-"""Smooth fields that follow guides, and their linear system.
+"""Smooth fields that follow guides, and the linear system that computes them.
 
-The field minimizes its Dirichlet energy plus a penalty for the difference from the guides, as by
-Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013, section 4. The weight of the penalty may vary
-between faces. Hard guides are constraints instead of penalties.
+A *guide* is a member vector on a face that the field should follow. The field minimizes its Dirichlet
+energy plus a penalty for the difference from the guides (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH
+2013, section 4). The weight of the penalty may vary between faces. *Hard* guides are constraints instead of
+penalties: the field follows them exactly.
 
-The system of a surface is kept while its guides change: they only add to the diagonal.
+The system of a surface can be reused when its guides change, because guides only add to the diagonal of the
+matrix.
 """
 
 from __future__ import annotations
@@ -32,10 +34,11 @@ from .sparse_multigrid import CSRMatrix, Level, add_diagonal, hierarchy, w_cycle
 from .surface import Surface
 from .surface_averages import SurfaceAverages
 
-#: Residual norm at which a solution near some nodes stops, relative to the norm of the right-hand side.
+#: Residual norm at which `GuidedSystem.solve_near` stops, relative to the norm of the right-hand side.
 NEAR_TOLERANCE = 1e-4
 
-#: Guides of at least this firmness are followed exactly. It is less than 1 because stored guides are rounded.
+#: Guides of at least this firmness (see `firmness_weights`) are followed exactly. It is less than 1 because
+#: stored guides are rounded.
 EXACT_FIRMNESS = 1 - 1e-4
 
 #: Added to the diagonal of the Laplacian, relative to it, so that the system is regular on connected
@@ -45,18 +48,18 @@ REGULAR_SHIFT = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class NodeGuides:
-    """Guides at the n nodes.
+    """Guides of a field at the n nodes, in the form in which they enter the linear system.
 
     Attributes
     ----------
     penalty : (n,) float64 ndarray
-        Weights of the guides.
+        Sum of the weights of the guides around each node.
     rhs : (n,) complex128 ndarray
-        Representations of the guides times their weights.
+        Sum of the representations of these guides times their weights.
     is_fixed : (n,) bool ndarray
-        Nodes of faces with hard guides.
+        Whether the value at the node is given by hard guides, which are followed exactly.
     fixed : (n,) complex128 ndarray
-        Representations of modulus 1 at these nodes; 0 at the other ones.
+        The given representations, of modulus 1, at fixed nodes; 0 at all other nodes.
     """
 
     penalty: np.ndarray
@@ -67,17 +70,21 @@ class NodeGuides:
 
 @dataclass(frozen=True, eq=False)
 class GuidedSystem:
-    """The linear system of the guided fields of a surface, without the guides.
+    """The linear system for guided fields of one degree on a surface, without the guides.
+
+    It has n unknowns: representations at the nodes, which are the vertices (see `field.connection`).
 
     Attributes
     ----------
     surface : Surface
     degree : int
+        N.
     averages : SurfaceAverages
-        Averages in `face_frames` of the surface.
+        Averages between faces and nodes, in the frames of `face_frames`.
     laplacian : (n, n) CSRMatrix
+        The connection Laplacian.
     levels : list of Level
-        Multigrid levels of `laplacian`; empty until a first solution.
+        Multigrid levels of `laplacian`; empty until `solve` is called the first time.
     """
 
     surface: Surface
@@ -101,17 +108,18 @@ class GuidedSystem:
         is_hard: np.ndarray,
         corner: np.ndarray | slice = slice(None),
     ) -> NodeGuides:
-        """Average guides on the faces at the nodes.
+        """Return guides at the nodes, given guides on the faces.
 
         Parameters
         ----------
         target : (F,) complex128 ndarray
-            Representations in the frames x, y.
+            Representations of the guides in the frames of the faces; 0 on faces without a guide.
         weight : (F,) float64 ndarray
-            Units of 1 / area.
+            Weights of the guides, in units of 1 / area.
         is_hard : (F,) bool ndarray
+            Faces whose guides are followed exactly.
         corner : (m,) int ndarray or slice
-            Corners of triangles that are taken into account.
+            Corners of triangles that are included; all by default. Values at nodes without one are 0.
         """
         sums = self.averages.node_sums
         penalty = sums(weight, 0, corner)
@@ -130,15 +138,15 @@ class GuidedSystem:
         start: np.ndarray | None = None,
         tolerance: float = RELATIVE_TOLERANCE,
     ) -> np.ndarray:
-        """Solve for the representations at the nodes.
+        """Return the representations at the nodes of the field that follows the guides: solve the system.
 
         Parameters
         ----------
         guides : NodeGuides
         start : (n,) complex128 ndarray, optional
-            First approximation; 0 by default.
+            Estimate from which the iteration starts; 0 by default.
         tolerance : float
-            Residual norm relative to that of the right-hand side at which the solver stops.
+            Residual norm at which the solver stops, relative to the norm of the right-hand side.
 
         Returns
         -------
@@ -148,7 +156,7 @@ class GuidedSystem:
         if not self.levels:
             with progress(0.0, 0.5, label):
                 self.levels.extend(hierarchy(self.laplacian))
-        # Fixed nodes are stiff in the preconditioner, so that it hardly changes them.
+        # Fixed nodes have a large diagonal in the preconditioner, so that it hardly changes them.
         diagonal = np.where(guides.is_fixed, self.laplacian.diagonal, guides.penalty)
         report(0.5, label)
         levels = add_diagonal(self.levels, diagonal)
@@ -167,20 +175,21 @@ class GuidedSystem:
     def solve_near(
         self, guides: NodeGuides, z: np.ndarray, nodes: np.ndarray, max_iterations: int
     ) -> np.ndarray:
-        """Improve a solution at some nodes, and keep it at the other ones.
+        """Solve the linear system for some of the nodes, with the values at all other nodes held fixed.
 
         Parameters
         ----------
         guides : NodeGuides
         z : (n,) complex128 ndarray
-            At all nodes.
+            Approximate solution at all nodes. The iteration starts from it.
         nodes : (m,) int ndarray
-            Different ones.
+            The nodes to solve for, without duplicates.
         max_iterations : int
 
         Returns
         -------
         (m,) complex128 ndarray
+            The new values at these nodes.
         """
         z = np.where(guides.is_fixed, guides.fixed, z)
         start = z[nodes]
@@ -198,7 +207,10 @@ class GuidedSystem:
         )
 
     def face_representations_at(self, z: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """Return (m,) complex128 means of (n,) representations at the nodes, on (m,) faces."""
+        """Return (m,) complex128 sums of the values z at the corners of the given faces, weighted by area.
+
+        z holds (n,) representations at the nodes. The sums are in the frames of the faces.
+        """
         corner = self._corners_of_faces(face)
         value = z[self.averages.connection.corner_node[corner]] * self.averages.corner_area[corner]
         value *= np.exp(1j * self.degree * self.averages.frame_angle[corner])
@@ -206,7 +218,10 @@ class GuidedSystem:
         return complex_bincount(corner_face, value, self.surface.face_count)[face]
 
     def neighbor_means(self, values: np.ndarray, face: np.ndarray) -> np.ndarray:
-        """Return (m,) complex128 means of (F,) representations around each of (m,) faces."""
+        """Return (m,) complex128 means of (F,) representations: on each given face, over the faces around it.
+
+        The face itself and all faces that share a node with it are included, weighted by area.
+        """
         averages = self.averages
         corner = self.corners_of_nodes(self.nodes_of_faces(face))
         total = averages.node_sums(values, self.degree, corner)
@@ -217,27 +232,31 @@ class GuidedSystem:
         return self.face_representations_at(mean, face) / np.maximum(face_area, 1e-300)
 
     def _corners_of_faces(self, face: np.ndarray) -> np.ndarray:
-        """Return (k,) intp, the corners of the triangles of (m,) faces, in ascending order."""
+        """Return the (k,) intp corners of all triangles of the given faces, in ascending order."""
         return np.flatnonzero(mask(self.surface.face_count, face)[self.averages.corner_face])
 
     def nodes_of_faces(self, face: np.ndarray) -> np.ndarray:
-        """Return (k,) intp, the nodes of (m,) faces, in ascending order."""
+        """Return the (k,) intp nodes at the corners of the given faces, in ascending order."""
         connection = self.averages.connection
         node = connection.corner_node[self._corners_of_faces(face)]
         return np.flatnonzero(mask(connection.node_count, node))
 
     def corners_of_nodes(self, node: np.ndarray) -> np.ndarray:
-        """Return (k,) intp, the corners of triangles at (m,) nodes, in ascending order."""
+        """Return the (k,) intp corners of triangles that lie at the given nodes, in ascending order."""
         corner_node = self.averages.connection.corner_node
         return np.flatnonzero(mask(len(self.laplacian), node)[corner_node])
 
     def nodes_near(self, node: np.ndarray, count: int) -> np.ndarray:
-        """Grow a set of nodes ring by ring, until it has at least a number of nodes or is closed.
+        """Add rings of neighbors to a set of nodes until it has at least `count` nodes.
+
+        It stays smaller if the connected components of the nodes have fewer nodes in total.
 
         Parameters
         ----------
         node : (m,) int ndarray
+            The initial nodes.
         count : int
+            Number of nodes at which to stop.
 
         Returns
         -------
@@ -257,10 +276,10 @@ class GuidedSystem:
 def firmness_weights(
     firmness: np.ndarray, edge_length: float, reach: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Convert the firmness of guides to their weights.
+    """Convert the firmness of guides (how strictly a field follows them, from 0 to 1) to penalty weights.
 
-    A guide of firmness 1/2 has an influence that falls off over an edge. A guide of firmness 1 is followed
-    exactly, unless guides are smoothed over a reach.
+    The influence of a guide of firmness 1/2 falls off over the mean length of an edge. A guide of firmness 1
+    is followed exactly if `reach` is 0.
 
     Parameters
     ----------
@@ -274,8 +293,9 @@ def firmness_weights(
     Returns
     -------
     weight : (F,) float64 ndarray
-        Units of 1 / area; 0 where a guide is followed exactly.
+        Weights in units of 1 / area; 0 where a guide is followed exactly.
     is_exact : (F,) bool ndarray
+        Whether the guide of the face is followed exactly.
     """
     is_exact = (firmness >= EXACT_FIRMNESS) & (reach == 0)
     firmness = np.where(is_exact, 0.0, np.minimum(firmness, 1.0))
@@ -286,7 +306,7 @@ def firmness_weights(
 
 
 def guided_system(surface: Surface, degree: int) -> GuidedSystem:
-    """Build the system of a surface."""
+    """Build the linear system for guided fields of this degree on a surface."""
     connection = build_connection(surface)
     averages = SurfaceAverages(surface, connection, *face_frames(surface))
     matrix = laplacian(connection, degree)
@@ -302,7 +322,7 @@ def guided_field(
     hard: np.ndarray | None = None,
     tolerance: float = RELATIVE_TOLERANCE,
 ) -> RosyField:
-    """Compute the smooth field that follows guides.
+    """Compute a smooth field that follows guides: given vectors on some of the faces.
 
     Connected components without a guide get the smoothest field.
 
@@ -310,16 +330,17 @@ def guided_field(
     ----------
     surface : Surface
     degree : int
+        N.
     guides : (F, 3) ndarray
-        One member vector for each face, in object space; zero where there is no guide. Lengths
-        matter: a guide of length 1/2 requests a field of magnitude 1/2.
+        One member vector for each face, in object space; zero where there is no guide. Lengths matter: the
+        vectors are compared with the field before it is normalized, so a shorter guide has less influence.
     weight : (F,) ndarray or float, optional
         Weight of the guide of each face, in units of 1 / area. The influence of a guide of weight w
         falls off over a distance of about 1 / sqrt(w). If not given, all guides are followed exactly.
     hard : (F,) bool ndarray, optional
         Faces on which the guide is followed exactly.
     tolerance : float
-        Residual norm relative to that of the right-hand side at which the solver stops.
+        Residual norm at which the solver stops, relative to the norm of the right-hand side.
 
     Returns
     -------
@@ -357,7 +378,7 @@ def guided_field(
 
 
 def unit_representations(z: np.ndarray) -> np.ndarray:
-    """Divide (F,) representations by their moduli; 0 where the modulus is a rounding error."""
+    """Return (F,) representations divided by their moduli; 0 where the modulus is only a rounding error."""
     modulus = np.abs(z)
     is_defined = modulus > 1e-9 * max(float(modulus.max()), 1e-300)
     return np.divide(z, modulus, out=np.zeros_like(z), where=is_defined)

@@ -1,6 +1,7 @@
-"""Guide vectors on faces: from mesh edges, strokes, UV maps and axes.
+"""Make guides for generated fields from mesh edges, strokes, UV maps and axes.
 
-A guide is a member vector that a generated field should follow; it is zero on faces without one.
+A *guide* is a vector on a face that one of the N members of the field should follow. The arrays of guides are
+zero on faces without a guide.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from .surface import Surface
 #: away are ignored.
 MAX_STROKE_DISTANCE = 0.05
 
-#: Smallest distance between samples of a stroke, relative to `Surface.extent`. Half of a mean edge may
-#: be much less, if a few faces are large and all others are tiny.
+#: Smallest distance between samples of a stroke, relative to `Surface.extent`. It is used where half the mean
+#: edge length is less: on a mesh with a few large faces and many tiny ones.
 MIN_STROKE_SPACING = 2.0**-14
 
 #: Largest number of samples of all strokes.
@@ -31,7 +32,7 @@ MAX_STROKE_SAMPLES = 1_000_000
 
 
 def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.ndarray:
-    """Make guides along edges, on the faces that have these edges.
+    """Make guides along mesh edges, on the faces to which these edges belong.
 
     Parameters
     ----------
@@ -39,14 +40,14 @@ def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.nda
     ends : (E, 2) int ndarray
         Pairs of vertices, in any order. Pairs that are not an edge of the mesh are ignored.
     degree : int
-        N of the field. A face with several of the edges gets the mean of their RoSys, which is zero
-        if they cancel. For odd degrees, the direction of an edge is that in which the face runs
-        along it.
+        N of the field. On a face with several of the edges, the guide is the mean of their directions in
+        the RoSy representation, which is zero if they cancel. For odd degrees, the direction of an edge
+        follows the counter-clockwise order of the vertices of the face.
 
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit, or zero.
+        Unit vectors; zero on faces without a guide.
     """
     tail = surface.corner_vertex.astype(np.int64)
     head = tail[surface.next_corner]
@@ -56,7 +57,7 @@ def guides_from_edges(surface: Surface, ends: np.ndarray, degree: int) -> np.nda
     corner = np.flatnonzero(np.isin(key, ends[:, 0] * stride + ends[:, 1]))
     face = surface.corner_face[corner]
     edge = normalize(surface.vertices[head[corner]] - surface.vertices[tail[corner]])
-    # On a face that is not planar, an edge is projected to the face plane and made unit again.
+    # On a face that is not planar, the edge direction is projected to the face plane and normalized again.
     edge -= dot(edge, surface.face_normal[face])[:, None] * surface.face_normal[face]
     return average_guides(surface, face, normalize(edge), degree)
 
@@ -79,7 +80,7 @@ def feature_edges(surface: Surface, angle: float) -> np.ndarray:
     is_feature = ~mask(len(edges.ends), edges.interior)
     normal = surface.face_normal
     normal_a, normal_b = (normal[surface.corner_face[side]] for side in edges.halfedges.T)
-    # Faces without area have no normal, so their edges have no angle.
+    # Faces without area have no normal, so no angle is computed at their edges.
     dihedral = np.arccos(np.clip(dot(normal_a, normal_b), -1, 1))
     sharp = (dihedral >= angle) & normal_a.any(axis=1) & normal_b.any(axis=1)
     is_feature[edges.interior[sharp]] = True
@@ -93,21 +94,23 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
     ----------
     surface : Surface
     strokes : sequence of (n, 3) float ndarray
-        Points in object space, in drawing order. Strokes are resampled at half the mean edge
-        length, which smooths finer jitter, but not more finely than `MIN_STROKE_SPACING`.
+        Points of each polyline in object space, in drawing order. Strokes are resampled at a distance of
+        half the mean edge length, which removes finer jitter. The distance is at least
+        `MIN_STROKE_SPACING`.
     degree : int
-        N of the field. A face gets the mean RoSy of all stroke samples on it.
+        N of the field. The guide of a face is the mean, in the RoSy representation, of the directions of all
+        stroke samples on it.
 
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit, or zero.
+        Unit vectors; zero on faces without a guide.
 
     Raises
     ------
     RosyError
-        If no stroke is within `MAX_STROKE_DISTANCE` of the surface, no stroke has a length, or they
-        need more than `MAX_STROKE_SAMPLES` samples.
+        If no stroke is within `MAX_STROKE_DISTANCE` of the surface, if all strokes have the length 0, or if
+        the strokes need more than `MAX_STROKE_SAMPLES` samples in total.
     """
     spacing = max(0.5 * surface.mean_edge_length, MIN_STROKE_SPACING * surface.extent)
     polylines = [
@@ -136,23 +139,23 @@ def guides_from_strokes(surface: Surface, strokes: Sequence[np.ndarray], degree:
 def guides_from_axes(
     surface: Surface, position: np.ndarray, axis: np.ndarray, radius: np.ndarray, degree: int
 ) -> np.ndarray:
-    """Make guides around points, along one axis for each point, projected to the surface.
+    """Make guides on the faces around points. Each point has an axis, which is projected to its faces.
 
     Parameters
     ----------
     surface : Surface
     position, axis : (K, 3) float ndarray
-        Object space.
+        Positions of the points, and directions of their axes, in object space.
     radius : (K,) float ndarray
-        Faces whose center is within this distance of the point get a guide, in Blender units. If
-        there are none, the face closest to the point gets it.
+        Faces whose center is within this distance of the point get a guide, in object space. If there is
+        no such face, the face closest to the point gets the guide.
     degree : int
         N of the field.
 
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit, or zero.
+        Unit vectors; zero on faces without a guide.
     """
     face = []
     closest_face = surface.triangle_face[closest_triangles(surface, position)[0]]
@@ -165,7 +168,7 @@ def guides_from_axes(
 
 
 def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
-    """Make guides along the axes of a UV map, in the direction of increasing u.
+    """Make guides along the axes of a UV map: along u, or along both axes for some degrees.
 
     Parameters
     ----------
@@ -173,13 +176,14 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     uv : (C, 2) float ndarray
         Texture coordinates of each corner.
     degree : int
-        N of the field. Multiples of 4 follow both axes equally (the rotation closest to the map);
-        other degrees follow u.
+        N of the field. If it is a multiple of 4, members follow the u axis and the v axis equally well: the
+        axes of the rotation nearest to the map. For other degrees, the guide is the direction of increasing
+        u.
 
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit; zero on faces without area in the map.
+        Unit vectors; zero on faces without area in the map.
     """
     x, y = face_frames(surface)
     face = surface.corner_face
@@ -196,7 +200,7 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
     degenerate = area <= 1e-12 * np.maximum(uu * vv, 1e-300)
     along_u, along_v = vv * up - uv_sum * vp, uu * vp - uv_sum * up
     if degree % 4 == 0:
-        # In a mirrored map, the v axis is reversed.
+        # Reverse the v axis where the map is mirrored.
         mirrored = (np.conj(along_u) * along_v).imag < 0
         size = np.maximum(np.abs(along_u), 1e-300), np.maximum(np.abs(along_v), 1e-300)
         along_u = along_u / size[0] - 1j * np.where(mirrored, -1, 1) * along_v / size[1]
@@ -208,7 +212,7 @@ def guides_from_uv(surface: Surface, uv: np.ndarray, degree: int) -> np.ndarray:
 def average_guides(
     surface: Surface, face: np.ndarray, vectors: np.ndarray, degree: int
 ) -> np.ndarray:
-    """Average vectors on each face as RoSys.
+    """Average the given vectors on each face, in the RoSy representation.
 
     Vectors are projected to the plane of their face and weighted by their projected length.
 
@@ -225,7 +229,7 @@ def average_guides(
     Returns
     -------
     (F, 3) float64 ndarray
-        Unit members of the mean RoSys; zero on faces without vectors, or where they cancel.
+        Unit member vectors of the means; zero on faces without vectors, and where the vectors cancel.
     """
     x, y = face_frames(surface)
     z = to_representation(vectors, x[face], y[face], degree)
@@ -237,7 +241,7 @@ def average_guides(
 
 
 def _polyline(stroke: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Leave out repeated ones of (n, 3) points. Return the others, and their arc lengths from the first."""
+    """Return the (m, 3) points of a stroke without consecutive duplicates, and their (m,) arc lengths."""
     with np.errstate(over="ignore"):  # a length may be infinite
         length = np.sqrt((np.diff(stroke, axis=0) ** 2).sum(axis=1))
     is_kept = np.ones(len(stroke), dtype=bool)
@@ -253,7 +257,7 @@ def _resampled(
     Returns
     -------
     points : (n, 3) float64 ndarray
-        About `spacing` apart along the polyline.
+        Points along the polyline at distances of about `spacing`.
     directions : (n, 3) float64 ndarray
         Unit directions of the polyline at these points, by central differences.
     """

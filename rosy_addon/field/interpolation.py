@@ -1,4 +1,4 @@
-"""Fields between two others, on meshes with the same polygons."""
+"""Interpolate between two fields, on meshes with the same polygons."""
 
 from __future__ import annotations
 
@@ -18,32 +18,33 @@ def interpolate_fields(
     share: float,
     surface: Surface,
 ) -> RosyField:
-    """Return a field between two others of the same degree.
+    """Return the field at a given share of the way between two fields of the same degree.
 
-    The direction of a RoSy field is the direction of (1 - s) z + s z', a linear interpolation of the
-    representations z = rho exp(i N t) in `face_frames`. Members turn the shorter way. Singularities move, if the
-    magnitude vanishes at them.
+    The directions of a RoSy field are those of (1 - s) z + s z', a linear interpolation of the
+    representations z = rho exp(i N t) of both fields in `face_frames`. Members take the shorter turn.
+    Singularities move continuously if the magnitude of the fields vanishes at them.
 
-    Where members turn by nearly pi / N, the shorter way may be to the left on one face and to the right on the
-    next one. If angles were interpolated, directions would differ by up to pi / N between these faces for all
-    of the time. With the linear interpolation, each face keeps its first direction, then takes the second one
-    within a short time. For turns up to a quarter of 2 pi / N, the two interpolations differ by less than
-    4 / N degrees.
+    Where members turn by nearly pi / N, the shorter turn may be to the left on one face and to the right on
+    the next one. If angles were interpolated, the directions of these two faces would differ by up to
+    pi / N during most of the interpolation. With the linear interpolation of z, each face keeps nearly its
+    first direction, and then changes to the second one within a short range of s. For turns up to a quarter
+    of 2 pi / N, the two interpolations differ by less than 4 / N degrees.
 
-    Magnitudes are interpolated linearly. They are reduced where the phase of z turns by more than pi / 2, because
-    the direction is uncertain there.
+    Magnitudes are interpolated linearly. They are reduced where the phase of z turns by more than pi / 2,
+    because the direction is uncertain there.
 
-    Fields that are not RoSys, and fields with families, such as the fields of tensors, are interpolated direction
-    by direction. Among the matchings that keep the families, the one with the least rotation is used.
+    In two cases, each direction is interpolated separately: if a field is not a RoSy, and if its directions
+    form separate families, such as the major and minor directions of a tensor field. The directions of the
+    two fields are matched so that families are kept, and so that they rotate least.
 
     Parameters
     ----------
     first, second : (Surface, RosyField)
-        The meshes have the same polygons.
+        The two fields with their meshes, which have the same polygons.
     share : float
-        s, 0 for the first field and 1 for the second.
+        s: 0 for the first field, 1 for the second field.
     surface : Surface
-        The mesh between the two, on which the field is returned.
+        The mesh with interpolated positions. The returned field lies on it.
 
     Returns
     -------
@@ -73,24 +74,25 @@ def interpolate_fields(
 
 
 def is_plain(field: RosyField) -> bool:
-    """Return whether a field is a RoSy whose stored member may be any of them."""
+    """Return whether a field is a RoSy whose members do not form separate families."""
     return field.direction_ratios is None and field.family_count == 1
 
 
 def _between(first: np.ndarray, second: np.ndarray, share: float) -> np.ndarray:
-    """Interpolate complex numbers as in `interpolate_fields`."""
+    """Interpolate complex numbers linearly, with the modulus that `interpolate_fields` describes."""
     z = (1 - share) * first + share * second
     modulus = np.abs(z)
     linear = (1 - share) * np.abs(first) + share * np.abs(second)
-    # The ratio of the two is the square root of 1/2 in the middle of a quarter turn.
+    # In the middle of a quarter turn, `modulus` is `linear` times the square root of 1/2.
     wanted = np.minimum(linear, np.sqrt(2) * modulus)
     return z * np.divide(wanted, modulus, out=np.zeros_like(modulus), where=modulus > 0)
 
 
 def _matched(first: np.ndarray, second: np.ndarray, family_count: int) -> np.ndarray:
-    """Return the (F, N) directions of the second field in the order of the first ones that are nearest.
+    """Return the (F, N) directions of the second field, reordered to be nearest to those of the first field.
 
-    Directions move by a multiple of the number of families, so that each stays on a line of its family.
+    Both are complex numbers. The directions of a face are shifted cyclically by a multiple of the number of
+    families, so that each direction keeps its family.
     """
     best, best_order = second, np.full(len(second), -np.inf)
     for shift in range(0, first.shape[1], family_count if family_count > 1 else 1):

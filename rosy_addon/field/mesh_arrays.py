@@ -1,6 +1,6 @@
-"""`MeshArrays`: the arrays of a mesh, from a file or from an object of another library.
+"""`MeshArrays`: the arrays of a mesh, from a file or from a mesh object of another library.
 
-None of these libraries is imported.
+Such libraries are meshio, PyVista, trimesh and Open3D. None of them is imported here.
 """
 
 from __future__ import annotations
@@ -19,32 +19,34 @@ from ..core.errors import RosyError, RosyWarning
 from .formats.polygons import Polygons, offsets_from_sizes
 from .mesh_io import READERS, read_polygons
 
-#: Corners of the surface cells of meshio, by their type. Cells of second order have further points,
-#: which are left out.
+#: Number of corners of each type of surface cell in meshio. Cells of second order have further points, which
+#: are left out.
 MESHIO_CORNERS = {
     "triangle": 3, "triangle6": 3, "triangle7": 3,
     "quad": 4, "quad8": 4, "quad9": 4,
 }  # fmt: skip
 
-#: VTK's types of faces: triangle, polygon, quad.
+#: Numbers of VTK's cell types for faces: triangle, polygon, quad.
 VTK_FACES = (5, 7, 9)
 
 
 @dataclass(frozen=True, eq=False)
 class MeshArrays:
-    """The arrays of a mesh, before they are checked.
+    """The arrays of a mesh with V vertices, F faces and C corners, not yet checked.
 
     Attributes
     ----------
     vertices : (V, 3) or (V, 2) array_like
+        Positions; a mesh with (V, 2) positions is flat.
     corner_vertex : (C,) int ndarray
         Vertices of the corners, face by face.
     face_start : (F + 1,) int ndarray
         First corner of each face, and C.
     uv : (V, 2) or (C, 2) array_like or None
+        Texture coordinates of the vertices or of the corners.
     vertex_data, face_data : mapping of str to ndarray, or None
-        Arrays of V and of F rows. None if the mesh file may have some, which are read when they are
-        asked for.
+        Named arrays with V rows (`vertex_data`) and F rows (`face_data`). None if they are not read yet: the
+        mesh file may have such arrays.
     note : str
         A warning about how the mesh was read; may be empty.
     """
@@ -59,12 +61,12 @@ class MeshArrays:
 
     @property
     def polygons(self) -> Polygons:
-        """Vertices and faces."""
+        """The vertices and faces as `Polygons`."""
         return Polygons(self.vertices, self.corner_vertex, self.face_start)
 
 
-#: Readers of the files of simulations by suffix, given the path and the step. The Python package adds
-#: them; the extension for Blender has none.
+#: Functions that read files of simulations, by file suffix. Their arguments are the path and the time step.
+#: The Python package adds them; the Blender extension has none.
 SIMULATION_READERS: dict[str, Callable[[Path, int | None], MeshArrays]] = {}
 
 
@@ -75,15 +77,15 @@ def mesh_arrays(
     uv: ArrayLike | None = None,
     step: int | None = None,
 ) -> MeshArrays:
-    """Return the arrays of a mesh, with (V, 3) `vertices` and (C, 2) `uv`, if any.
+    """Return the arrays of a mesh that is given by arrays, by a file or by a mesh object of another library.
 
-    The parameters are those of `Surface`.
+    In the result, `vertices` are (V, 3), and `uv` is (C, 2) or None. For the parameters, see `Surface`.
 
     Raises
     ------
     RosyError
-        If the vertices are not numbers, the faces not whole numbers, texture coordinates do not fit, a
-        file cannot be read, or an object is no mesh.
+        If the vertices are not numbers, the faces are not whole numbers, the number of texture coordinates
+        does not fit, a file cannot be read, or an object is not a mesh.
     """
     is_path = faces is None and isinstance(vertices, (str, os.PathLike))
     suffix = Path(vertices).suffix.lower() if is_path else ""
@@ -109,7 +111,7 @@ def mesh_arrays(
 def _corner_uv(
     uv: ArrayLike, vertex_count: int, corner_vertex: NDArray[Any], name: str
 ) -> NDArray[np.float64]:
-    """Return (C, 2) texture coordinates of corners, from coordinates of vertices or corners."""
+    """Return (C, 2) texture coordinates of corners, given those of vertices (V, 2) or of corners (C, 2)."""
     array = np.asarray(uv, dtype=np.float64)
     if (
         array.ndim != 2
@@ -128,7 +130,7 @@ def _corner_uv(
 def _flat_faces(
     faces: ArrayLike | Sequence[Sequence[int]],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the vertices of all corners, and the first corner of each face."""
+    """Return `corner_vertex` and `face_start` (see `MeshArrays`) for faces as an array or as sequences."""
     if isinstance(faces, np.ndarray):
         rows: Sequence[Any] | NDArray[Any] = faces
     else:
@@ -149,7 +151,7 @@ def _flat_faces(
 
 
 def _positions(vertices: ArrayLike, name: str) -> NDArray[np.float64]:
-    """Return (V, 3) positions; the (V, 2) positions of a flat mesh get z = 0."""
+    """Return positions as (V, 3) float64. The (V, 2) positions of a flat mesh get the coordinate z = 0."""
     try:
         array = np.asarray(vertices, dtype=np.float64)
     except (TypeError, ValueError):
@@ -160,12 +162,14 @@ def _positions(vertices: ArrayLike, name: str) -> NDArray[np.float64]:
 
 
 def _arrays_of(mesh: Any, name: str) -> MeshArrays:
-    """Return the arrays of a mesh of meshio, PyVista, trimesh or Open3D. `MeshArrays` stay as they are.
+    """Return the arrays of a mesh object of meshio, PyVista, trimesh or Open3D.
+
+    An object that is already `MeshArrays` is returned unchanged.
 
     Raises
     ------
     RosyError
-        If the object is no such mesh, or it has no surface.
+        If the object is not such a mesh, or if the mesh has no surface.
     """
     if isinstance(mesh, MeshArrays):
         return mesh
@@ -173,7 +177,7 @@ def _arrays_of(mesh: Any, name: str) -> MeshArrays:
         return _from_meshio(mesh, name)
     if hasattr(mesh, "extract_surface"):
         return _from_pyvista(mesh, name)
-    # A scene of trimesh, and a mesh of Open3D's tensors.
+    # Convert a scene of trimesh to a mesh, and a tensor mesh of Open3D to a legacy mesh.
     for conversion in ("to_mesh", "to_legacy"):
         if hasattr(mesh, conversion):
             mesh = getattr(mesh, conversion)()
@@ -187,7 +191,7 @@ def _arrays_of(mesh: Any, name: str) -> MeshArrays:
 
 
 def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
-    """Return the arrays of a mesh of trimesh or Open3D."""
+    """Return the arrays of a triangle mesh of trimesh or Open3D, given its (F, 3) faces."""
     vertices = np.asarray(mesh.vertices)
     faces = faces.reshape(-1, 3)
     visual = getattr(mesh, "visual", None)
@@ -208,7 +212,7 @@ def _from_triangles(mesh: Any, faces: NDArray[Any]) -> MeshArrays:
 
 
 def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
-    """Return the (V, 3) or (V, 4) colors of vertices, 0 to 1; an empty array if there are none."""
+    """Return the (V, 3) or (V, 4) vertex colors, from 0 to 1; an empty array if there are none."""
     visual: Any = getattr(mesh, "visual", None)
     if getattr(visual, "kind", None) == "vertex":
         return np.asarray(visual.vertex_colors) / 255.0
@@ -216,7 +220,7 @@ def _vertex_colors(mesh: Any) -> NDArray[np.float64]:
 
 
 def _from_meshio(mesh: Any, name: str) -> MeshArrays:
-    """Return the surface cells of a mesh of meshio."""
+    """Return the arrays of a mesh of meshio: its surface cells, with their data."""
     corners, sizes, kept = [], [], []
     for index, block in enumerate(mesh.cells):
         count = MESHIO_CORNERS.get(block.type)
@@ -245,11 +249,12 @@ def _from_meshio(mesh: Any, name: str) -> MeshArrays:
 
 
 def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
-    """Return the surface of a data set of PyVista: of a volume, its boundary."""
+    """Return the arrays of the surface of a PyVista data set. The surface of a volume is its boundary."""
     surface = mesh if hasattr(mesh, "faces") else _extracted_surface(mesh)
     if surface.n_strips:
         surface = surface.triangulate()
-    # The unstructured grid has the offsets of faces of different sizes, and says which cells are lines.
+    # Convert to an unstructured grid: it has the offsets of faces of different sizes, and the cell types,
+    # which tell faces from lines.
     cells = surface.cast_to_unstructured_grid()
     is_face = np.isin(cells.celltypes, VTK_FACES)
     if not is_face.any():
@@ -267,7 +272,7 @@ def _from_pyvista(mesh: Any, name: str) -> MeshArrays:
 
 
 def _extracted_surface(mesh: Any) -> Any:
-    """Return the faces of a grid, and the boundary of its volumes."""
+    """Return the surface of a PyVista grid: its faces, and the boundary of its volume cells."""
     try:
         return mesh.extract_surface(algorithm="dataset_surface")
     except TypeError:  # before PyVista 0.47, there was no other algorithm

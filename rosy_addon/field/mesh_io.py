@@ -16,7 +16,7 @@ from .formats.ply import read_ply, read_vertex_values
 from .formats.polygons import Polygons
 from .formats.stl import read_stl
 
-#: The reader of each file name extension.
+#: The function that reads files with each file name extension.
 READERS: dict[str, Callable[[Path], Polygons]] = {
     ".obj": read_obj,
     ".off": read_off,
@@ -24,12 +24,12 @@ READERS: dict[str, Callable[[Path], Polygons]] = {
     ".stl": read_stl,
 }
 
-#: Bytes of memory that a byte of a binary file takes until its surface is built.
+#: Peak memory in bytes per byte of a binary file, until its surface is built.
 BINARY_MEMORY = {".ply": 20, ".stl": 10}
 
-#: Angle between face normals in radians above which an edge counts as sharp, because files do not
-#: mark sharp edges. Curved regions rarely exceed 60 degrees even in coarse meshes (an octagonal
-#: prism has 45), and most intended edges have 90.
+#: Angle between face normals in radians above which an edge counts as sharp. Mesh files do not mark sharp
+#: edges. In curved regions, angles rarely exceed 60 degrees, even in coarse meshes (45 in an octagonal
+#: prism). Most edges that are meant to be sharp have 90 degrees.
 SHARP_ANGLE = np.radians(60)
 
 
@@ -43,7 +43,7 @@ def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = 
     ----------
     path : path-like
     other_suffixes : sequence of str
-        Suffixes of other readers, for the error.
+        Further file suffixes that the caller can read, for the error message.
 
     Returns
     -------
@@ -52,8 +52,8 @@ def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = 
     Raises
     ------
     RosyError
-        If the file is missing, has another extension, is malformed or truncated, or needs more memory
-        than there is. The message names the file and, in text files, the line.
+        If the file is missing, malformed or truncated, has an unknown extension, or needs more memory than
+        the computer has. The message names the file and, for text files, the line.
     """
     path = Path(path)
     reader = READERS.get(path.suffix.lower())
@@ -67,10 +67,13 @@ def read_polygons(path: str | os.PathLike[str], other_suffixes: Sequence[str] = 
 
 
 def read_uv_map(path: Path) -> np.ndarray | None:
-    """Return the (C, 2) texture coordinates in a mesh file; None if it has none. Only .obj files have."""
+    """Return the (C, 2) texture coordinates in a mesh file, or None if it has none.
+
+    They are read from .obj files only.
+    """
     return read_uv(path) if path.suffix.lower() == ".obj" else None
 
 
 def read_vertex_data(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of vertices in a mesh file by their names. Only .ply files have any."""
+    """Return the vertex attributes in a mesh file, as arrays by their names; {} for files other than .ply."""
     return read_vertex_values(path) if path.suffix.lower() == ".ply" else {}

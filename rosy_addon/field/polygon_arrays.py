@@ -1,7 +1,7 @@
 """Faces and corners of polygon meshes as flat arrays.
 
-The corners of face f are ``face_start[f] .. face_start[f + 1] - 1``; F is the number of faces, C of corners.
-`corner_vertex` is the vertex of each corner.
+The corners of face f are ``face_start[f] .. face_start[f + 1] - 1``. `corner_vertex` holds the vertex of each
+corner. F is the number of faces, and C is the number of corners.
 """
 
 from __future__ import annotations
@@ -10,29 +10,29 @@ import numpy as np
 
 from .frames import dot, normalize
 
-#: Faces or corners processed at once, to bound memory and fit in the CPU caches.
+#: Number of faces or corners that are processed at once, to bound memory and to fit in the CPU caches.
 BLOCK_ELEMENTS = 1 << 14
 
 
 def corner_faces(face_start: np.ndarray) -> np.ndarray:
-    """Return (C,) int32, the face of each corner."""
+    """Return the face of each corner, as (C,) int32."""
     return np.repeat(np.arange(len(face_start) - 1, dtype=np.int32), np.diff(face_start))
 
 
 def next_corners(face_start: np.ndarray) -> np.ndarray:
-    """Return (C,) int32, the following corner around the same face."""
+    """Return the next corner of the same face for each corner, as (C,) int32."""
     following = np.arange(1, face_start[-1] + 1, dtype=np.int32)
     following[face_start[1:] - 1] = face_start[:-1]
     return following
 
 
 def sum_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
-    """Return (F, ...) sums of (C, ...) corner values over each face."""
+    """Return (F, ...) sums of (C, ...) corner values over the corners of each face."""
     return np.add.reduceat(values, face_start[:-1], axis=0)
 
 
 def mean_per_face(values: np.ndarray, face_start: np.ndarray) -> np.ndarray:
-    """Return (F, ...) means of (C, ...) corner values over each face."""
+    """Return (F, ...) means of (C, ...) corner values over the corners of each face."""
     count = np.diff(face_start).reshape((-1,) + (1,) * (values.ndim - 1))
     return sum_per_face(values, face_start) / count
 
@@ -42,8 +42,8 @@ def face_area_vectors(
 ) -> np.ndarray:
     """Return (F, 3) area vectors (normal times area) of polygons, by Newell's formula.
 
-    Positions are relative to the first corner of each face, so that no precision is lost far from
-    the origin.
+    They are computed from positions relative to the first corner of each face, so that no precision is lost
+    far from the origin.
     """
     area = np.empty((len(face_start) - 1, 3))
     for faces, corners, starts in face_blocks(face_start):
@@ -62,14 +62,14 @@ def _relative_to_first_corner(
 
 
 def face_blocks(face_start: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
-    """Split the faces into consecutive blocks, to bound memory.
+    """Split the faces of a mesh into consecutive blocks, to bound memory.
 
     Returns
     -------
-    faces, corners : slice
-        The faces of the block and their corners.
-    starts : (faces + 1,) ndarray
-        `face_start` of the block, counted from its first corner.
+    list of (faces, corners, starts)
+        One tuple for each block. `faces` and `corners` are slices of the faces of the block and of their
+        corners. `starts` is `face_start` for the faces of the block, where corners are counted from the first
+        one of the block.
     """
     count = len(face_start) - 1
     blocks = []
@@ -81,7 +81,10 @@ def face_blocks(face_start: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]
 
 
 def sum_per_fan(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
-    """Return (K, k) sums of (C, k) real corner values over the corners of each of the K fans."""
+    """Return (K, k) sums of (C, k) real corner values over the corners of each of the K smooth fans.
+
+    `corner_fan` holds the index of the fan of each corner.
+    """
     fan_count = int(corner_fan.max()) + 1
     columns = [np.bincount(corner_fan, weights=column, minlength=fan_count) for column in values.T]
     return np.stack(columns, axis=1)
@@ -90,9 +93,9 @@ def sum_per_fan(values: np.ndarray, corner_fan: np.ndarray) -> np.ndarray:
 def fan_normals(
     vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray, corner_fan: np.ndarray
 ) -> np.ndarray:
-    """Return (C, 3) unit corner normals: face normals averaged over each fan, weighted by corner angle.
+    """Return (C, 3) unit corner normals: face normals averaged over smooth fans, weighted by corner angle.
 
-    Where the mean is zero, it is the face normal, or (0, 0, 1) if that is zero, too.
+    Where the mean is zero, the corner normal is the face normal or, if that is zero too, (0, 0, 1).
     """
     angle = np.empty(len(corner_vertex))
     for _, corners, starts in face_blocks(face_start):
@@ -114,7 +117,7 @@ def fan_normals(
 
 
 def box_corners(points: np.ndarray) -> np.ndarray:
-    """Return (8, 3) corners of the bounding box of (n, 3) points."""
+    """Return the (8, 3) corners of the bounding box of (n, 3) points."""
     limits = np.stack([points.min(axis=0), points.max(axis=0)])
     selector = np.indices((2, 2, 2)).reshape(3, 8)
     return np.stack([limits[selector[axis], axis] for axis in range(3)], axis=1)

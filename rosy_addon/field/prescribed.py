@@ -1,14 +1,15 @@
 """Fields with given singularities (Crane, Desbrun and Schröder, *Trivial Connections*, 2010).
 
 The singularities of a field determine the angles by which it turns from face to face (`turning_angles`). The
-angles of least squares give the field of least Dirichlet energy, up to terms of fourth order. To change the
+least-squares angles give the field of least Dirichlet energy, up to terms of fourth order. To change the
 singularities of a field, the angles of the change are added to its angles.
 
-A field is rotated toward guides without changing its singularities: by an angle that is continuous over the
-surface. If the field has the least squared turning angles, its Dirichlet energy grows by the Dirichlet energy of
-this angle. So the angle solves a linear equation, once the multiple of 2 pi / N is known that takes the field to
-each guide. The first multiples come from a linear equation for the representation, which may have other
-singularities. They are improved until they are the nearest ones.
+To bend a field toward guides without changing its singularities, it is rotated by an angle that is continuous
+over the surface. If the turning angles of the field have the least sum of squares, the rotation increases its
+Dirichlet energy by the Dirichlet energy of this angle. Rotating the field to a guide is possible by several
+angles, which differ by multiples of 2 pi / N. Once a multiple is chosen for each guide, the angle solves a
+linear equation. The first choice comes from a linear equation for the representation, which may have other
+singularities. The choice is then improved until each guide has the multiple nearest to the angle.
 """
 
 from __future__ import annotations
@@ -39,19 +40,19 @@ from .turning_angles import added_resistance, turning_angles
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-8
 
-#: Number of times that the field is kept from turning too fast between two faces.
+#: Number of attempts to reduce turning angles that reach pi / N between two faces.
 MAX_ATTEMPTS = 8
 
-#: Number of times that the multiples of the guides are improved.
+#: Number of attempts to improve the multiples of 2 pi / N of the guides.
 MAX_ROUNDS = 12
 
-#: Penalty of the nodes without a guide, relative to the stiffness of their edges, so that all angles are
-#: defined.
+#: Added to the diagonal of the matrix, relative to it, so that the matrix is regular on components without a
+#: guide.
 REGULARIZATION = 1e-9
 
 
 class TurningError(RosyError):
-    """A field would turn too fast between two faces.
+    """Error: a field would turn by pi / N or more between two faces, so its singularities would change.
 
     Attributes
     ----------
@@ -84,11 +85,12 @@ def prescribed_field(
     index : (K,) int ndarray
         Their indices in units of 1 / N.
     guides : (F, 3) ndarray, optional
-        Member vectors, zero where there is no guide. On each connected component, the whole field is
-        turned to them; without guides, to the edges of the mesh.
+        Member vectors that the field should follow; zero on faces without a guide. On each connected
+        component, the whole field is rotated by one angle to align it with the guides, or with the edges
+        of the mesh if there are no guides.
     reach : float
-        If it is above 0, the field also bends to the guides. Their influence falls off over this distance, in
-        object space.
+        If it is above 0, the field also bends toward the guides locally. The influence of a guide falls off
+        over this distance, in object space.
 
     Returns
     -------
@@ -98,8 +100,8 @@ def prescribed_field(
     Raises
     ------
     RosyError
-        If a vertex has no index (at a border, or not in the mesh), if the indices do not have the sum
-        that a closed surface needs, or if the field would turn too fast for the size of the faces.
+        If a vertex cannot be singular (at a border, or not in the mesh), if the indices do not have the sum
+        that a closed surface needs, or if the field would turn by pi / N or more between two faces.
     """
     degree = check_degree(degree)
     raise_mmap_threshold()
@@ -122,14 +124,15 @@ def prescribed_field(
 def change_singularities(
     surface: Surface, field: RosyField, vertex: np.ndarray, change: np.ndarray, reach: float
 ) -> RosyField:
-    """Change the singularities of a field near them.
+    """Change the singularity indices of vertices. Directions change mainly near these vertices.
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
-        A RoSy.
+        A field whose directions are rotationally symmetric.
     vertex : (K,) int ndarray
+        Vertices whose indices change.
     change : (K,) int ndarray
         Amount that is added to the index of each vertex, in units of 1 / N.
     reach : float
@@ -138,15 +141,15 @@ def change_singularities(
     Returns
     -------
     RosyField
-        A field of the same magnitude.
+        The new field, with the same magnitudes.
 
     Raises
     ------
     RosyError
-        If a vertex has no index (at a border, at faces without a direction,
-        or not in the mesh), or if the changes do not add up to 0 on a closed surface.
+        If a vertex cannot be singular (at a border, next to a face without a direction, or not in the
+        mesh), or if the changes do not add up to 0 on a closed surface.
     TurningError
-        If the field would turn too fast for the size of the faces.
+        If the field would turn by pi / N or more between two faces.
     """
     raise_mmap_threshold()
     degree, magnitude = field.degree, np.linalg.norm(field.vectors, axis=1, keepdims=True)
@@ -175,9 +178,10 @@ def _turning(
     defect: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the angles and directions of a field with given indices; see `turning_angles`.
+    """Return the turning angles and directions of a field with given singularity indices.
 
-    `defect` is (n,) angle defects of the vertex nodes. `present` is the angles of a field that are changed.
+    See `turning_angles` for the result. `defect` holds the (n,) angle defects of the vertex nodes. If an
+    existing field is changed, `present` holds its turning angles.
     """
     node_index = index_at_nodes(surface, graph, vertex, index)
     _check_sums(surface, graph, defect * (degree / (2 * np.pi)), node_index, degree)
@@ -198,7 +202,7 @@ def _bent(
     target: np.ndarray,
     reach: float,
 ) -> np.ndarray:
-    """Return (F,) the representation z, rotated toward a target without changing singularities."""
+    """Return (F,) representations z after rotating them toward a target, with the same singularities."""
     area = face_area_vectors(surface.vertices, surface.corner_vertex, surface.face_start)
     penalty = np.linalg.norm(area, axis=1) / reach / reach
     angle = guided_rotation(graph, degree, turning, z, target, penalty)
@@ -209,7 +213,11 @@ def _bent(
 def index_at_nodes(
     surface: Surface, graph: FaceGraph, vertex: np.ndarray, index: np.ndarray
 ) -> np.ndarray:
-    """Return (n,) int64 indices of the vertex nodes. The index of a vertex is given to its first node."""
+    """Return the (n,) int64 singularity indices of the vertex nodes, given those of vertices.
+
+    A vertex whose faces are not connected around it has several nodes. Its index is given to the first of
+    them.
+    """
     vertex, vertex_count = np.asarray(vertex, dtype=np.int64), len(surface.vertices)
     out_of_range = (vertex < 0) | (vertex >= vertex_count)
     if out_of_range.any():
@@ -234,14 +242,14 @@ def index_at_nodes(
 def _check_sums(
     surface: Surface, graph: FaceGraph, needed: np.ndarray, given: np.ndarray, degree: int
 ) -> None:
-    """Check that the indices have the sum that each closed component needs.
+    """Check that the singularity indices on each closed component have the sum that it needs.
 
-    `needed` and `given` are values at the nodes.
+    `needed` and `given` are values at the nodes; their sums over a component must be equal.
 
     Raises
     ------
     RosyError
-        If one has another sum.
+        If the indices on a component have another sum.
     """
     component = graph.node_component
     count = int(component.max(initial=-1)) + 1
@@ -262,12 +270,13 @@ def _check_sums(
 
 
 def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.ndarray) -> None:
-    """Check that a field turns by less than half the angle between two members from face to face.
+    """Check that a field turns by less than pi / N (half the angle between two members) from face to face.
 
     Raises
     ------
     TurningError
-        If it does not: then other members match, and the indices are not those that were asked for.
+        If it turns by more. Then other members of the two faces are nearest to each other, and the field has
+        other singularities than requested.
     """
     if not len(angle) or np.abs(angle).max() < np.pi / degree:
         return
@@ -285,7 +294,7 @@ def _check_angles(surface: Surface, graph: FaceGraph, degree: int, angle: np.nda
 
 
 def _rotation_to(target: np.ndarray, z: np.ndarray, component: np.ndarray) -> np.ndarray:
-    """Return (F,) factors that rotate z toward a target, the same factor on each connected component."""
+    """Return (F,) complex factors that rotate z toward a target, equal on all faces of a component."""
     total = complex_bincount(component, target * z.conj(), int(component.max(initial=-1)) + 1)
     return unit_complex(total, otherwise=1)[component]
 
@@ -298,7 +307,7 @@ def guided_rotation(
     target: np.ndarray,
     penalty: np.ndarray,
 ) -> np.ndarray:
-    """Compute the angle by which a field turns to follow guides.
+    """Compute the angle by which a field is rotated on each face to follow guides.
 
     Parameters
     ----------
@@ -310,16 +319,16 @@ def guided_rotation(
     z : (F,) complex ndarray
         Representation of the field, of modulus 1 or 0.
     target : (F,) complex ndarray
-        Representation of the guides, 0 where there is none.
+        Representation of the guides; 0 on faces without a guide.
     penalty : (F,) ndarray
-        Weight of the squared difference from the guide. Squared angles at edges of conductance 1 have the
-        weight 1.
+        Weight of the squared difference from the guide. The squared change of the angle across an edge of
+        conductance 1 has the weight 1.
 
     Returns
     -------
     (F,) float64 ndarray
-        Angle in radians. It turns no edge by half the angle between two members or more, unless the guides
-        require that.
+        Angle in radians. The rotated field turns by less than pi / N across each edge, unless the guides
+        require more.
     """
     offset = target * z.conj()
     is_guide = (offset != 0) & (penalty > 0)
@@ -355,7 +364,7 @@ def guided_rotation(
 
 
 def _system(graph: FaceGraph, stiffness: np.ndarray, penalty: np.ndarray) -> CSRMatrix:
-    """Return the Laplacian of the faces, with the penalty on its diagonal."""
+    """Return the matrix of the Laplacian of the graph of faces, with the penalty added to its diagonal."""
     ends = np.concatenate([graph.source, graph.target])
     diagonal = np.bincount(ends, np.tile(stiffness, 2), len(penalty))
     diagonal += penalty + REGULARIZATION * np.where(diagonal > 0, diagonal, 1.0)
@@ -370,7 +379,11 @@ def _initial_angle(
     offset: np.ndarray,
     penalty: np.ndarray,
 ) -> np.ndarray:
-    """Return (F,) N times an angle near the guides: the least-squares unwrapping of their smoothed phases."""
+    """Return a first estimate of N times the (F,) angles that `guided_rotation` computes.
+
+    The phases by which z must be rotated to the guides are smoothed. The estimate is the least-squares phase
+    unwrapping of the result.
+    """
     unit = unit_complex(offset)
     with progress(0.0, 0.3):
         mean = _solve(matrix, penalty * unit, levels)
@@ -387,7 +400,7 @@ def _initial_angle(
 
 
 def _solve(matrix: CSRMatrix, rhs: np.ndarray, levels: list[Level] | None) -> np.ndarray:
-    """Solve a system; see `conjugate_gradient`."""
+    """Solve a linear system by the conjugate gradient method, with multigrid as preconditioner if given."""
     precondition = None if levels is None else partial(w_cycle, levels)
     return conjugate_gradient(
         matrix, rhs, TOLERANCE, precondition, "turning the field to the guides"

@@ -1,8 +1,9 @@
 """The representation of an N-RoSy: the complex number z = rho exp(i N t).
 
-rho is the length of the members and t the angle of any one of them from the x axis of a frame. All
-N members give the same z, so the mean of representations is a mean of RoSys (Palacios and Zhang
-2007); the mean of member vectors is not. All averages, interpolations and comparisons use z.
+An N-RoSy has N *members*: vectors of length rho that are rotations of each other by 2 pi / N. t is the
+angle of one member from the x axis of a tangent frame. All N members give the same z. Therefore the mean
+of representations is a mean of RoSys (Palacios and Zhang 2007), and the mean of member vectors is not. All
+averages, interpolations and comparisons use z.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ def power(base: np.ndarray, degree: int) -> np.ndarray:
 
 
 def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
-    """Return `base` ** `exponent` for numbers of modulus 1 or 0 and any integer exponent.
+    """Return `base` ** `exponent` for complex numbers of modulus 1 or 0 and any integer exponent.
 
-    Negative powers are conjugates of positive ones, so negative powers of 0 are 0.
+    Negative powers are computed as conjugates of positive powers, so negative powers of 0 are 0.
     """
     if exponent == 0:
         return 1
@@ -40,24 +41,24 @@ def signed_power(base: np.ndarray, exponent: int) -> np.ndarray | int:
 
 
 def unit_complex(z: np.ndarray, otherwise: int = 0) -> np.ndarray:
-    """Divide complex numbers by their moduli; what is 0 becomes `otherwise`."""
+    """Return complex numbers divided by their moduli. Zeros are replaced by `otherwise`."""
     modulus = np.abs(z)
     return np.divide(z, modulus, out=np.full_like(z, otherwise), where=modulus > 0)
 
 
 def complex_bincount(index: np.ndarray, weights: np.ndarray, count: int) -> np.ndarray:
-    """Return (count,) complex128 sums of the weights of each index, like `numpy.bincount`."""
+    """Return (count,) complex128 sums of the weights of each index: `numpy.bincount` for complex weights."""
     real = np.bincount(index, weights.real, count)
     return real + 1j * np.bincount(index, weights.imag, count)
 
 
 def to_representation(vectors: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int) -> np.ndarray:
-    """Convert member vectors to representations z in the frames x, y.
+    """Convert member vectors of N-RoSys to representations z in the frames x, y.
 
     Parameters
     ----------
     vectors : (..., 3) ndarray
-        One member of each RoSy.
+        One of the N member vectors of each RoSy.
     x, y : (..., 3) ndarray
         Orthonormal tangents; y is a quarter turn counter-clockwise from x about the normal.
     degree : int
@@ -90,7 +91,7 @@ def from_representation(z: np.ndarray, x: np.ndarray, y: np.ndarray, degree: int
 
 
 def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
-    """Return (F,) complex128 representations z of a field in `face_frames`."""
+    """Return (F,) complex128 representations z of a field in the tangent frames of `surface.face_frames`."""
     x, y = face_frames(surface)
     return to_representation(field.vectors, x, y, field.degree)
 
@@ -98,10 +99,11 @@ def face_representation(surface: Surface, field: RosyField) -> np.ndarray:
 def edge_unfolding(
     surface: Surface, x: np.ndarray, y: np.ndarray, a: np.ndarray, b: np.ndarray
 ) -> np.ndarray:
-    """Return (I,) complex128 factors of modulus 1, from the frame of the first face at each edge to the second.
+    """Return (I,) complex128 factors of modulus 1 that change frames across each interior edge.
 
-    A direction in the first face, as a complex number, times the factor is the same direction in the second
-    one if the faces are unfolded into one plane. The parameters are the same as in `matching_angles`.
+    If the two faces are unfolded into one plane, a direction (as a complex number in the frame of the first
+    face) times the factor is the same direction in the frame of the second face. For the parameters, see
+    `matching_angles`.
     """
     source_face, target_face = surface.corner_face[a], surface.corner_face[b]
     edge = surface.vertices[surface.corner_vertex[b]] - surface.vertices[surface.corner_vertex[a]]
@@ -129,7 +131,7 @@ def matching_angles(
     ----------
     surface : Surface
     x, y : (F, 3) ndarray
-        Frames of the faces.
+        Orthonormal tangent frames of the faces.
     z : (F,) complex ndarray
         Representations in these frames.
     degree : int
@@ -140,8 +142,8 @@ def matching_angles(
     Returns
     -------
     (I,) float64 ndarray
-        Counter-clockwise angle in radians from a member on side a to the nearest on side b, from
-        -pi / N to pi / N.
+        Counter-clockwise angle in radians from a member of the first face to the nearest member of the
+        second face, from -pi / N to pi / N.
     """
 
     def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""The N-RoSy field of a surface: its degree and one member vector for each face.
+"""`RosyField`: the degree N of an N-RoSy field and one vector for each face.
 
-A field of N directions that are not rotationally symmetric is stored as a RoSy field and the ratios
-of its directions to the members.
+On each face, an N-RoSy (N-way rotational symmetry) has N *members*: vectors that are rotations of each
+other by 2 pi / N. Storing one of them is enough. A field of N directions that are not rotationally
+symmetric is stored as a RoSy field and the ratios of its directions to the members.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import numpy as np
 
 from ..core.errors import RosyError
 
-#: Largest degree N that is supported. The directions of a field are hard to distinguish above about
-#: 6 (Figure 10 of the paper).
+#: Largest degree N that is supported. Above a degree of about 6, the directions of a field are hard to
+#: distinguish in pictures.
 MAX_DEGREE = 12
 
 
@@ -23,7 +24,7 @@ def check_degree(degree: int) -> int:
     Raises
     ------
     RosyError
-        If it is not a whole number from 1 to `MAX_DEGREE`.
+        If the degree is not a whole number from 1 to `MAX_DEGREE`.
     """
     if isinstance(degree, bool) or int(degree) != degree or not 1 <= degree <= MAX_DEGREE:
         raise RosyError(f"degree {degree} is not a whole number from 1 to {MAX_DEGREE}")
@@ -32,10 +33,10 @@ def check_degree(degree: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class RosyField:
-    """An N-RoSy field on the faces of a surface.
+    """An N-way rotational symmetry (N-RoSy) field on F faces.
 
-    The N member vectors of a face are the rotations of the stored one by 2 pi k / N about the face
-    normal. For a RoSy it makes no difference which member is stored.
+    One vector is stored for each face. The N *members* of the face are the rotations of this vector by
+    2 pi k / N about the face normal. For a RoSy it makes no difference which member is stored.
 
     Attributes
     ----------
@@ -45,15 +46,17 @@ class RosyField:
         One member vector for each face, in object space. Its length is the magnitude rho. The field
         is undefined on faces with a zero vector.
     direction_ratios : (F, N) complex128 ndarray or None
-        None for a RoSy. Otherwise direction k is member k (counted counter-clockwise from the
-        stored one) rotated by the phase of ratio k and scaled by its modulus.
+        None for a RoSy. Otherwise the field has directions that deviate from the members: direction k is
+        member k, rotated by the phase of ratio k and scaled by its modulus. Members are counted
+        counter-clockwise from the stored one.
     family_count : int
-        Number of line families that the stored member distinguishes: 1 if it may be on any line,
-        otherwise the number of lines. A tensor field has 2: the major and the minor directions.
+        1 if the stored member may be any of the members. Otherwise its direction is in the same family on
+        all faces, and this is the number of families. A tensor field has 2: the major and the minor
+        directions. (Two opposite directions are in the same family.)
     source_directions : (F, N, 3) float64 ndarray or None
-        The input directions in their original order, if the field was made from directions: those
-        of faces with values that are not finite are zero, all others unmodified. Writers use them
-        to reproduce the input.
+        The input directions in their original order, if the field was made from directions. They are
+        unmodified, except that they are zero on faces with values that are not finite. They are written
+        to files instead of recomputed directions.
 
     See Also
     --------
@@ -83,11 +86,11 @@ class RosyField:
 
     @property
     def magnitude(self) -> np.ndarray:
-        """(F,) float64: rho, the common length of the members."""
+        """(F,) float64: rho, the common length of the members of each face."""
         return np.linalg.norm(self.vectors, axis=1)
 
     def check_rosy(self, name: str) -> None:
-        """Raise an error, which names the mesh, if the directions are not a RoSy."""
+        """Raise a `RosyError` if the directions are not a RoSy; `name` is the mesh name for the message."""
         if self.direction_ratios is not None:
             raise RosyError(
                 f"{name}: only RoSy fields can be changed, but the directions of this field are not a RoSy"

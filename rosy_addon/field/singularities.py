@@ -1,4 +1,4 @@
-"""Singularities of a field on faces, and their indices."""
+"""Find the singularities of a field on faces, and their indices."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
 
     A field on faces is singular at vertices. The rotation of the field around a vertex is the sum
     of the angles between matching members of consecutive faces, plus the angle defect of the
-    vertex. It is an integer multiple of 2 pi / N. On a closed surface the indices, in units of 1 /
-    N, sum to N times the Euler characteristic (Poincaré-Hopf theorem).
+    vertex. It is an integer multiple of 2 pi / N; this integer is the index in units of 1 / N. On a closed
+    surface, the indices in these units sum to N times the Euler characteristic (Poincaré-Hopf theorem).
 
     No index is computed for vertices on a boundary or a nonmanifold edge, or next to a face where
     the field is undefined.
@@ -32,7 +32,7 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     ----------
     surface : Surface
     field : RosyField
-        On its faces.
+        Field on the faces of the surface.
 
     Returns
     -------
@@ -50,8 +50,8 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
     count = len(surface.vertices)
     tail, head = surface.corner_vertex[a], surface.corner_vertex[b]
     report(0.7, "counting singularities")
-    # A counter-clockwise loop around the head of an edge crosses it from side a to side b, a loop
-    # around its tail from b to a.
+    # A counter-clockwise loop around the head of an edge crosses the edge from side a to side b. A loop
+    # around its tail crosses it from side b to side a.
     angle_sum = np.bincount(head, matching, count) - np.bincount(tail, matching, count)
     corner_vertex = surface.corner_vertex
     corner_angles = signed_corner_angles(surface, x, y)
@@ -68,24 +68,28 @@ def find_singularities(surface: Surface, field: RosyField) -> tuple[np.ndarray, 
 
 
 def format_index(index: int, degree: int) -> str:
-    """Return an index, given in units of 1 / N, as a fraction: +1/4, -1, +3/2."""
+    """Return the text of a singularity index as a fraction, such as "+1/4", "-1" or "+3/2".
+
+    `index` is in units of 1 / `degree`.
+    """
     divisor = int(np.gcd(index, degree))
     numerator, denominator = index // divisor, degree // divisor
     return f"{numerator:+d}" if denominator == 1 else f"{numerator:+d}/{denominator}"
 
 
 def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularities: bool) -> str:
-    """Describe fields for a message.
+    """Return a text for a message: how many singularities and undefined faces some fields have in total.
 
     Parameters
     ----------
     fields : sequence of (Surface, RosyField)
     count_singularities : bool
+        Whether to count singularities, which takes some time.
 
     Returns
     -------
     str
-        Such as "12 singularities, 3 faces without a direction"; empty if there is nothing to say.
+        A text such as "12 singularities, 3 faces without a direction"; empty if there is nothing to report.
     """
     parts = []
     if count_singularities:
@@ -98,16 +102,17 @@ def description(fields: Sequence[tuple[Surface, RosyField]], *, count_singularit
 
 
 def first_pairs(pairs: np.ndarray) -> np.ndarray:
-    """Choose the first of some pairs, each thing in one of them at most.
+    """Choose pairs greedily, in their order, so that no element is in two chosen pairs.
 
     Parameters
     ----------
     pairs : (n, 2) int ndarray
+        Each row holds the indices of the two elements of a pair.
 
     Returns
     -------
     (m,) intp ndarray
-        Indices of the chosen pairs.
+        Rows of the chosen pairs.
     """
     taken: set[int] = set()
     chosen = []
@@ -119,7 +124,10 @@ def first_pairs(pairs: np.ndarray) -> np.ndarray:
 
 
 def signed_corner_angles(surface: Surface, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return (C,) interior angles in the plane of each face, radians from 0 to 2 pi (reflex included)."""
+    """Return (C,) interior angles at the corners of the faces, in radians from 0 to 2 pi.
+
+    Angles are measured in the plane of each face, whose frame is x, y. Concave corners have angles above pi.
+    """
     angles = np.empty(len(surface.corner_vertex))
     for _, corners, starts in face_blocks(surface.face_start):
         points, following = surface.vertices[surface.corner_vertex[corners]], next_corners(starts)

@@ -13,50 +13,51 @@ from .rosy_field import RosyField
 from .singularities import find_singularities, first_pairs
 from .surface import Surface
 
-#: Instead of a vertex: an index that is moved there leaves the surface across a border.
+#: Value for "no vertex": an index that is moved there leaves the surface across a border.
 OUTSIDE = -1
 
-#: Least distance over which the change falls off, relative to `Surface.extent`.
+#: Smallest distance over which a change of the directions falls off, relative to `Surface.extent`.
 MIN_REACH = 0.01
 
-#: Label of the progress.
+#: Text that is shown with the progress bar.
 LABEL = "pairing singularities"
 
 
 def move_index(
     surface: Surface, field: RosyField, source: int, target: int, index: int = 0, reach: float = 0.0
 ) -> RosyField:
-    """Move a singularity index from one vertex to another.
+    """Return the field with a singularity index moved from one vertex to another.
 
-    All ways to edit singularities by hand are such moves. The index of a singularity that is moved onto
-    another one is added to it, so that opposite ones vanish. An index that is moved from a vertex without
-    one leaves its opposite there: a new pair. A part of an index splits a singularity.
+    All edits of singularities by hand are such moves. A singularity that is moved onto another one adds its
+    index to that one, so opposite indices cancel. Moving an index away from a vertex that is not singular
+    leaves the opposite index there, which creates a pair. Moving a part of an index splits a singularity.
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
-        A RoSy.
+        A field whose directions are rotationally symmetric.
     source, target : int
-        Vertices. `OUTSIDE` stands for none, on a surface with a border.
+        Vertices. `OUTSIDE` instead of a vertex means that the index enters or leaves over the border.
     index : int
-        What is moved, in units of 1 / N. 0 is all that `source` has.
+        Index to move, in units of 1 / N; 0 for the whole index of `source`.
     reach : float
-        Distance over which the change of direction falls off, in object space. The distance between the
-        vertices is used if that is larger.
+        Distance over which the change of direction falls off, in object space. If the two vertices are
+        farther apart, it is the distance between them.
 
     Returns
     -------
     RosyField
-        A field with the same other singularities.
+        The new field. All other singularities are the same.
 
     Raises
     ------
     RosyError
-        If the directions are not a RoSy, both vertices are the same, a vertex can have no index or has
-        none to move, or nothing can leave the surface because it is closed.
+        If the directions are not a RoSy, if both vertices are the same, if one of them cannot be singular (at
+        a border, for example), if `source` has no index to move, or if one of them is `OUTSIDE` and the
+        surface is closed.
     TurningError
-        If the field would turn too fast for the size of the faces.
+        If the field would turn by pi / N or more between two faces; smaller faces would allow the move.
     """
     field.check_rosy(surface.name)
     if source == target:
@@ -81,30 +82,30 @@ def move_index(
 
 
 def _distance(surface: Surface, ends: np.ndarray) -> float:
-    """Return the distance between two vertices; 0 if one is `OUTSIDE`, or not in the mesh."""
+    """Return the distance between two vertices; 0 if one of them is `OUTSIDE` or not in the mesh."""
     if (ends < 0).any() or (ends >= len(surface.vertices)).any():
         return 0.0
     return float(np.linalg.norm(np.diff(surface.vertices[ends].astype(np.float64), axis=0)))
 
 
 def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> RosyField:
-    """Remove pairs of singularities with opposite indices.
+    """Return the field without nearby pairs of singularities that have opposite indices.
 
-    Far from them, the field turns by an angle that falls with the distance. All other singularities stay, and
-    so do pairs without which the field would turn too fast for the size of the faces.
+    Directions change most near a removed pair, and less with the distance from it. All other singularities
+    stay. A pair is kept if the field without it would turn by pi / N or more between two faces.
 
     Parameters
     ----------
     surface : Surface
     field : RosyField
-        A RoSy.
+        A field whose directions are rotationally symmetric.
     max_distance : float
-        Largest length of a path along edges between the two of a pair, in object space.
+        Largest length of the shortest path along edges between the vertices of a pair, in object space.
 
     Returns
     -------
     RosyField
-        The field itself if it has no such pairs.
+        The new field; the same object if it has no such pairs.
 
     Raises
     ------
@@ -131,7 +132,10 @@ def cancel_pairs(surface: Surface, field: RosyField, max_distance: float) -> Ros
 
 
 def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.ndarray:
-    """Return (P,) bool, which (P, 2) pairs of vertices are the fewest faces away from other vertices."""
+    """Return (P,) bool: which of the (P, 2) pairs of vertices are nearest to the given other vertices.
+
+    Distances are counted in faces. All pairs with the smallest distance are marked.
+    """
     is_near = mask(len(surface.vertices), vertices)
     corner_vertex, corner_face = surface.corner_vertex, surface.corner_face
     while not is_near[pairs].any():
@@ -146,20 +150,21 @@ def _are_near(surface: Surface, pairs: np.ndarray, vertices: np.ndarray) -> np.n
 def opposite_pairs(
     surface: Surface, vertex: np.ndarray, index: np.ndarray, max_distance: float
 ) -> np.ndarray:
-    """Pair singularities with opposite indices, the nearest ones first.
+    """Find pairs of nearby singularities with opposite indices. The nearest ones are paired first.
 
     Parameters
     ----------
     surface : Surface
     vertex, index : (K,) int ndarray
-        The singularities.
+        Vertices and indices of the singularities.
     max_distance : float
-        Largest length of a path along edges between the two of a pair, in object space.
+        Largest length of the shortest path along edges between the vertices of a pair, in object space.
 
     Returns
     -------
     (P, 2) intp ndarray
-        Pairs of positions in `vertex`; each occurs once at most.
+        Each row holds the positions in `vertex` of the two singularities of a pair. Each singularity is in at
+        most one pair.
     """
     first, second, distance = _near(surface, vertex, max_distance)
     is_opposite = (first < second) & (index[first] == -index[second])
@@ -171,14 +176,14 @@ def opposite_pairs(
 def _near(
     surface: Surface, vertex: np.ndarray, max_distance: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find which of some vertices are near to each other.
+    """Find all pairs of the given vertices that are at most `max_distance` apart, along edges.
 
     Returns
     -------
     first, second : (n,) intp ndarray
-        Positions in `vertex`.
+        Positions in `vertex` of the two vertices of each pair.
     distance : (n,) float64 ndarray
-        Length of the shortest path along edges.
+        Length of the shortest path along edges between them.
     """
     ends = build_edges(surface.corner_vertex, surface.face_start).ends
     count = len(surface.vertices)
@@ -186,7 +191,7 @@ def _near(
     near = length <= max_distance
     start, neighbor, order = neighbors_of_nodes(count, *ends[near].T)
     neighbor, length = neighbor.astype(np.int64), np.tile(length[near], 2)[order]
-    # All paths from all sources, by the number of their edges. A state is a source and a vertex.
+    # Extend the paths from all sources by one edge at a time. A state is a pair of a source and a vertex.
     state = np.arange(len(vertex), dtype=np.int64) * count + vertex
     distance = np.zeros(len(vertex))
     known_state, known_distance = state, distance
@@ -199,7 +204,7 @@ def _near(
         following = np.repeat(source, counts) * count + neighbor[entry]
         is_near = reached <= max_distance
         reached, following = reached[is_near], following[is_near]
-        # The nearest of each state, if it is nearer than before.
+        # Keep the shortest path to each state, if it is shorter than before.
         order = np.lexsort((reached, following))
         following, kept = np.unique(following[order], return_index=True)
         reached = reached[order][kept]

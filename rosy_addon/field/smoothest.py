@@ -1,8 +1,8 @@
-"""The smoothest field of degree N (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
+"""Compute the smoothest field of degree N (Knöppel, Crane, Pinkall and Schröder, SIGGRAPH 2013).
 
-It is the eigenvector of the connection Laplacian of degree N with the smallest eigenvalue. It is
-computed at the nodes (see `field.connection`) and transported to the faces. Disconnected components
-of a mesh are solved separately.
+The field is the eigenvector of the connection Laplacian of degree N that has the smallest eigenvalue. It is
+computed at the nodes, which are the vertices (see `field.connection`), and transported to the faces.
+Disconnected components of a mesh are solved separately.
 """
 
 from __future__ import annotations
@@ -22,22 +22,25 @@ from .surface import Surface
 from .surface_averages import SurfaceAverages
 
 #: The eigensolver stops when the eigenvector changes by less than this in an iteration (the sine of
-#: an angle). At `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
+#: an angle). With `TOLERANCE`, the energy has about eight correct digits. Meshes of up to
 #: `SMALL_MESH_NODES` nodes use the smaller tolerance, so that the field does not depend on the
 #: numbering of the vertices. On larger meshes, separating almost equal eigenvectors would take
 #: seconds and make no visible difference.
 TOLERANCE, SMALL_MESH_TOLERANCE, SMALL_MESH_NODES = 1e-4, 1e-8, 30_000
 MAX_ITERATIONS = 60
 
-#: Largest number of iterations on each intermediate level; they reduce those on the finest level.
+#: Largest number of iterations on each intermediate multigrid level. They save iterations on the finest
+#: level.
 COARSE_ITERATIONS = 12
 
-#: Multiple of the mass matrix that is added for multigrid, in units of 4 pi / area.
+#: Factor of the mass matrix that is added to the matrix for multigrid, in units of 4 pi / area.
 SPECTRAL_SHIFT = 0.02
 
 
 def smoothest_field(surface: Surface, degree: int) -> RosyField:
-    """Compute the field of least Dirichlet energy for its L2 norm, then normalize it.
+    """Compute the field with the least Dirichlet energy among all fields of the same L2 norm.
+
+    Its vectors are then normalized.
 
     Parameters
     ----------
@@ -48,8 +51,8 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
     Returns
     -------
     RosyField
-        A field of magnitude 1; 0 on faces without area. A rotation of the whole field does not change its
-        energy, so the field is rotated to align with the edges of the mesh.
+        A field of magnitude 1; zero on faces without area. A rotation of the whole field does not change its
+        energy, so the field is finally rotated to align with the edges of the mesh.
 
     Raises
     ------
@@ -71,12 +74,14 @@ def smoothest_field(surface: Surface, degree: int) -> RosyField:
 
 
 def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the eigenvector of L z = e M z with the smallest e on each connected component.
+    """Compute, on each connected component, the eigenvector of L z = e M z with the smallest eigenvalue e.
+
+    L is the connection Laplacian of this degree, and M the mass matrix.
 
     Returns
     -------
     z : (n,) complex128 ndarray
-        At the nodes; z* M z is 1 on each component.
+        Values of the eigenvectors at the nodes; z* M z is 1 on each component.
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
@@ -88,19 +93,19 @@ def smallest_eigenvectors(connection: Connection, degree: int) -> tuple[np.ndarr
 
 
 def spectral_shift(mass: np.ndarray) -> float:
-    """Return the multiple of the masses that is added to an energy, so that multigrid can solve it."""
+    """Return the factor of the mass matrix to add to an energy matrix, so that multigrid can solve it."""
     return SPECTRAL_SHIFT * 4 * np.pi / float(mass.sum())
 
 
 def eigenproblem(
     matrix: CSRMatrix, mass: np.ndarray, component: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the eigenvector of A z = e M z with the smallest e on each connected component.
+    """Compute, on each connected component, the eigenvector of A z = e M z with the smallest eigenvalue e.
 
     Parameters
     ----------
     matrix : (n, n) CSRMatrix
-        Hermitian A, with the masses times `spectral_shift`.
+        A + s M, where A is Hermitian and s is the result of `spectral_shift`.
     mass : (n,) float64 ndarray
         The diagonal of M.
     component : (n,) int32 ndarray
@@ -109,7 +114,7 @@ def eigenproblem(
     Returns
     -------
     z : (n,) complex128 ndarray
-        z* M z is 1 on each component.
+        Values of the eigenvectors at the nodes; z* M z is 1 on each component.
     energy : (components,) float64 ndarray
         The eigenvalues e.
     """
@@ -140,13 +145,14 @@ def eigenproblem(
 def _lobpcg(
     levels: list[Level], mass: np.ndarray, component: np.ndarray, z: np.ndarray, max_iterations: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Minimize the Rayleigh quotient of each component by LOBPCG (Knyazev 2001).
+    """Minimize the Rayleigh quotient on each connected component by LOBPCG (Knyazev 2001).
 
     Parameters
     ----------
     levels : list of Level
-        The first holds the matrix; all of them precondition it by a W-cycle.
+        Multigrid levels. The first holds the matrix; a W-cycle over all of them is the preconditioner.
     mass : (n,) float64 ndarray
+        Masses of the nodes.
     component : (n,) int32 ndarray
         Connected component of each node.
     z : (n,) complex128 ndarray
@@ -156,17 +162,18 @@ def _lobpcg(
     Returns
     -------
     z : (n,) complex128 ndarray
+        The vector with the least Rayleigh quotients.
     energy : (components,) float64 ndarray
-        The Rayleigh quotients.
+        Its Rayleigh quotient on each component.
     """
     matrix, products = levels[0].matrix, _ComponentProducts(mass, component)
     tolerance = TOLERANCE if len(matrix) > SMALL_MESH_NODES else SMALL_MESH_TOLERANCE
-    # Vectors are in pairs with their images: their products with the matrix.
+    # Each vector is stored as a pair with its image: the product of the matrix and the vector.
     current = products.normalize(np.stack([z, matrix @ z]))
     previous_step: list[np.ndarray] = []
     energy = products.sums(current[0].conj() * current[1]).real
     for iteration in range(max_iterations):
-        # 20 to 50 iterations are usual; the progress bar is scaled for that.
+        # The progress bar is scaled for 20 to 50 iterations, the usual number.
         report(1 - 0.95**iteration, "solving for the smoothest field")
         z, image = current
         direction = w_cycle(levels, image - products.at_nodes(energy) * (mass * z))
@@ -196,32 +203,41 @@ class _ComponentProducts:
         self._count = int(component.max()) + 1
 
     def sums(self, values: np.ndarray) -> np.ndarray:
-        """Return (components,) sums of (n,) values over each component."""
+        """Return (components,) sums of (n,) values over the nodes of each component."""
         return _component_sums(self._component, values, self._count)
 
     def at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Expand a value for each component to its nodes."""
+        """Return (n,) values at the nodes, given one value for each component."""
         return values[self._component] if self._count > 1 else values
 
     def norms(self, vector: np.ndarray) -> np.ndarray:
-        """Return (components,) mass norms of a vector."""
+        """Return (components,) norms of an (n,) vector on each component, weighted by the masses."""
         return np.sqrt(self.sums(self._mass * (vector.real**2 + vector.imag**2)).real)
 
     def normalize(self, pair: np.ndarray) -> np.ndarray:
-        """Divide a (2, n) vector and its image in place by the mass norm of the vector."""
+        """Divide a vector and its image, given as a (2, n) pair, in place by the norm of the vector.
+
+        The norm is that of `norms`, separate for each component. The pair is also returned.
+        """
         norm = self.norms(pair[0])
         pair *= self.at_nodes(1 / np.where(norm > 0, norm, 1))
         return pair
 
     def combine(self, pairs: list[np.ndarray], coefficients: np.ndarray) -> np.ndarray:
-        """Return the linear combination of pairs with (components, k) coefficients."""
+        """Return the linear combination of k (2, n) pairs of vector and image, as a new pair.
+
+        The coefficients are (components, k).
+        """
         total = pairs[0] * self.at_nodes(coefficients[:, 0])
         for index, pair in enumerate(pairs[1:], 1):
             total += pair * self.at_nodes(coefficients[:, index])
         return total
 
     def gram_matrices(self, a: Sequence[np.ndarray], b: Sequence[np.ndarray]) -> np.ndarray:
-        """Return (components, k, k) inner products a_i* b_j on each component; must be Hermitian."""
+        """Return (components, k, k) inner products a_i* b_j on each component: Hermitian matrices.
+
+        The vectors a and b must be such that these matrices are Hermitian: only one triangle is computed.
+        """
         gram = np.empty((self._count, len(a), len(b)), dtype=np.complex128)
         for i, vector in enumerate(a):
             conjugate = vector.conj()
@@ -232,14 +248,14 @@ class _ComponentProducts:
 
 
 def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve the small generalized eigenproblems A x = e B x for the smallest e.
+    """Solve small generalized eigenproblems A x = e B x, one for each component, for the smallest e.
 
     Directions in which B is nearly singular are excluded.
 
     Parameters
     ----------
     a, b : (components, k, k) complex128 ndarray
-        Hermitian.
+        The Hermitian matrices A and B.
 
     Returns
     -------
@@ -258,23 +274,23 @@ def _rayleigh_ritz(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray
     reduced += np.einsum("pk,kl->pkl", np.where(usable, 0, penalty[:, None]), np.eye(a.shape[1]))
     energy, eigenvectors = np.linalg.eigh(reduced)
     coefficients = (whitening @ eigenvectors[:, :, :1])[:, :, 0]
-    # Make the coefficient of the current vector real and positive, so that the change per iteration
-    # measures convergence.
+    # Make the coefficient of the current vector real and positive, so that the change of the vector in an
+    # iteration measures convergence.
     phase = np.where(coefficients[:, 0] == 0, 1, coefficients[:, 0])
     return coefficients * (np.abs(phase) / phase)[:, None], energy[:, 0]
 
 
 def _component_sums(component: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """Return (count,) complex128 sums of (n,) values over each component."""
+    """Return (count,) complex128 sums of (n,) values over the nodes of each component."""
     if count == 1:
         return np.array([values.sum()], dtype=np.complex128)
     return complex_bincount(component, values, count)
 
 
 def _align_to_edges(connection: Connection, z: np.ndarray, degree: int) -> np.ndarray:
-    """Rotate the field of each component by one angle so that it best aligns with the edges.
+    """Return z rotated by one angle on each component, so that the field best aligns with the edges.
 
-    Eigenvectors are unique only up to such a rotation. This choice depends on the mesh alone.
+    Eigenvectors are unique only up to such a rotation. With this choice, the field depends on the mesh alone.
     """
     component = connection.component
     count = int(component.max()) + 1

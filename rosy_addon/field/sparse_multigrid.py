@@ -1,11 +1,11 @@
 """Sparse Hermitian matrices in numpy, and algebraic multigrid for connection Laplacians.
 
-Matrices are complex or real. Products, levels and solutions have the same type.
+Matrices are complex or real. Products, multigrid levels and solutions have the type of the matrix.
 
-The smooth vectors of a connection Laplacian are parallel, not constant: between neighboring
-unknowns their phase changes by the phase of the matrix entry. So each aggregate stores the phases
-along a tree within it. The prolongation is then smoothed by a Jacobi step (smoothed aggregation:
-Vanek, Mandel and Brezina 1996).
+The smooth vectors of a connection Laplacian are parallel, not constant: from one unknown to its neighbor,
+their phase changes by the phase of the matrix element. So the prolongation from an aggregate (a group of
+neighboring unknowns) contains such phases, which are accumulated along a tree within the aggregate. The
+prolongation is then smoothed by a Jacobi step (smoothed aggregation: Vanek, Mandel and Brezina 1996).
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ import numpy as np
 from ..core.progress import progress, report
 from .blocks import concatenated_ranges
 
-#: Relative increase of the diagonal of a matrix that is singular, and smallest value on a diagonal,
-#: relative to the largest one.
+#: Relative increase of the diagonal of a singular matrix, and smallest value on a diagonal, relative to the
+#: largest value.
 SINGULAR_SHIFT = 1e-10
 
-#: Largest number of unknowns of the coarsest level; it is solved with a dense inverse.
+#: A level with at most this number of unknowns is the coarsest one, and is solved with a dense inverse.
 DIRECT_SOLVE_SIZE = 400
 
-#: Rows processed at once, so that their entries fit in the cache of a core.
+#: Number of rows that are processed at once, so that their entries fit in the cache of a CPU core.
 BLOCK_ROWS = 1 << 12
 
-#: Blocks of rows of a new matrix that are assembled between two reports.
+#: Number of blocks of rows of a new matrix that are assembled between two reports of the progress.
 BLOCKS_PER_REPORT = 4
 
-#: Entries below this fraction of the largest off-diagonal entry of both rows are weak: they do not
-#: connect unknowns to an aggregate.
+#: A matrix entry below this fraction of the largest off-diagonal entry, in both of its rows, is weak: it does
+#: not connect two unknowns in an aggregate.
 STRENGTH_THRESHOLD = 0.08
 
 
@@ -41,17 +41,19 @@ STRENGTH_THRESHOLD = 0.08
 class CSRMatrix:
     """A sparse matrix in compressed row storage (CSR), without empty rows.
 
-    n is the number of rows, m of entries. ``len(matrix)`` is n, ``matrix @ vector`` the product.
+    n is the number of rows, and m is the number of stored elements, called *entries*. ``len(matrix)`` is n,
+    and ``matrix @ vector`` is the matrix product.
 
     Attributes
     ----------
     indptr : (n + 1,) intp ndarray
-        The entries of row i are ``indptr[i] .. indptr[i + 1] - 1``.
+        The entries of row i are at positions ``indptr[i] .. indptr[i + 1] - 1`` of the other arrays.
     indices : (m,) intp ndarray
         Column of each entry.
     data : (m,) complex or float ndarray
-        Values of the entries.
+        Value of each entry.
     column_count : int
+        Number of columns.
     """
 
     indptr: np.ndarray
@@ -73,7 +75,7 @@ class CSRMatrix:
         return result
 
     def with_values(self, data: np.ndarray) -> CSRMatrix:
-        """Return a matrix with other values of the same entries."""
+        """Return a matrix with the same sparsity pattern and other values (m,) of its entries."""
         return replace(self, data=data)
 
     @cached_property
@@ -83,36 +85,39 @@ class CSRMatrix:
 
     @cached_property
     def diagonal(self) -> np.ndarray:
-        """(n,) float64: the real part of the diagonal."""
+        """(n,) float64: the real part of the diagonal of the matrix."""
         on_diagonal = self.indices == self.row_indices
         return np.bincount(self.row_indices[on_diagonal], self.data[on_diagonal].real, len(self))
 
     def plus_diagonal(self, values: np.ndarray) -> CSRMatrix:
-        """Return the matrix with (n,) values added to its diagonal, which has an entry in each row."""
+        """Return the matrix with (n,) values added to its diagonal. All diagonal elements must be stored."""
         data = self.data.copy()
         data[self.diagonal_entries] += values
         return self.with_values(data)
 
     @cached_property
     def diagonal_entries(self) -> np.ndarray:
-        """(n,) intp: an entry on the diagonal in each row, which has at least one."""
+        """(n,) intp: position of the diagonal entry of each row. All diagonal elements must be stored."""
         entries = np.flatnonzero(self.indices == self.row_indices)
         if len(entries) > len(self):  # some rows have several, which add up
             entries = entries[np.unique(self.row_indices[entries], return_index=True)[1]]
         return entries
 
     def entries_of_rows(self, rows: np.ndarray) -> np.ndarray:
-        """Return (k,) intp, the entries of (m,) rows, row by row."""
+        """Return the positions of the entries of the given rows, row by row, as intp."""
         return concatenated_ranges(self.indptr[:-1][rows], np.diff(self.indptr)[rows])
 
     def rows(self, rows: np.ndarray) -> CSRMatrix:
-        """Return the (m, n) matrix of (m,) rows."""
+        """Return the matrix that consists of the given rows."""
         entries = self.entries_of_rows(rows)
         indptr = np.concatenate([[0], np.cumsum(np.diff(self.indptr)[rows])])
         return CSRMatrix(indptr, self.indices[entries], self.data[entries], self.column_count)
 
     def columns(self, columns: np.ndarray) -> CSRMatrix:
-        """Return the matrix of (m,) different columns, of which each row must have an entry."""
+        """Return the matrix that consists of the given columns, without duplicates.
+
+        Each row of the result must have an entry.
+        """
         new_column = np.full(self.column_count, -1)
         new_column[columns] = np.arange(len(columns))
         kept = np.flatnonzero(new_column[self.indices] >= 0)
@@ -122,7 +127,7 @@ class CSRMatrix:
 
     @cached_property
     def adjoint(self) -> CSRMatrix:
-        """The conjugate transpose."""
+        """Return the conjugate transpose of the matrix."""
         return from_coo(
             self.indices, self.row_indices, self.data.conj(), self.column_count, len(self)
         )
@@ -131,15 +136,18 @@ class CSRMatrix:
 def from_coo(
     row: np.ndarray, column: np.ndarray, value: np.ndarray, row_count: int, column_count: int
 ) -> CSRMatrix:
-    """Make a matrix from entries in any order.
+    """Make a matrix from its entries in coordinate format (COO), in any order.
 
-    Entries with the same row and column add up. No row may be empty.
+    Entries with the same row and column are summed. No row may be empty.
 
     Parameters
     ----------
     row, column : (m,) intp ndarray
+        Row and column of each entry.
     value : (m,) complex or float ndarray
+        Value of each entry.
     row_count, column_count : int
+        Shape of the matrix.
     """
     # A radix sort by digits of 16 bits, the low digit first: numpy's stable sort takes linear time
     # only for integers of at most 16 bits.
@@ -154,14 +162,17 @@ def from_coo(
 def from_edges(
     tail: np.ndarray, head: np.ndarray, value: np.ndarray, diagonal: np.ndarray
 ) -> CSRMatrix:
-    """Make a Hermitian matrix from its entries at edges and on the diagonal.
+    """Make the Hermitian matrix of a graph, with one off-diagonal value for each edge.
 
     Parameters
     ----------
     tail, head : (E,) int ndarray
-        Row and column of the entry of each edge. The conjugate is at (head, tail).
+        The two nodes of each edge. The value of the edge is at row `tail` and column `head`, and its
+        conjugate at row `head` and column `tail`.
     value : (E,) complex or float ndarray
+        Value of each edge.
     diagonal : (n,) float64 ndarray
+        Values on the diagonal, one for each node.
     """
     count = len(diagonal)
     nodes = np.arange(count)
@@ -178,7 +189,7 @@ def matrix_product(a: CSRMatrix, b: CSRMatrix) -> CSRMatrix:
 def _product_terms(
     a: CSRMatrix, b: CSRMatrix, block: slice
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return rows, columns and values of the terms that a block of entries of `a` adds to the product a b."""
+    """Return the terms that a block of entries of `a` adds to the product a b: rows, columns and values."""
     inner = a.indices[block]
     first = b.indptr.take(inner)
     count = b.indptr.take(inner + 1) - first
@@ -194,17 +205,17 @@ def _assemble_by_rows(
     column_count: int,
     entries: Callable[[slice], tuple[np.ndarray, np.ndarray, np.ndarray]],
 ) -> CSRMatrix:
-    """Build a matrix block by block of the rows of another one, so that sorting stays in the cache.
+    """Build a matrix from another matrix in blocks of rows, so that sorting stays in the CPU cache.
 
     Parameters
     ----------
     matrix : CSRMatrix
-        The result has the same number of rows.
+        The given matrix. The result has the same number of rows.
     column_count : int
         Number of columns of the result.
     entries : callable
-        Takes a slice of the entries of `matrix` and returns the rows, columns and values of the
-        result that come from them. Entries at the same position are summed.
+        Function that takes a slice of the entries of `matrix`. It returns the rows, columns and values of the
+        entries of the result that they contribute. Values at the same position are summed.
     """
     bits = int(column_count).bit_length()
     row_counts, index_blocks, value_blocks = [], [], []
@@ -225,7 +236,7 @@ def _assemble_by_rows(
 
 
 def _sum_duplicates(key: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct keys in ascending order, and the sum of the values of each."""
+    """Return the distinct keys in ascending order, and for each key the sum of its values."""
     order = np.argsort(key, kind="stable")
     key = key.take(order)
     first = np.flatnonzero(np.concatenate([[True], key[1:] != key[:-1]]))
@@ -239,13 +250,13 @@ class Level:
     Attributes
     ----------
     matrix : CSRMatrix
-        (n, n), Hermitian and positive definite.
+        The (n, n) matrix, Hermitian and positive definite.
     prolongation : CSRMatrix or None
-        (n, n_coarse) interpolation from the next coarser level; None on the coarsest level.
+        The (n, n_coarse) matrix that interpolates from the next coarser level; None on the coarsest level.
     jacobi_weight : (n,) float64 ndarray
-        Factors of the residual in a Jacobi smoothing step.
+        Factors by which a Jacobi smoothing step multiplies the residual.
     inverse : (n, n) ndarray or None
-        Dense inverse of the matrix on the coarsest level, if that is small enough.
+        Dense inverse of the matrix on the coarsest level, if it is small enough; None on all other levels.
     """
 
     matrix: CSRMatrix
@@ -293,15 +304,16 @@ def hierarchy(matrix: CSRMatrix) -> list[Level]:
 def add_diagonal(levels: list[Level], diagonal: np.ndarray) -> list[Level]:
     """Return multigrid levels for a matrix with other values on its diagonal.
 
-    This is much faster than `hierarchy`. Each coarser matrix gets the sum of what is added at the
-    unknowns of its aggregates, which is an upper bound of their Galerkin product.
+    This is much faster than calling `hierarchy` again. On each coarser level, the value added to the diagonal
+    of an aggregate is the sum of the values added to its unknowns. This is an upper bound of the exact
+    (Galerkin) matrix.
 
     Parameters
     ----------
     levels : list of Level
-        From `hierarchy`.
+        Result of `hierarchy`.
     diagonal : (n,) float64 ndarray
-        Values that are added, not negative.
+        Values that are added to the diagonal, at least 0.
     """
     result = []
     for level in levels:
@@ -316,21 +328,22 @@ def add_diagonal(levels: list[Level], diagonal: np.ndarray) -> list[Level]:
 
 
 def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
-    """Approximate the solution of ``levels[0].matrix @ solution = rhs`` by one W-cycle.
+    """Approximate the solution of ``levels[0].matrix @ solution = rhs`` by one multigrid W-cycle.
 
-    Each coarser level is visited twice. This costs little, because a level has about a ninth of the
-    unknowns of the next finer one. It makes the convergence rate independent of the number of
-    levels.
+    From each level, the next coarser level is visited twice. This costs little, because the coarser level has
+    about a ninth of the unknowns. It makes the convergence rate independent of the number of levels.
 
     Parameters
     ----------
     levels : list of Level
-        From `hierarchy`.
+        Result of `hierarchy`.
     rhs : (n,) complex or float ndarray
+        Right-hand side.
 
     Returns
     -------
     (n,) complex or float ndarray
+        The approximate solution.
     """
     level = levels[0]
     if level.inverse is not None:
@@ -350,16 +363,16 @@ def w_cycle(levels: list[Level], rhs: np.ndarray) -> np.ndarray:
 
 
 def _jacobi_weights(matrix: CSRMatrix) -> np.ndarray:
-    """Return (n,) weights of a Jacobi step that damps the upper part of the spectrum."""
+    """Return (n,) factors of the residual for a Jacobi step that damps the upper part of the spectrum."""
     diagonal = _positive_diagonal(matrix)
     scaled_row_sum = np.add.reduceat(np.abs(matrix.data), matrix.indptr[:-1]) / diagonal
     return 4 / (3 * scaled_row_sum.max() * diagonal)
 
 
 def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
-    """Return (n,) the diagonal, made positive.
+    """Return the (n,) diagonal of a matrix, with small positive values instead of values near 0.
 
-    Rounding errors can remove the diagonal of a component of tiny area.
+    Rounding errors can make the diagonal 0 on a connected component with a tiny area.
     """
     diagonal = matrix.diagonal
     return np.maximum(diagonal, SINGULAR_SHIFT * diagonal.max())
@@ -368,8 +381,8 @@ def _positive_diagonal(matrix: CSRMatrix) -> np.ndarray:
 def _dense_inverse(matrix: CSRMatrix) -> np.ndarray:
     """Return the inverse of a sparse matrix as a dense array.
 
-    If the matrix is singular, its diagonal is enlarged a little. The inverse is a preconditioner, so
-    that changes the rate of convergence, not the solution.
+    If the matrix is singular, its diagonal is enlarged a little. The inverse is used as a preconditioner, so
+    this changes the rate of convergence and not the solution.
     """
     dense = np.zeros((len(matrix), len(matrix)), dtype=matrix.data.dtype)
     np.add.at(dense, (matrix.row_indices, matrix.indices), matrix.data)
@@ -387,7 +400,10 @@ def _smoothed_prolongation(
     count: int,
     phase: np.ndarray,
 ) -> CSRMatrix:
-    """Return the prolongation: one column for each aggregate, smoothed by a Jacobi step of the matrix."""
+    """Return the prolongation matrix: one column for each aggregate, smoothed by a Jacobi step of the matrix.
+
+    `aggregate`, `count` and `phase` are results of `_aggregates`.
+    """
     unknowns = np.arange(len(matrix))
 
     def entries(block: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -414,7 +430,7 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
     count : int
         Number of aggregates.
     phase : (n,) ndarray
-        Numbers of modulus 1; a smooth vector is nearly proportional to them in each aggregate.
+        Numbers of modulus 1. Within each aggregate, a smooth vector is nearly proportional to them.
     """
     count = len(matrix)
     row, column = matrix.row_indices, matrix.indices
@@ -428,7 +444,8 @@ def _aggregates(matrix: CSRMatrix) -> tuple[np.ndarray, int, np.ndarray]:
             np.where(strong | (row == column), values.take(column), -1), matrix.indptr[:-1]
         )
 
-    # Roots are the free unknowns with the largest random priority among those within two steps.
+    # A root of a new aggregate is a free unknown whose random priority is the largest among the free unknowns
+    # that are at most two steps away.
     priority = np.random.default_rng(0).permutation(count)
     free, root = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
     while free.any():

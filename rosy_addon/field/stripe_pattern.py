@@ -1,19 +1,23 @@
-"""Evenly spaced lines along the directions of a field, as a phase on the surface.
+"""Compute a phase function on a surface whose integer level lines are evenly spaced stripes along a field.
 
-A phase counts lines: it grows by 1 from one line to the next, and the lines are where it is an integer.
-Along an edge, the phase of a family of lines should change by the component of the edge across the lines,
-divided by the spacing. On a curved surface, no phase changes exactly so. `stripe_pattern` computes the phase
-with the least squared error of exp(2 pi i phase). Where lines diverge too much, new lines begin, at triangles
+The *phase* counts stripes: it grows by 1 from one stripe to the next, and a stripe is drawn where it is an
+integer. A field of N directions has M families of stripes: N / 2 if each direction has an opposite, because
+both give the same stripes, and N otherwise. Each family has its own phase.
+
+Along an edge, the phase should change by the component of the edge across the stripes, divided by the
+spacing. On a curved surface, no phase satisfies this exactly. `stripe_pattern` computes the phase with the
+least squared error of exp(2 pi i phase). Where stripes diverge too much, new stripes begin, at triangles
 around which the phase changes by an integer.
 
-Energy, covering and interpolation follow Knöppel, Crane, Pinkall and Schröder, "Stripe Patterns on
-Surfaces" (SIGGRAPH 2015). The energy is minimized over numbers of modulus 1
-(`angular_synchronization`) instead of eigenvectors: an eigenvector would be small on most parts of the
-surface, and take longer.
+The energy, the covering and the interpolation are those of Knöppel, Crane, Pinkall and Schröder, "Stripe
+Patterns on Surfaces" (SIGGRAPH 2015). But the energy is minimized over numbers of modulus 1
+(`angular_synchronization`) instead of eigenvectors, because an eigenvector would be small on most parts of
+the surface, and would take longer to compute.
 
-Around a singularity, the families of a field are permuted. So the unknowns are on the covering: a *node* is
-a vertex with one of its families, and nodes are connected across edges by the directions that match. If a
-family continues as the opposite direction of another one, its value is the conjugate of the other's.
+Around a singularity, the families of a field are permuted. So the unknowns are on a covering of the
+surface. A *node* of the covering is a vertex together with one of its families. Two nodes are connected
+across an edge if their directions match. If a family continues as the opposite direction of another family,
+its value is the complex conjugate of the value of the other family.
 """
 
 from __future__ import annotations
@@ -29,13 +33,14 @@ from .connection import sums_in_umbrellas, umbrella_order
 from .connectivity import build_edges
 from .polygon_arrays import next_corners
 
-#: Bounds of the cotangent weights of edges. The lower one also connects obtuse triangles.
+#: Smallest and largest cotangent weight of an edge. The smallest weight is positive, so that obtuse triangles
+#: are connected as well.
 MIN_WEIGHT, MAX_WEIGHT = 0.02, 50.0
 
 
 @dataclass(frozen=True, eq=False)
 class CornerDirections:
-    """The directions of a field at the corners of T triangles, in the planes of the triangles.
+    """The N directions of a field at the corners of T triangles, as angles in the planes of the triangles.
 
     Attributes
     ----------
@@ -44,12 +49,12 @@ class CornerDirections:
     has_opposites : bool
         Whether direction k + N / 2 is the opposite of direction k (see `FieldSymmetry`).
     offset : (T, 3) complex128 ndarray
-        Positions of the corners in a frame of the plane.
+        Positions of the corners in a frame of the plane of the triangle.
     angle : (T, 3) float64 ndarray
-        Angle of direction 0 in that frame, radians. Within a triangle direction 0 is the same
-        branch at all corners.
+        Angle of direction 0 in that frame, in radians. Direction 0 of one corner of a triangle matches
+        direction 0 of the other two corners.
     deviation : (T, 3, N) complex128 ndarray or None
-        Ratios of the directions to the members of the nearest RoSy, of modulus 1. None for a RoSy.
+        Ratios of the directions to the members of the nearest RoSy, as numbers of modulus 1. None for a RoSy.
     defined : (T,) bool ndarray
         Whether the field is defined in the triangle.
     """
@@ -63,11 +68,14 @@ class CornerDirections:
 
     @property
     def family_count(self) -> int:
-        """M, the number of families of lines: N / 2 with opposites, N otherwise."""
+        """M, the number of families of stripes: N / 2 with opposites, N otherwise."""
         return self.degree // 2 if self.has_opposites else self.degree
 
     def phase_changes(self, spacing: float) -> np.ndarray:
-        """Return (3 T, M) changes of the phase from each corner to the next, for lines along the field."""
+        """Return the (3 T, M) changes that the phase of each family should have from each corner to the next.
+
+        `spacing` is the distance between neighboring stripes, in the units of `offset`.
+        """
         edge = np.roll(self.offset, -1, axis=1) - self.offset
         middle = 0.5 * (self.angle + np.roll(self.angle, -1, axis=1))
         result = np.empty((*edge.shape, self.family_count))
@@ -84,14 +92,14 @@ class CornerDirections:
 
 @dataclass(frozen=True, eq=False)
 class StripePattern:
-    """The phases of M families of lines on T triangles.
+    """The phases of M families of stripes on T triangles. A phase grows by 1 from one stripe to the next.
 
     Attributes
     ----------
     phase : (T, M, 3) float32 ndarray
-        Phase at the corners, in lines: the linear part (see `evaluate`).
+        The linear part of the phase, at the corners (see `evaluate`).
     index : (T, M) float32 ndarray
-        Number of lines that end in the triangle: integers, 0 in most triangles.
+        Number of stripes that end in each triangle: an integer, 0 in most triangles.
     """
 
     phase: np.ndarray
@@ -103,19 +111,22 @@ class StripePattern:
         Parameters
         ----------
         triangle : (P,) int ndarray
+            Triangle of each of P points.
         weights : (3, P) float32 ndarray
-            Barycentric coordinates.
+            Barycentric coordinates of the points.
         family : (P,) int ndarray
+            Family of stripes for each point.
 
         Returns
         -------
         (P,) float32 ndarray
-            Phase in lines.
+            Phase, in units of the distance between stripes.
 
         Notes
         -----
-        In a triangle with an index, the phase is the sum of a linear function and of a part that is linear
-        along the edges and constant on rays from the center (Knöppel et al., section 4.3).
+        If the index of a triangle is not 0, the phase is the sum of a linear function and of a second part.
+        The second part is linear along the edges, and constant on rays from the center (Knöppel et al.,
+        section 4.3).
         """
         entry = triangle * np.int32(self.index.shape[1]) + family
         corners = self.phase.reshape(-1, 3)
@@ -130,13 +141,15 @@ class StripePattern:
 
 
 def _turn_fraction(weights: np.ndarray) -> np.ndarray:
-    """Return (P,) parts of a turn around a triangle: 0 at corner 0, 1/3 at corner 1, 2/3 at corner 2.
+    """Return the position of P points around the center of their triangle, as a fraction of a full turn.
 
-    They are linear along the edges and constant on rays from the center.
+    It is 0 at corner 0, 1/3 at corner 1 and 2/3 at corner 2. It is linear along the edges and constant on
+    rays from the center. `weights` holds the (3, P) barycentric coordinates of the points.
     """
     opposite = weights.argmin(axis=0)
     points = np.arange(weights.shape[1])
-    # The nearest edge runs from `tail` to the next corner, opposite the smallest weight.
+    # The nearest edge runs from corner `tail` to the next corner. It is opposite the corner of smallest
+    # weight.
     tail = (opposite + 1) % 3
     smallest = weights[opposite, points]
     head_weight = weights[(opposite + 2) % 3, points]
@@ -147,16 +160,15 @@ def _turn_fraction(weights: np.ndarray) -> np.ndarray:
 def stripe_pattern(
     triangle_vertex: np.ndarray, directions: CornerDirections, spacing: float
 ) -> StripePattern:
-    """Compute phases of evenly spaced lines along all directions of a field.
+    """Compute the phases of evenly spaced stripes along all directions of a field.
 
     Parameters
     ----------
     triangle_vertex : (T, 3) int ndarray
-        Triangles that share edges share their vertices. Their edges should not be much longer than
-        the spacing; see `bisection`.
+        Vertices of the triangles. Edges should not be much longer than the spacing; see `bisection`.
     directions : CornerDirections
     spacing : float
-        Distance between neighboring lines, in the units of the corners.
+        Distance between neighboring stripes, in the units of `CornerDirections.offset`.
 
     Returns
     -------
@@ -182,7 +194,8 @@ def stripe_pattern(
         corner = z[node[block]]
         np.conjugate(corner, out=corner, where=conjugated[block])
         corner_phase = np.angle(corner) / (2 * np.pi)
-        # Choose the change from corner to corner that is nearest to what it should be.
+        # The phase is known up to integers. Choose the integers so that its change from corner to corner is
+        # nearest to the change that it should have.
         step = np.roll(corner_phase, -1, axis=1) - corner_phase
         step += np.rint(change[block] - step)
         index[block] = np.rint(step.sum(axis=1))
@@ -195,16 +208,19 @@ def stripe_pattern(
 
 @dataclass(frozen=True, eq=False)
 class _Gluing:
-    """How the directions of T triangles continue across their edges.
+    """How the directions of T triangles continue in the neighboring triangles.
+
+    Corner k of triangle t has the index 3 t + k. There is one halfedge from each corner to the next one.
 
     Attributes
     ----------
     twin : (3 T,) int32 ndarray
-        For the edge from each corner (3 t + k) to the next, the corner at which it starts in the
-        neighboring triangle, where it runs backward. -1 if the field does not continue there.
+        For the halfedge that starts at each corner, the corner at which the opposite halfedge starts, in the
+        neighboring triangle; -1 if the field does not continue across the edge.
     shift : (3 T,) int32 ndarray
-        Direction d continues as direction d + shift of the neighbor, modulo N.
+        Direction d continues across that edge as direction (d + shift) modulo N of the neighboring triangle.
     next_corner : (3 T,) int32 ndarray
+        The next corner of the same triangle.
     """
 
     twin: np.ndarray
@@ -213,7 +229,7 @@ class _Gluing:
 
 
 def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluing:
-    """Match the directions of neighboring triangles, unfolded into one plane."""
+    """Match the directions of neighboring triangles, after unfolding the two triangles into one plane."""
     corner_vertex = np.ascontiguousarray(triangle_vertex, dtype=np.int32).reshape(-1)
     start = np.arange(0, len(corner_vertex) + 1, 3, dtype=np.int32)
     edges = build_edges(corner_vertex, start)
@@ -234,7 +250,10 @@ def _gluing(triangle_vertex: np.ndarray, directions: CornerDirections) -> _Gluin
 def _shared_changes(
     change: np.ndarray, gluing: _Gluing, directions: CornerDirections
 ) -> np.ndarray:
-    """Return (3 T, M) changes of the phases, made exactly opposite in the two triangles of an edge."""
+    """Return (3 T, M) changes of the phases along edges: means of the changes in both triangles of each edge.
+
+    So the changes of the two opposite halfedges of an edge are exactly opposite.
+    """
     families = directions.family_count
     result = change.copy()
     glued = np.flatnonzero(gluing.twin >= 0)
@@ -249,18 +268,19 @@ def _shared_changes(
 
 @dataclass(frozen=True, eq=False)
 class _Covering:
-    """The nodes of the covering.
+    """The nodes of the covering: a node is a vertex together with one of its M families of stripes.
 
     Attributes
     ----------
     node : (3 T, M) int32 ndarray
         Node of each corner and family.
     conjugated : (3 T, M) bool ndarray
-        Whether the family has the conjugate of the value of the node.
+        Whether the value of the corner and family is the complex conjugate of the value of the node.
     node_count : int
+        Number of nodes.
     is_singular : (3 T,) bool ndarray
-        Whether the vertex is singular. Its corners are separate nodes, because around it, a family
-        comes back as another one.
+        Whether the vertex of each corner is singular. Each corner of a singular vertex has its own nodes,
+        because a family becomes another one when it is followed around the vertex.
     """
 
     node: np.ndarray
@@ -272,7 +292,10 @@ class _Covering:
 def _covering(
     triangle_vertex: np.ndarray, gluing: _Gluing, directions: CornerDirections
 ) -> _Covering:
-    """Find the nodes: number the directions at all corners around a vertex from the same direction."""
+    """Find the nodes of the covering.
+
+    The directions at all corners around a vertex are numbered consistently, starting from the same direction.
+    """
     degree, families = directions.degree, directions.family_count
     corner = np.arange(len(gluing.twin), dtype=np.int32)
     previous, _ = umbrella_order(triangle_vertex.reshape(-1), gluing.twin, gluing.next_corner)
@@ -294,7 +317,10 @@ def _covering(
 
 
 def _edge_weights(directions: CornerDirections) -> np.ndarray:
-    """Return (T, 3) halves of the cotangents of the angles opposite the edge from each corner to the next."""
+    """Return (T, 3) weights for the edges from each corner to the next: half cotangents of opposite angles.
+
+    They are limited to the range from `MIN_WEIGHT` to `MAX_WEIGHT`.
+    """
     to_corner = directions.offset - np.roll(directions.offset, 1, axis=1)
     to_next = np.roll(directions.offset, -1, axis=1) - np.roll(directions.offset, 1, axis=1)
     product = to_corner.conj() * to_next
@@ -308,12 +334,15 @@ def _edge_weights(directions: CornerDirections) -> np.ndarray:
 def _covering_graph(
     covering: _Covering, gluing: _Gluing, change: np.ndarray, directions: CornerDirections
 ) -> PhaseGraph:
-    """Return the graph of the edges of all triangles on the covering."""
+    """Return the graph that connects the nodes of the covering along the edges of all triangles.
+
+    Each entry relates the values at the ends of an edge by the given change of the phase.
+    """
     weight = _edge_weights(directions).reshape(-1)
     corner = np.arange(len(weight))
     has_twin = gluing.twin >= 0
     weight = weight + np.where(has_twin, weight[gluing.twin], 0)
-    # Each edge once. At singular vertices, both triangles have nodes of their own.
+    # Take each edge once. If it ends at a singular vertex, take it for both triangles, whose nodes differ.
     cut = covering.is_singular | covering.is_singular[gluing.next_corner]
     tail = np.flatnonzero(~has_twin | (corner < gluing.twin) | cut)
     head = gluing.next_corner[tail]

@@ -1,4 +1,7 @@
-"""`Surface`: a polygon mesh as flat arrays, with its triangles, normals and smooth fans."""
+"""`Surface`: a polygon mesh as flat arrays, with its triangles, its normals and its smooth fans.
+
+A *smooth fan* is a set of corners at a vertex that share a normal: no sharp edge lies between their faces.
+"""
 
 from __future__ import annotations
 
@@ -37,13 +40,13 @@ from .up_axis import UP_AXIS_BY_SUFFIX, UP_AXIS_MATRIX
 #: leave the range of floating-point numbers.
 MAX_COORDINATE, MIN_EXTENT = 1e12, 1e-12
 
-#: Largest difference, in each component, at which a corner normal equals the mean of its fan.
+#: A corner normal counts as equal to the mean of its fan if no component differs by more than this.
 NORMAL_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class Surface:
-    """A polygon mesh, on which fields are made and drawn.
+    """A polygon mesh on which fields are made and drawn.
 
     It has V vertices, F faces, C corners (face-vertex pairs) and T triangles. The corners of face f are
     ``face_start[f] .. face_start[f + 1] - 1``, counter-clockwise about the outward normal, as in
@@ -52,26 +55,27 @@ class Surface:
     Parameters
     ----------
     vertices : (V, 3) array_like, path-like or mesh
-        Positions; (V, 2) for a flat mesh. Or, without `faces`, a file (``.obj``, ``.off``, ``.ply``,
-        ``.stl``, or a file of a simulation, such as ``.vtu``), or a mesh of meshio, PyVista, trimesh
-        (or its scene) or Open3D.
+        Positions of the vertices; (V, 2) for a flat mesh. If `faces` is not given: the path of a file
+        (``.obj``, ``.off``, ``.ply``, ``.stl``, or a file of a simulation, such as ``.vtu``), or a mesh
+        object of meshio, PyVista, trimesh (or a scene of trimesh) or Open3D.
     faces : (F, k) array_like of int, or sequence of sequences of int, optional
         Vertices of each face, counter-clockwise about the outward normal.
     name : str, optional
-        For messages; by default the path of the file, or "surface".
+        Name in messages; by default the path of the file, or "surface" if there is no file.
     up : {"y", "z"}, optional
         The axis that points up in pictures. By default "y" for ``.obj`` and ``.off`` files, otherwise
         "z".
     uv : (V, 2) or (C, 2) array_like, optional
-        Texture coordinates of the vertices, or of the corners, face by face. Files in ``.obj`` format
-        and meshes of trimesh, PyVista and Open3D can have their own.
+        Texture coordinates of the vertices, or of the corners, face by face. By default those of the
+        ``.obj`` file or of the mesh of trimesh, PyVista or Open3D, if it has any.
     sharp_angle : float, optional
         Angle in radians between the normals of two faces above which their edge is sharp. Field values
         and normals do not mix across sharp edges. By default 60 degrees.
     sharp_edges : (E, 2) array_like of int, optional
-        Pairs of vertices, further sharp edges.
+        Pairs of vertices: edges that are sharp regardless of their angle.
     step : int, optional
-        Number of the step in the file of a simulation with several, from 1. By default the last one.
+        Number of the time step to read if the file of a simulation has several, counted from 1. By default
+        the last step.
 
     Attributes
     ----------
@@ -90,10 +94,11 @@ class Surface:
     corner_normal : (C, 3) float64 ndarray
         Unit shading normals.
     corner_fan : (C,) int32 ndarray
-        Smooth fan of each corner. The corners of a fan share a vertex and a smooth normal, and
-        field values are averaged over them. Sharp edges and flat faces separate fans.
+        Index of the smooth fan of each corner. The corners of a fan share a vertex and a smooth normal,
+        and field values are averaged over them. Sharp edges and faces with flat shading separate fans.
     rest_vertices : (V, 3) float64 ndarray or None
-        Positions before deformation, which field vectors refer to; None if not deformed.
+        Positions before deformation; None if the mesh is not deformed. The vectors of a field are tangent
+        to this shape.
     up : {"y", "z"}
         The axis that points up in pictures.
 
@@ -130,8 +135,8 @@ class Surface:
     rest_vertices: np.ndarray | None = None
     up: str = "z"
 
-    #: The file that it was read from. Like `uv` and the arrays below, it is no field of the dataclass, so
-    #: other processes do not get it.
+    #: Path of the file that the surface was read from. Like `uv` and the arrays below, this is not a field of
+    #: the dataclass, so it is not passed to other processes.
     _path = None
 
     def __init__(
@@ -172,7 +177,7 @@ class Surface:
         )
 
     def with_parts(self, **parts: Any) -> Surface:
-        """Return the surface with other values of some attributes, which must fit the rest."""
+        """Return a copy of the surface in which some attributes are replaced; they must fit the others."""
         own = {each.name: getattr(self, each.name) for each in fields(self)}
         return _surface_of_parts(**{**own, **parts})
 
@@ -183,7 +188,7 @@ class Surface:
 
     @property
     def faces(self) -> np.ndarray | list[np.ndarray]:
-        """(F, k) int32: the vertices of each face; a list of arrays if faces have different sizes."""
+        """The vertices of each face: (F, k) int32, or a list of F arrays if faces have different sizes."""
         sizes = np.diff(self.face_start)
         if (sizes == sizes[0]).all():
             return self.corner_vertex.reshape(-1, sizes[0])
@@ -191,73 +196,79 @@ class Surface:
 
     @cached_property
     def uv(self) -> np.ndarray | None:
-        """(C, 2) float64: texture coordinates of the corners, face by face; None without a UV map."""
+        """(C, 2) float64: texture coordinates of the corners, face by face; None if there is no UV map."""
         return None if self._path is None else read_uv_map(self._path)
 
     @cached_property
     def vertex_data(self) -> Mapping[str, np.ndarray]:
-        """Arrays of V rows by their names, from a ``.ply`` file, a simulation or the mesh of a library."""
+        """Named arrays with a row for each vertex, from a ``.ply`` file, a simulation or a mesh object.
+
+        Mesh objects are those of other libraries, such as PyVista.
+        """
         return {} if self._path is None else read_vertex_data(self._path)
 
     @cached_property
     def face_data(self) -> Mapping[str, np.ndarray]:
-        """Arrays of F rows by their names, from the file of a simulation or the mesh of a library."""
+        """Named arrays with a row for each face, from the file of a simulation or a mesh object.
+
+        Mesh objects are those of other libraries, such as PyVista.
+        """
         return {}
 
     @cached_property
     def face_frames(self) -> tuple[np.ndarray, np.ndarray]:
-        """The tangent frame of each face: x along its first edge, and y, a quarter turn from it.
+        """The tangent frames x, y of the faces: x along the first edge of a face, y a quarter turn from x.
 
-        Both are (F, 3) float64. `Field.angles` are measured from x. The frames are those of
+        Both are (F, 3) float64. `Field.angles` are measured from x. The frames are the same as those of
         ``igl.local_basis``.
         """
         return face_frames(self)
 
     @property
     def euler_characteristic(self) -> int:
-        """V - E + F: 2 for a sphere, 0 for a torus. Vertices without a face do not count."""
+        """Number of vertices - edges + faces: 2 for a sphere, 0 for a torus. Unused vertices do not count."""
         edges = build_edges(self.corner_vertex, self.face_start)
         return len(self.used_vertices) - len(edges.face_count) + self.face_count
 
     def in_rest_shape(self) -> Surface:
-        """Return the surface before deformation, to which field vectors refer."""
+        """Return the surface before deformation, in the shape to which the vectors of a field are tangent."""
         if self.rest_vertices is None:
             return self
         return self.with_vertices(self.rest_vertices)
 
     def with_vertices(self, vertices: np.ndarray) -> Surface:
-        """Return the surface with (V, 3) other positions, without a rest shape.
+        """Return the surface with other (V, 3) positions, and without a rest shape.
 
-        The normals stay as they are.
+        Shading normals do not change.
         """
         return self.with_parts(vertices=vertices, rest_vertices=None)
 
     @cached_property
     def rest_shape_key(self) -> bytes:
-        """A hash of the rest shape and its triangles, equal for all deformations of a mesh."""
+        """A hash of the rest shape and its triangles. It is the same for all deformations of a mesh."""
         rest = self.in_rest_shape().vertices
         return content_hash(rest, self.corner_vertex, self.face_start, self.triangles)
 
     @cached_property
     def extent(self) -> float:
-        """The longest side of the bounding box, in Blender units; see `box_corners`."""
+        """Length of the longest side of the bounding box in object space; see `box_corners`."""
         return float(np.ptp(self.box_corners, axis=0).max())
 
     @cached_property
     def mean_edge_length(self) -> float:
-        """The mean length of the edges of the faces, in Blender units."""
+        """Mean length of the sides of all faces, in object space. An edge of two faces counts twice."""
         corners = self.vertices[self.corner_vertex]
         edge = corners[self.next_corner] - corners
         return float(np.sqrt(dot(edge, edge)).mean())
 
     @cached_property
     def used_vertices(self) -> np.ndarray:
-        """(n,) intp: the vertices that have a face, in ascending order."""
+        """(n,) intp: the vertices that belong to a face, in ascending order."""
         return _used_vertices(self.corner_vertex, len(self.vertices))
 
     @cached_property
     def box_corners(self) -> np.ndarray:
-        """(8, 3) float64: corners of the bounding box; vertices without a face are ignored."""
+        """(8, 3) float64: corners of the bounding box of all vertices that belong to a face."""
         return box_corners(self.vertices[self.used_vertices])
 
     @cached_property
@@ -267,22 +278,22 @@ class Surface:
 
     @cached_property
     def next_corner(self) -> np.ndarray:
-        """(C,) int32: the following corner around the same face."""
+        """(C,) int32: for each corner, the next corner of the same face, counter-clockwise."""
         return next_corners(self.face_start)
 
     @cached_property
     def triangle_vertex(self) -> np.ndarray:
-        """(T, 3) int32: the vertex indices of the triangles."""
+        """(T, 3) int32: the three vertices of each triangle."""
         return self.corner_vertex.take(self.triangles)
 
     @cached_property
     def fan_normal(self) -> np.ndarray:
-        """(K, 3) float64: the unit mean of the corner normals of each of the K fans."""
+        """(K, 3) float64: normalized mean of the corner normals of each of the K smooth fans."""
         return normalize(sum_per_fan(self.corner_normal, self.corner_fan))
 
     @cached_property
     def fans_share_normals(self) -> bool:
-        """Whether all corner normals equal the normal of their fan; custom normals may differ."""
+        """Whether all corner normals equal the mean normal of their fan; custom normals may differ."""
         normals = self.fan_normal
         return all(
             np.abs(self.corner_normal[block] - normals.take(self.corner_fan[block], axis=0)).max()
@@ -292,7 +303,7 @@ class Surface:
 
     @cached_property
     def face_normal(self) -> np.ndarray:
-        """(F, 3) float64 unit normals by Newell's formula; zero for a face without area."""
+        """(F, 3) float64: unit normals of the faces by Newell's formula; zero for a face without area."""
         return normalize(face_area_vectors(self.vertices, self.corner_vertex, self.face_start))
 
     @cached_property
@@ -316,7 +327,7 @@ def build_surface(
     triangle_face: np.ndarray | None = None,
     rest_vertices: np.ndarray | None = None,
 ) -> Surface:
-    """Make a `Surface` from arrays, and compute the parts that are not given.
+    """Make a `Surface` from arrays, and compute the attributes that are not given.
 
     Parameters
     ----------
@@ -327,16 +338,17 @@ def build_surface(
     sharp_edges : (E, 2) array_like of int, optional
         Vertex pairs across which normals and field values do not mix.
     sharp_angle : float, optional
-        Angle between face normals in radians. Edges with a larger angle are also sharp.
+        Edges with a larger angle between the normals of their faces, in radians, are also sharp.
     flat_faces : (F,) array_like of bool, optional
         Faces with flat shading, which do not share normals or field values with other faces.
     corner_normal : (C, 3) array_like, optional
-        Shading normals. If not given, the face normals averaged over each fan, weighted by angle.
+        Shading normals. By default the face normals averaged over each smooth fan, weighted by corner angle.
     corner_fan : (C,) array_like of int, optional
         The result of `smooth_fans`, if it is known.
     triangles, triangle_face : (T, 3) and (T,) array_like of int, optional
         The result of `triangulate`, if it is known.
     rest_vertices : (V, 3) array_like, optional
+        Positions before deformation, if the mesh is deformed.
 
     Returns
     -------
@@ -376,14 +388,14 @@ def build_surface(
 
 
 def _surface_of_parts(**parts: Any) -> Surface:
-    """Return a surface with these attributes."""
+    """Return a surface with the given attributes, without the work of `Surface.__init__`."""
     surface = object.__new__(Surface)
     vars(surface).update(parts)
     return surface
 
 
 def _used_vertices(corner_vertex: np.ndarray, vertex_count: int) -> np.ndarray:
-    """Return (n,) intp, the vertices that a corner refers to, in ascending order."""
+    """Return the (n,) intp vertices that belong to at least one corner, in ascending order."""
     return np.flatnonzero(mask(vertex_count, corner_vertex))
 
 
@@ -412,10 +424,10 @@ def face_frames(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 
 
 def count_inconsistent_edges(surface: Surface) -> int:
-    """Count the edges between two faces that disagree on which side is out.
+    """Count the inconsistent edges: those between two faces that disagree on which side is outward.
 
-    Faces without area are ignored. Fields are cut along such edges. Flipping faces removes them,
-    except on nonorientable surfaces such as a Möbius strip.
+    Faces without area are ignored. A field is not continued across such an edge. Flipping faces removes
+    inconsistent edges, except on nonorientable surfaces such as a Möbius strip.
     """
     edges = build_edges(surface.corner_vertex, surface.face_start)
     degenerate = ~surface.face_normal.any(axis=1)
@@ -427,7 +439,7 @@ def count_inconsistent_edges(surface: Surface) -> int:
 
 
 def orientation_warning(surface: Surface) -> str:
-    """Return the warning to show for inconsistently oriented faces; empty if there are none."""
+    """Return the warning to show for inconsistently oriented faces; an empty string if there are none."""
     count = count_inconsistent_edges(surface)
     if not count:
         return ""
@@ -441,7 +453,7 @@ def orientation_warning(surface: Surface) -> str:
 def _check_polygons(
     name: str, vertices: np.ndarray, corner_vertex: np.ndarray, face_start: np.ndarray
 ) -> None:
-    """Raise an error unless the arrays of `build_surface` are a valid mesh with faces."""
+    """Raise a `RosyError` unless the arrays for `build_surface` describe a valid mesh with faces."""
     if len(face_start) < 2:
         raise RosyError(f"{name}: the mesh has no faces")
     corner_counts = np.diff(face_start)
@@ -470,7 +482,7 @@ def _check_polygons(
 
 
 def have_same_polygons(first: Surface, second: Surface) -> bool:
-    """Return whether the faces of two meshes have the same vertices, wherever these are."""
+    """Return whether two meshes have the same faces by vertex index. Positions may differ."""
     return (
         len(first.vertices) == len(second.vertices)
         and np.array_equal(first.corner_vertex, second.corner_vertex)

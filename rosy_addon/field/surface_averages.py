@@ -1,4 +1,4 @@
-"""Averages of face values at the nodes of a surface, back on the faces, and over lengths."""
+"""Averages of the values on faces: at the vertices, back on the faces, and smoothed over a given distance."""
 
 from __future__ import annotations
 
@@ -13,23 +13,25 @@ from .representation import complex_bincount
 from .sparse_multigrid import CSRMatrix
 from .surface import Surface
 
-#: Relative residual norm at which conjugate gradients stop.
+#: Relative norm of the residual at which the conjugate gradient method stops.
 AVERAGE_TOLERANCE = 1e-2
 
-#: Largest number of steps of conjugate gradients.
+#: Largest number of steps of the conjugate gradient method.
 MAX_STEPS = 500
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceAverages:
-    """Averages of representations on the faces at the n nodes of a connection, and the way back.
+    """Operators that average RoSy representations from F faces to n nodes, and from nodes to faces.
+
+    The nodes are those of a `Connection`: the vertices, with several nodes for a nonmanifold vertex.
 
     Attributes
     ----------
     surface : Surface
     connection : Connection
     x, y : (F, 3) float64 ndarray
-        Frames of the faces.
+        Tangent frames of the faces.
     """
 
     surface: Surface
@@ -39,10 +41,11 @@ class SurfaceAverages:
 
     @cached_property
     def frame_angle(self) -> np.ndarray:
-        """(3 T,) float64 angles that convert directions at the nodes to the frames of the faces.
+        """(3 T,) float64: angle to add to a direction at a node to express it in the frame of a face.
 
-        For each corner of a triangle, the angle in radians to add to a direction in the map of its node.
-        The bisector of a corner is the same direction in the polar map of the node and on the face.
+        There is one angle in radians for each corner of a triangle. Directions at the node of the corner are
+        angles in polar coordinates (the polar map of `Connection`). The added angle is chosen so that the
+        bisector of the corner is the same direction in both.
         """
         surface = self.surface
         angle = np.empty(surface.triangle_vertex.shape)
@@ -66,32 +69,32 @@ class SurfaceAverages:
 
     @cached_property
     def corner_area(self) -> np.ndarray:
-        """(3 T,) float64: a third of the area of the triangle of each corner."""
+        """(3 T,) float64: for each corner, a third of the area of its triangle."""
         return np.repeat(self.connection.area / 3, 3)
 
     @cached_property
     def mass(self) -> np.ndarray:
-        """(n,) float64 masses of the nodes, all positive."""
+        """(n,) float64: the mass of each node (a third of the area of its triangles), always positive."""
         return self.connection.positive_mass
 
     def node_sums(
         self, values: np.ndarray, degree: int, corner: np.ndarray | slice = slice(None)
     ) -> np.ndarray:
-        """Integrate face values around the nodes.
+        """Sum face values at the nodes, weighted by a third of the area of each triangle around the node.
 
         Parameters
         ----------
         values : (F,) ndarray
-            Representations in the frames of the faces.
+            RoSy representations in the frames of the faces; real numbers if `degree` is 0.
         degree : int
             N of the representations; 0 for real numbers.
         corner : (m,) int ndarray or slice
-            Corners of triangles that are taken into account.
+            Corners of triangles that are included in the sums; all by default.
 
         Returns
         -------
         (n,) ndarray
-            Complex if the degree is not 0.
+            Sums in the polar maps of the nodes; complex if the degree is not 0.
         """
         terms = self.corner_area[corner] * values[self.corner_face[corner]]
         node, count = self.connection.corner_node[corner], self.connection.node_count
@@ -101,7 +104,11 @@ class SurfaceAverages:
         return complex_bincount(node, terms * to_node, count)
 
     def face_sums(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """Return (F,) complex128, the sum of (n,) node values at triangle corners, weighted by triangle areas."""
+        """Return (F,) complex128 sums of (n,) node values at the triangle corners of each face.
+
+        Node values are representations of `degree`, and are converted to the frame of the face. Each is
+        weighted by the area of its triangle.
+        """
         area = self.connection.area
         weighted = np.empty((len(area), 3), dtype=np.complex128)
         node, frame_angle = (
@@ -118,13 +125,17 @@ class SurfaceAverages:
         return complex_bincount(surface.triangle_face, weighted.sum(axis=1), surface.face_count)
 
     def face_means(self, values: np.ndarray, degree: int) -> np.ndarray:
-        """Return (F,) complex128, mean of the node values of a degree on each face."""
+        """Return (F,) complex128 means of (n,) node values on each face, weighted by triangle areas.
+
+        Node values are representations of `degree`, and are converted to the frame of the face. The mean is 0
+        on faces without area.
+        """
         total, surface = self.face_sums(values, degree), self.surface
         area = np.bincount(surface.triangle_face, 3 * self.connection.area, surface.face_count)
         return np.divide(total, area, out=np.zeros_like(total), where=area > 0)
 
     def laplacian(self, degree: int) -> CSRMatrix:
-        """Return the matrix of `connection.laplacian` in single precision; real for degree 0."""
+        """Return the matrix of `connection.laplacian`, as complex64 (as float32 if the degree is 0)."""
         matrix = laplacian(self.connection, degree)
         if degree:
             return matrix.with_values(matrix.data.astype(np.complex64))
@@ -133,18 +144,20 @@ class SurfaceAverages:
     def smooth(
         self, matrix: CSRMatrix, area: float, sums: np.ndarray, start: np.ndarray | None = None
     ) -> np.ndarray:
-        """Solve (M + area L) z = sums by conjugate gradients, with M the masses and L the Laplacian.
+        """Smooth node values: solve (M + area L) z = sums by the conjugate gradient method.
+
+        M is the diagonal matrix of the masses of the nodes, and L the Laplacian.
 
         Parameters
         ----------
         matrix : CSRMatrix
-            L, from `laplacian`.
+            L, the result of `laplacian`.
         area : float
-            The square of the length of the average.
+            The square of the smoothing distance.
         sums : (n,) ndarray
             Result of `node_sums`.
         start : (n,) ndarray, optional
-            An estimate of the solution.
+            An estimate of the solution from which the iteration starts; zeros by default.
 
         Returns
         -------
@@ -155,7 +168,7 @@ class SurfaceAverages:
         scale = float(np.abs(sums).max())
         if scale < np.finfo(np.float64).tiny:
             return np.zeros_like(sums)
-        # All numbers are of order 1 after this, whatever the size of the mesh.
+        # Scale all numbers to order 1, so that single precision is enough for a mesh of any size.
         mass = (self.mass / self.mass.mean()).astype(np.float32)
         area = np.float32(area / self.mass.mean())
         diagonal = mass + area * matrix.diagonal.astype(np.float32)

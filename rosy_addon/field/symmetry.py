@@ -1,4 +1,4 @@
-"""The symmetry of a field: how many lines and covering sheets its N directions form."""
+"""The symmetry of a field: how many lines (pairs of opposite directions) its N directions form."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 class FieldSymmetry:
     """The symmetry of a field of N directions.
 
-    A direction and its opposite have the same streamlines, so they form one line. The members of a
-    RoSy have opposites if N is even. Directions that deviate from a RoSy have opposites if N is
-    even and all their harmonics have even order.
+    A direction and its opposite have the same streamlines, so they are called one *line* here. The N
+    directions of a RoSy (a rotationally symmetric field) include their opposites if N is even. Directions
+    that deviate from a RoSy include their opposites if N is even and all harmonics have even order.
 
     Attributes
     ----------
@@ -32,16 +32,17 @@ class FieldSymmetry:
 
     @property
     def line_count(self) -> int:
-        """M, the number of lines through a point: N / 2 with opposites, N otherwise."""
+        """M, the number of lines through a point: N / 2 if the field has opposites, N otherwise."""
         return self.degree // 2 if self.has_opposites else self.degree
 
     @property
     def sheets_per_turn(self) -> int:
-        """Number of covering sheets in a full turn of 2 pi.
+        """Number of sheets of the covering surface that a full turn of 2 pi passes.
 
-        It is 2 M for a RoSy. With odd N, the opposite of a member lies halfway between two members,
-        so both orientations of the lines are evenly spaced. It is N for directions that have no
-        opposites and are not a RoSy, because their opposites are not evenly spaced.
+        The covering surface contains each point of the surface once for each direction in which a streamline
+        can pass it, on a separate *sheet*. There are 2 M sheets: forward and backward for each of the M lines
+        (see `line_count`). A full turn passes all of them if the field is a RoSy or has opposites. Otherwise
+        it passes only the N forward or only the N backward sheets.
         """
         if self.harmonic_orders and not self.has_opposites:
             return self.degree

@@ -9,10 +9,10 @@ import numpy as np
 #: Largest sine of the turning angle at a flat corner. Reflex corners have negative sines.
 COLLINEAR_SINE = 1e-6
 
-#: Corners that are compared with a triangle at once.
+#: Number of corners that are compared with a triangle at once.
 CHUNK_SIZE = 512
 
-#: Faces whose corners are compared at once.
+#: Number of faces whose corners are processed at once.
 FACES_PER_BLOCK = 1 << 14
 
 
@@ -21,29 +21,31 @@ def triangulate(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Split each face with k corners into k - 2 triangles, in the order of the faces.
 
-    Triangles of a concave face lie inside it, and collinear corners cause no triangles without
+    The triangles of a concave face lie inside the face, and collinear corners do not cause triangles without
     area. Faces are projected along their Newell normal. Self-intersecting faces are also split, but
     their triangles may overlap.
 
     Parameters
     ----------
     vertices : (V, 3) float64 ndarray
+        Positions of the vertices.
     corner_vertex : (C,) int32 ndarray
+        Vertex of each corner.
     face_start : (F + 1,) int32 ndarray
+        First corner of each face, and C.
 
     Returns
     -------
     triangles : (T, 3) int32 ndarray
-        Corner indices.
+        Indices of the three corners of each triangle.
     triangle_face : (T,) int32 ndarray
-        Face of each triangle, ascending.
+        Face of each triangle, in ascending order.
 
     Notes
     -----
-    Convex faces become a fan around their first corner. A face with a single flat or reflex corner
-    becomes a fan around that corner. All other corners are visible from it, because shortest paths
-    inside a polygon bend only at reflex corners. The remaining faces, usually few, are ear-clipped
-    in a Python loop.
+    A convex face becomes a fan around its first corner. A face with a single flat or reflex corner becomes
+    a fan around that corner. All other corners are visible from it, because shortest paths inside a polygon
+    bend only at reflex corners. The remaining faces, usually few, are ear-clipped in a Python loop.
     """
     size = np.diff(face_start)
     apex = np.zeros(len(size), dtype=np.int32)
@@ -60,7 +62,10 @@ def triangulate(
 
 
 def _triangle_fans(face_start: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return `triangles` and `triangle_face` of fans around (F,) `apex`, a corner of each face, from 0."""
+    """Return `triangles` and `triangle_face` (see `triangulate`) if each face is split into a fan.
+
+    `apex` holds, for each of F faces, the corner around which the fan is, counted from 0 within the face.
+    """
     size = np.diff(face_start)
     count = size - 2
     triangle_face = np.repeat(np.arange(len(size), dtype=np.int32), count)
@@ -88,8 +93,9 @@ def _fan_apexes(
     Returns
     -------
     apex : (n,) int32 ndarray
-        Corner within each face, from 0.
+        Corner around which the fan is, counted from 0 within each face.
     needs_ears : (n,) bool ndarray
+        Whether the face cannot be split into a fan and needs ear clipping.
     """
     size = np.diff(face_start)[faces]
     apex = np.zeros(len(faces), dtype=np.int32)
@@ -110,7 +116,10 @@ def _fan_apexes(
 
 
 def _corner_sines(points: np.ndarray) -> np.ndarray:
-    """Return (F, k) sines of the turning angles of (F, k, 3) polygons; negative at reflex corners."""
+    """Return the (F, k) sines of the exterior angles at the corners of (F, k, 3) polygons.
+
+    They are negative at reflex corners.
+    """
     edge = np.roll(points, -1, axis=1) - points
     previous_edge = np.roll(edge, 1, axis=1)
     relative = points - points[:, :1]
@@ -122,7 +131,7 @@ def _corner_sines(points: np.ndarray) -> np.ndarray:
 
 
 def _project_to_plane(points: np.ndarray) -> np.ndarray:
-    """Return (k, 2) corners of a polygon projected along its normal, in counter-clockwise order."""
+    """Return the (k, 2) corners of a polygon projected along its normal, which are counter-clockwise."""
     relative = points - points[0]
     normal = np.cross(relative, np.roll(relative, -1, axis=0)).sum(axis=0)
     axis = np.zeros(3)
@@ -145,20 +154,20 @@ def _ear_clip(points: np.ndarray) -> np.ndarray:
     Returns
     -------
     (k - 2, 3) int ndarray
-        Indices of points.
+        Indices of the three points of each triangle.
 
     Notes
     -----
-    Candidates are in a heap by quality. A candidate that turns out to contain a corner cannot be an
-    ear before that corner is cut off, so it waits until then. The time is nearly linear in k unless
-    many corners are near each other along both axes.
+    Candidates for ears are kept in a heap, sorted by the smallest angle of their triangle. If the triangle
+    of a candidate contains a corner, it cannot be an ear before that corner is cut off, so it waits until
+    then. The time is nearly linear in k unless many corners are near each other along both axes.
     """
     count = len(points)
     previous = [count - 1, *range(count - 1)]
     following = [*range(1, count), 0]
     remaining = _RemainingCorners(points)
     quality = _smallest_sine(points[previous], points, points[following])
-    # Entries of a corner are valid if they have its current version.
+    # An entry of the heap is valid if its version is the current version of its corner.
     version = [0] * count
     candidates = [(-value, corner, 0) for corner, value in enumerate(quality.tolist())]
     heapq.heapify(candidates)
@@ -166,7 +175,7 @@ def _ear_clip(points: np.ndarray) -> np.ndarray:
     waiting: dict[int, list[tuple[float, int, int]]] = {}
     triangles = []
     while len(triangles) < count - 3:
-        # A self-intersecting polygon may have no ear; then take the triangle of best quality.
+        # A self-intersecting polygon may have no ear. Then cut off the triangle of best quality.
         is_candidate = bool(candidates)
         entry = heapq.heappop(candidates if is_candidate else blocked)
         _, corner, entry_version = entry
@@ -206,22 +215,22 @@ class _RemainingCorners:
         self._sort()
 
     def _sort(self) -> None:
-        """Sort the remaining corners."""
+        """Sort the remaining corners along both axes."""
         corners = np.flatnonzero(self._alive)
         self._order = [corners[np.argsort(self._points[corners, axis])] for axis in (0, 1)]
         self._coordinate = [self._points[self._order[axis], axis] for axis in (0, 1)]
 
     def remove(self, corner: int) -> None:
-        """Remove a corner that is cut off."""
+        """Remove a corner that has been cut off."""
         self._alive[corner] = False
         self._alive_count -= 1
         if 2 * self._alive_count < len(self._order[0]):
             self._sort()
 
     def first_inside(self, a: int, b: int, c: int) -> int | None:
-        """Return a corner in or on the triangle of three corners, or None.
+        """Return a remaining corner in or on the triangle of the corners a, b and c; None if there is none.
 
-        Corners with the position of one of the three do not count.
+        Corners at the same position as a, b or c do not count.
         """
         triangle = self._points[[a, b, c]]
         low, high = triangle.min(axis=0), triangle.max(axis=0)
@@ -231,7 +240,7 @@ class _RemainingCorners:
             stop = np.searchsorted(self._coordinate[axis], high[axis], "right")
             slices.append(self._order[axis][start:stop])
         nearby = min(slices, key=len)
-        # Most triangles that contain a corner contain one among the first.
+        # Test in chunks: most triangles that contain a corner contain one of the first chunk.
         for first in range(0, len(nearby), CHUNK_SIZE):
             corners = nearby[first : first + CHUNK_SIZE]
             corners = corners[self._alive[corners]]
@@ -248,12 +257,12 @@ class _RemainingCorners:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return (...) z components of the cross products of (..., 2) vectors."""
+    """Return the (...) z components of the cross products of (..., 2) vectors."""
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 def _smallest_sine(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Return (k,) smallest sines of the angles of triangles; negative for clockwise triangles."""
+    """Return the smallest sine of the angles of each triangle; it is negative for clockwise triangles."""
     area = _cross(b - a, c - a)
     ab, bc, ca = (np.linalg.norm(side, axis=1) for side in (b - a, c - b, a - c))
     scale = ab * bc * ca / np.maximum(np.minimum(np.minimum(ab, bc), ca), 1e-300)

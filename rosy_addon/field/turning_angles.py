@@ -1,13 +1,15 @@
-"""Compute the angles by which a field turns from face to face, from its singularities.
+"""Compute the angles by which a field turns across mesh edges, given the indices of its singularities.
 
-Beyond parallel transport, a field turns by some angle from each face to the next. Around a vertex, these angles
-and the angle defect add up to the singularity index. So the angles of a field with given indices satisfy a
-linear equation for each interior vertex. On surfaces with handles or with several borders, there is also an
-equation for each loop that cannot be contracted to a vertex.
+Across each interior edge, a field turns relative to parallel transport. This is its *turning angle* at the
+edge. The turning angles around a vertex, plus the angle defect of the vertex, add up to 2 pi times the
+singularity index. So a field with given indices satisfies one linear equation for each interior vertex. On
+surfaces with handles or with several borders, there is one more equation for each loop of faces that cannot
+be contracted to a vertex: around it, the field may turn by any multiple of 2 pi / N in total.
 
-The angles of least squares are the sum of the gradient of a potential at the vertices, which solves a Poisson
-equation on the triangles (`face_graph.TriangleGraph`), and of a harmonic part for each loop. Around a loop, the
-field may turn by any multiple of 2 pi / N. The multiples of least energy are chosen.
+The solution with the least weighted sum of squares is a sum of two parts. The first is the gradient of a
+potential at the vertices, which solves a Poisson equation on the triangles (`face_graph.TriangleGraph`). The
+second is a combination of harmonic angles, one set for each loop. The multiples of 2 pi / N around the loops
+are chosen so that this sum of squares, the *energy*, is small.
 """
 
 from __future__ import annotations
@@ -28,23 +30,24 @@ from .surface import Surface
 #: Residual norm at which the solver stops, relative to the norm of the right-hand side.
 TOLERANCE = 1e-10
 
-#: Attempts to keep the field from turning too fast between two faces, and the angle up to which edges
-#: are left alone, relative to half the angle between two members.
+#: A field may not turn by pi / N or more between two faces. Number of attempts to reduce larger angles, and
+#: the fraction of pi / N up to which the angle at an edge needs no reduction.
 MAX_ATTEMPTS, ANGLE_MARGIN = 24, 0.8
 
-#: Number of edges around too fast ones where the angles change at an attempt.
+#: An attempt changes the angles at all edges within this number of edges of an edge with too large an angle.
 REACH = 16
 
-#: Least angle that is left to add, relative to half the angle between two members.
+#: Smallest limit for an added angle, as a fraction of pi / N (if the present angle nearly uses up pi / N).
 MIN_ROOM = 1e-6
 
-#: Largest change of the angle around a loop that is a rounding error, in radians.
+#: Largest change of the sum of the angles around a loop that counts as a rounding error, in radians.
 MAX_LOOP_CHANGE = 1e-6
 
-#: Least eigenvalue of the matrix of the loops, relative to the largest one. Smaller ones are rounding errors.
+#: Smallest eigenvalue of the matrix of the loops, relative to the largest eigenvalue. Smaller eigenvalues are
+#: rounding errors and are replaced by it.
 MIN_EIGENVALUE = 1e-8
 
-#: Number of loops up to which their multiples are also changed in pairs.
+#: With at most this number of loops, the search also changes the multiples of 2 pi / N of two loops at once.
 MAX_PAIRED_LOOPS = 20
 
 
@@ -55,28 +58,29 @@ def turning_angles(
     required: np.ndarray,
     present: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Compute angles at the edges that have given sums around the vertices.
+    """Compute turning angles at the interior edges that have given sums around the vertices.
 
     Parameters
     ----------
     surface : Surface
     graph : FaceGraph
-        Graph of its faces.
+        Graph of the faces of the surface. Its n nodes are the vertices (several for a nonmanifold vertex).
     degree : int
         N.
     required : (n,) ndarray
         Sums of the angles around interior nodes, in radians; values at other nodes are ignored.
     present : (I,) ndarray or float
-        Angles of a field to which these are added.
+        Turning angles of an existing field, to which the result will be added, in radians.
 
     Returns
     -------
     angle : (I,) float64 ndarray
-        Angles of least squares. Around a loop, these angles, the present angles and the unfolding add up to
-        a multiple of 2 pi / N. Where a field would turn by pi / N or more between two faces, the angles are
-        reduced, if that is possible.
+        Angles in radians with the least weighted sum of squares. Around each loop, these angles, the present
+        angles and the angles between the frames of neighboring faces add up to a multiple of 2 pi / N. Where
+        the field would turn by pi / N or more between two faces, the angles are reduced, if possible.
     direction : (F,) float64 ndarray
-        Direction of the field that turns by these angles, in radians in the frames of the faces.
+        Direction on each face of the field that turns by the present angles plus these angles, in radians in
+        the frame of the face.
     """
     triangles = triangle_graph(surface, graph)
     present_between = triangles.on_triangles(present)
@@ -102,7 +106,7 @@ def turning_angles(
                 changed = triangles.graph.conductance * least_angles(
                     triangles.graph, degree, required, loops, present_between
                 )
-        # Resistance is of angles between triangles.
+        # The resistances apply to the angles between triangles, not to those from triangles to face centers.
         is_changed = changed != between
         to_center[triangles.graph.source[is_changed]] = 0
         to_center[triangles.graph.target[is_changed]] = 0
@@ -118,10 +122,10 @@ def _least_angles_near(
     angle: np.ndarray,
     changed: np.ndarray,
 ) -> np.ndarray | None:
-    """Return (I,) angles of least squares near changed edges, where the other angles stay.
+    """Return (I,) least-squares angles that differ from `angle` only near the edges `changed`.
 
-    The result is None if the angles around loops would change. That happens if the neighborhoods of the edges
-    surround a part of the surface.
+    The result is None if the sum of the angles around a loop would change. That can happen if the changed
+    neighborhood surrounds a part of the surface.
     """
     is_near = np.zeros(graph.node_count, dtype=bool)
     is_near[graph.tail[changed]] = is_near[graph.head[changed]] = True
@@ -152,9 +156,10 @@ def _least_angles_near(
 
 
 def added_resistance(angle: np.ndarray, present: np.ndarray | float, limit: float) -> np.ndarray:
-    """Return (I,) factors to multiply the resistance of edges with, where angles are too large.
+    """Return (I,) factors for the resistances of edges, which make angles smaller where they are too large.
 
-    `angle` is added to the `present` angles. Factors are 1 where the sum is clearly below the limit.
+    The resistance of an edge is its weight in the sum of squares. `angle` is added to the `present` angles.
+    Factors are 1 where the sum of both is clearly below `limit`, and greater elsewhere.
     """
     room = np.maximum(limit - np.sign(angle) * present, MIN_ROOM * limit)
     return np.maximum(np.abs(angle) / (ANGLE_MARGIN * room), 1) ** 2
@@ -167,7 +172,10 @@ def least_angles(
     loops: list[tuple[np.ndarray, np.ndarray]],
     present: np.ndarray | float,
 ) -> np.ndarray:
-    """Return (I,) angles of least squares, divided by the conductances; see `turning_angles`."""
+    """Return (I,) least-squares angles divided by the conductances of the edges, for a graph of triangles.
+
+    `loops` is the result of `_loops`. For the other parameters, see `turning_angles`.
+    """
     with progress(0.0, 0.5):
         solver = potential_solver(graph)
     share = 0.5 / (len(loops) + 1)
@@ -200,7 +208,11 @@ def least_angles(
 def potential_solver(
     graph: FaceGraph, tolerance: float = TOLERANCE
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a solver: from (n,) sums of angles around the interior nodes, it computes the (n,) potential."""
+    """Return a function that solves the Poisson equation of a graph.
+
+    It takes the (n,) sums of angles around the interior nodes, in radians, and returns the (n,) potential at
+    the nodes.
+    """
     matrix = levels = None
     if graph.is_interior.any():
         with progress(0.0, 0.2):
@@ -221,10 +233,11 @@ def potential_solver(
 
 
 def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
-    """Return the Laplacian of potentials at interior nodes, which are 0 at the others.
+    """Return the Laplacian matrix of potentials at interior nodes. At all other nodes the potential is 0.
 
-    On closed components, the first node is tied to 0 as well; the sums of a solvable equation do not change
-    that node.
+    A closed component has no such nodes, so a constant could be added to its potential. To make the matrix
+    regular, the diagonal element of its first node is increased. This does not change the gradient of the
+    solution if the sums on the component add up to 0.
     """
     unknown = np.cumsum(graph.is_interior) - 1
     tail, head, conductance = graph.tail, graph.head, graph.conductance
@@ -240,11 +253,12 @@ def _potential_matrix(graph: FaceGraph) -> CSRMatrix:
 
 
 def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: float) -> np.ndarray:
-    """Return (m,) coefficients c of least energy for which matrix @ c equals the sums up to multiples of a turn.
+    """Return (m,) coefficients c that make the energy c @ matrix @ c small, given the sums matrix @ c.
 
-    The energy is c @ matrix @ c. The nearest multiples are found by rounding, then one by one and in
-    pairs as long as that reduces the energy. This ends: the inverse is made positive definite, so that only
-    finitely many multiples have less energy than the first ones.
+    The sums are given up to multiples of `turn`. These multiples are first found by rounding. They are then
+    changed by 1, one by one and in pairs, as long as that reduces the energy. The search ends because the
+    inverse of the matrix is made positive definite, so that only finitely many multiples have less energy
+    than the first ones.
     """
     eigenvalue, vector = np.linalg.eigh((matrix + matrix.T) / 2)
     largest = max(float(np.abs(eigenvalue).max()), 1e-300)
@@ -269,13 +283,14 @@ def _nearest_lattice_coefficients(matrix: np.ndarray, sums: np.ndarray, turn: fl
 
 
 def _loops(graph: FaceGraph, tree: SpanningForest) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Find loops of faces that no vertex can contract: edges that they cross, and 1 or -1 for each.
+    """Find the loops of faces that cannot be contracted to a vertex, by a tree-cotree decomposition.
 
-    They are closed by the edges that are neither in the spanning forest of the faces nor in one of the
-    vertices (the tree-cotree decomposition), where all border nodes of a component are one.
+    The result has, for each loop, the edges that it crosses, and the direction of each crossing as 1 or -1.
+    There is one loop for each edge that is neither in the spanning forest `tree` of the faces nor in a
+    spanning forest of the vertices. In the latter, all border nodes of a component count as one node.
     """
     rest = np.flatnonzero(~tree.has_edge)
-    # All border nodes of a component are the same node.
+    # All border nodes of a component count as the same node.
     node = np.arange(graph.node_count)
     component = graph.node_component
     border = np.flatnonzero(~graph.is_interior)

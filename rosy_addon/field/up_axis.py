@@ -1,14 +1,14 @@
-"""The upward axes of meshes in files. In world space, z points up."""
+"""The axis that points up in mesh files of each format. In world space, z points up."""
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Mesh space to world space, for each upward axis of a mesh.
+#: The matrix from mesh space to world space, for each upward axis of a mesh.
 UP_AXIS_MATRIX = {
     "y": np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]]),
     "z": np.eye(4),
 }
 
-#: The upward axis of mesh files by suffix, as Blender's importers assume it.
+#: The upward axis of mesh files by file suffix. Blender's importers assume the same axes.
 UP_AXIS_BY_SUFFIX = {".obj": "y", ".off": "y", ".ply": "z", ".stl": "z"}

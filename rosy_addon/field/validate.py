@@ -29,21 +29,21 @@ from .representation import (
 from .rosy_field import RosyField, check_degree
 from .surface import Surface
 
-#: Largest angle in degrees between a vector and the plane of its face or vertex. Larger angles mean
-#: that the field belongs to another mesh or another space. Rounding in text files causes about a
-#: thousandth of that on faces. Programs define vertex normals differently: on coarse meshes,
-#: angle-weighted and area-weighted normals differ by as much as that on vertices.
+#: Largest angle in degrees between a vector and the tangent plane of its face or vertex. Larger angles mean
+#: that the field belongs to another mesh or another space. On faces, rounding in text files causes only
+#: about a thousandth of this angle. On vertices, the angle allows for the different definitions of vertex
+#: normals: angle-weighted and area-weighted normals differ by this much on coarse meshes.
 TOLERANCE_DEG = {"face": 5.0, "vertex": 20.0}
 
 #: Largest fraction of the nonzero vectors that may exceed the tolerance, for example on needle
 #: faces whose normals are inaccurate.
 MAX_OUTLIER_FRACTION = 0.01
 
-#: Numbers of this modulus or more count as infinite. Products of the lengths of vectors would
+#: Values of at least this modulus count as infinite. Products of the lengths of longer vectors would
 #: overflow, and pictures are computed in single precision.
 MAX_COMPONENT = 1e30
 
-#: Vectors whose components are all smaller count as zero, because products would underflow.
+#: A vector counts as zero if all its components are smaller than this, because products would underflow.
 MIN_COMPONENT = 1e-30
 
 #: Sine of the angle off the tangent plane below which vectors are left unchanged. It is the
@@ -60,15 +60,16 @@ def validated_field(
     nonfinite: str = "error",
     domain: str | None = None,
 ) -> RosyField:
-    """Make a field from one member vector for each face or vertex, after checking them.
+    """Check one member vector for each face or vertex, and make a field from them.
 
-    Vectors slightly off the tangent plane are rotated into it and keep their length. Vertex values
-    are averaged onto the faces as RoSys (by their representations, not their member vectors).
+    Vectors slightly off the tangent plane are rotated into the plane and keep their length. Values at
+    vertices are averaged onto the faces in the RoSy representation. (A mean of member vectors would depend
+    on which of the N members are stored.)
 
     Parameters
     ----------
     surface : Surface
-        If it is deformed, the vectors belong to its rest shape.
+        If it is deformed, the vectors must be tangent to its rest shape.
     vectors : (F, 3) or (V, 3) array_like
         Member vectors in object space. The field is undefined where they are zero, and on faces
         without area.
@@ -77,10 +78,10 @@ def validated_field(
     source : str
         Name of the file or attribute, for messages.
     nonfinite : {"error", "zero"}
-        Raise an error if a vector is not finite, or treat it as undefined.
+        What to do if a vector is not finite: raise an error, or treat it as undefined.
     domain : {"face", "vertex"}, optional
-        The mesh elements of the vectors. If not given, it follows from their number; faces take
-        precedence.
+        The mesh elements to which the vectors belong. By default it is determined from the number of vectors,
+        and is "face" if the mesh has as many faces as vertices.
 
     Returns
     -------
@@ -89,8 +90,8 @@ def validated_field(
     Raises
     ------
     RosyError
-        If the number of vectors fits neither faces nor vertices, a vector is not finite, or more
-        than `MAX_OUTLIER_FRACTION` of them are off the tangent plane.
+        If the number of vectors is neither that of the faces nor that of the vertices, if a vector is not
+        finite, or if more than `MAX_OUTLIER_FRACTION` of the vectors are off the tangent plane.
     """
     degree = check_degree(degree)
     vectors = np.array(vectors, dtype=np.float64).reshape(-1, 3)
@@ -108,7 +109,10 @@ def validated_field(
 
 
 def _checked_domain(surface: Surface, count: int, domain: str | None, source: str) -> str:
-    """Return the domain of a number of vectors, or raise an error if the number does not fit."""
+    """Return the domain ("face" or "vertex") of `count` vectors, or raise an error if the count does not fit.
+
+    If `domain` is given, `count` must fit it.
+    """
     domain = infer_domain(surface, count) if domain is None else domain
     faces, vertices = surface.face_count, len(surface.vertices)
     if count != {"face": faces, "vertex": vertices}.get(domain):
@@ -127,28 +131,29 @@ def validated_directions(
     nonfinite: str = "error",
     domain: str | None = None,
 ) -> RosyField:
-    """Make a field from N directions for each face or vertex, after checking them.
+    """Check N directions for each face or vertex, and make a field from them.
 
-    The directions need not be a RoSy.
+    The directions need not be rotationally symmetric.
 
     Parameters
     ----------
     surface : Surface
+        If it is deformed, the directions must be tangent to its rest shape.
     directions : (n, N, 3) array_like
-        In object space, in any order. Where one of them is zero, the field is undefined.
+        Vectors in object space, in any order. Where one of the N vectors is zero, the field is undefined.
     source, nonfinite, domain
-        The same as in `validated_field`.
+        See `validated_field`.
 
     Returns
     -------
     RosyField
-        With `direction_ratios` if they are not a RoSy; see `field_from_directions`.
+        The field, with `direction_ratios` if the directions are not a RoSy; see `field_from_directions`.
 
     Raises
     ------
     RosyError
-        If the number of directions fits neither faces nor vertices, a direction is not finite, or more than
-        `MAX_OUTLIER_FRACTION` of them are off the tangent plane.
+        If the number of rows is neither that of the faces nor that of the vertices, if a direction is not
+        finite, or if more than `MAX_OUTLIER_FRACTION` of the directions are off the tangent plane.
     """
     directions = np.array(directions, dtype=np.float64)
     count, degree = len(directions), check_degree(directions.shape[1])
@@ -184,9 +189,10 @@ def validated_directions(
 
 
 def _average_directions(surface: Surface, directions: np.ndarray, normal: np.ndarray) -> RosyField:
-    """Average (V, N, 3) directions onto the faces, as means of z and of each harmonic.
+    """Return the field on the faces that is the mean of (V, N, 3) directions at the vertices.
 
-    (V, 3) `normal` are the vertex normals.
+    The mean is computed of the representation z and of each harmonic (see `directional_field`). `normal`
+    holds the (V, 3) vertex normals.
     """
     degree = directions.shape[1]
     x, y = tangent_frame(normal)
@@ -207,10 +213,11 @@ def _average_directions(surface: Surface, directions: np.ndarray, normal: np.nda
 def _vertex_averages(
     surface: Surface, normal: np.ndarray, face_x: np.ndarray
 ) -> Callable[[np.ndarray, int], np.ndarray]:
-    """Return a function that averages (V,) complex numbers of an order N onto the faces.
+    """Return a function that averages (V,) complex values at the vertices onto the faces.
 
-    They turn by exp(i N t) if a frame turns by -t. (V, 3) `normal` are the vertex normals, (F, 3) `face_x`
-    the x axes of the frames of the faces.
+    The second argument of the function is the order k of the values: if a tangent vector is rotated by t,
+    its value is multiplied by exp(i k t). `normal` holds the (V, 3) vertex normals, and `face_x` the (F, 3)
+    x axes of the frames of the faces.
     """
     corner_normal = normal[surface.corner_vertex]
     rotation = corner_rotations(surface.face_normal, face_x, surface.corner_face, corner_normal)
@@ -223,9 +230,9 @@ def _vertex_averages(
 
 
 def infer_domain(surface: Surface, count: int) -> str | None:
-    """Return the domain, "face" or "vertex", with `count` elements; None for neither.
+    """Return "face" or "vertex" if the mesh has `count` faces or vertices; None if it has neither.
 
-    Faces take precedence.
+    If the mesh has as many faces as vertices, it is "face".
     """
     if count == surface.face_count:
         return "face"
@@ -248,9 +255,9 @@ def tangent_normals(surface: Surface, domain: str) -> np.ndarray:
 
 
 def vertex_normals(surface: Surface) -> np.ndarray:
-    """Average the face normals around each vertex, weighted by corner angle.
+    """Return vertex normals: the face normals around each vertex, averaged with the corner angles as weights.
 
-    Sharp edges are ignored. The normals belong to `Surface.vertices`, the deformed shape.
+    Sharp edges are ignored. The normals are those of the deformed shape, `Surface.vertices`.
 
     Returns
     -------
@@ -268,21 +275,21 @@ def vertex_normals(surface: Surface) -> np.ndarray:
 def project_to_tangent(
     vectors: np.ndarray, normal: np.ndarray, tolerance_deg: float, source: str, domain: str
 ) -> np.ndarray:
-    """Project vectors to tangent planes and restore their length.
+    """Project vectors to tangent planes, and scale them to their original length.
 
     Parameters
     ----------
     vectors, normal : (n, 3) float64 ndarray
         Vectors, and the unit normals of their planes.
     tolerance_deg : float
-        Largest angle between a vector and its plane, degrees.
+        Largest angle between a vector and its plane, in degrees.
     source, domain : str
-        Names of the source and the mesh elements, for messages.
+        Name of the file or attribute, and name of the mesh elements, for messages.
 
     Returns
     -------
     (n, 3) float64 ndarray
-        Zero where the normal is zero or parallel to the vector.
+        Tangent vectors; zero where the normal is zero or parallel to the vector.
 
     Raises
     ------
@@ -302,14 +309,17 @@ def project_to_tangent(
 
 
 def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return projected vectors, their angles to the planes in degrees, and whether they are zero."""
+    """Return the projections of vectors to planes, with their original length.
+
+    Further results are the angles between vectors and planes in degrees, and whether each vector is zero.
+    """
     length = np.sqrt(dot(vectors, vectors))
     normal_component = dot(vectors, normal)
     sine = np.divide(
         np.abs(normal_component), length, out=np.zeros_like(normal_component), where=length > 0
     )
     angle = np.degrees(np.arcsin(np.minimum(sine, 1.0)))
-    # The projection of a vector parallel to the normal is only rounding error.
+    # If a vector is parallel to the normal, its projection is only a rounding error.
     tangent = np.where(
         (sine < 1 - 1e-12)[:, None], vectors - normal_component[:, None] * normal, 0.0
     )
@@ -320,18 +330,19 @@ def _project(vectors: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def apply_nonfinite_policy(values: np.ndarray, source: str, domain: str, nonfinite: str) -> None:
-    """Raise an error if values are not finite, or set them to zero in place.
+    """Check in place that values are finite: raise an error, or set those that are not finite to zero.
 
-    Values from `MAX_COMPONENT` on are treated as infinite. Vectors below `MIN_COMPONENT` are set to
-    zero.
+    Values of modulus `MAX_COMPONENT` or more count as infinite. Vectors whose components are all below
+    `MIN_COMPONENT` are set to zero as well.
 
     Parameters
     ----------
     values : (n,), (n, 3) or (n, 3, 3) float ndarray
-        Angles, vectors or tensors.
+        Angles, vectors or tensors. They are changed in place.
     source, domain : str
-        Names of the source and the mesh elements, for the message.
+        Name of the file or attribute, and name of the mesh elements, for the message.
     nonfinite : {"error", "zero"}
+        What to do if a value is not finite.
 
     Raises
     ------

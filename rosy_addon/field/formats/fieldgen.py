@@ -1,8 +1,8 @@
 """Read and write the `.obj` files of fieldgen: a mesh with a vertex field in its comments.
 
-The comments are ``# degree N``, one line ``# field i x y z`` with a member vector for each vertex
-i, and ``# singularity i s`` for each singular triangle i, with its index s in turns. Vertices and
-triangles are counted from 1. Singularities are neither read nor written here.
+The comments are ``# degree N``, a line ``# field i x y z`` with one of the N vectors of each vertex i, and a
+line ``# singularity i s`` for each singular triangle i with the singularity index s, in full turns. Vertices
+and triangles are counted from 1. Singularities are neither read nor written here.
 
 fieldgen is the program of Knöppel, Crane, Pinkall and Schröder,
 https://github.com/GeometryCollective/fieldgen.
@@ -47,7 +47,7 @@ def read_fieldgen(path: Path) -> RawField:
     Raises
     ------
     RosyError
-        If the file cannot be read, is not an .obj mesh, or has no degree or not exactly one field
+        If the file cannot be read, is not an .obj mesh, has no degree, or does not have exactly one field
         line for each vertex.
     """
     data = read_bytes(path, reject_binary=True)
@@ -83,10 +83,10 @@ def read_fieldgen(path: Path) -> RawField:
 
 
 def fieldgen_text(surface: Surface, field: RosyField) -> str:
-    """Format a mesh and a field as a fieldgen file.
+    """Return the text of a fieldgen file with a mesh and a field.
 
-    The value of a vertex is the mean RoSy of its faces, weighted by the corner angles, of length 1.
-    It is zero where the mean is zero.
+    The vector of a vertex is the mean of the field on the faces around it, in the RoSy representation,
+    weighted by corner angle. It has length 1, or is zero where the mean is zero.
     """
     count = len(surface.vertices)
     angle = corner_angles(surface)
@@ -114,6 +114,6 @@ def fieldgen_text(surface: Surface, field: RosyField) -> str:
 
 
 def _faces(surface: Surface) -> Iterator[list[int]]:
-    """Yield the vertices of each face, counted from 1."""
+    """Yield the list of the vertices of each face, counted from 1."""
     vertices, starts = (surface.corner_vertex + 1).tolist(), surface.face_start.tolist()
     return (vertices[start:stop] for start, stop in pairwise(starts))

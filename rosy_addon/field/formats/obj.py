@@ -1,4 +1,4 @@
-"""Read Wavefront .obj files: vertices and faces, and texture coordinates separately.
+"""Read Wavefront .obj files: one function for vertices and faces, and one for texture coordinates.
 
 Normals, materials and groups are ignored.
 """
@@ -19,8 +19,8 @@ from .text_rows import ROWS_PER_BLOCK, TextRows, read_rows
 def read_obj(path: Path) -> Polygons:
     """Read the vertices and faces (`v` and `f` lines) of an .obj file.
 
-    Corners may have the forms v, v/vt, v//vn and v/vt/vn. Negative indices are relative to the last
-    vertex above the line.
+    Corners may have the forms v, v/vt, v//vn and v/vt/vn. A negative index counts back from the last vertex
+    that is defined above the line.
 
     Raises
     ------
@@ -50,20 +50,20 @@ def read_obj(path: Path) -> Polygons:
 def _resolved(
     rows: TextRows, label: str, defined_above: np.ndarray, count: int, message: str
 ) -> np.ndarray:
-    """Return the indices in rows, counted from 0, of elements that the file numbers from 1.
+    """Return the indices in rows of a file, counted from 0; the file counts vertices (or `vt` lines) from 1.
 
     Parameters
     ----------
     rows : TextRows
-        Rows of indices. Negative indices are relative to the number of elements above the line.
+        Rows of indices. A negative index counts back from the last vertex that is defined above the line.
     label : str
-        What the indices are, for messages.
+        Name of the indices in messages.
     defined_above : (rows,) int ndarray
-        The number of elements above each line.
+        Number of vertices that are defined above each line.
     count : int
-        The number of all elements.
+        Number of vertices in the whole file.
     message : str
-        Begins the message about an index out of range, with a place for it.
+        Beginning of the message about an index out of range, with a format field for the index.
     """
     index = rows.ints(label)
     defined_above = np.repeat(defined_above, list(map(len, rows.words)))
@@ -78,12 +78,12 @@ def _resolved(
 
 
 def _is_kind(rows: TextRows, kind: bytes) -> np.ndarray:
-    """Return (rows,) bool, whether the first word of each row is the given one."""
+    """Return (rows,) bool: whether the first word of each row is `kind`, such as b"v"."""
     return np.array([words[0] == kind for words in rows.words], dtype=bool)
 
 
 def _position_indices(corners: TextRows) -> TextRows:
-    """Reduce corners v, v/vt, v//vn and v/vt/vn to v, the index of the position."""
+    """Return rows with position indices only: v of corners v, v/vt, v//vn and v/vt/vn."""
     rows: list[Sequence[bytes]] = []
     for start in range(0, len(corners), ROWS_PER_BLOCK):
         words = corners.words[start : start + ROWS_PER_BLOCK]
@@ -101,7 +101,7 @@ def read_uv(path: Path) -> np.ndarray | None:
     Returns
     -------
     (C, 2) float64 ndarray or None
-        One (u, v) for each corner, in the order of `read_obj`; None if the file has none.
+        Texture coordinates (u, v) of each corner, in the order of `read_obj`; None if the file has none.
 
     Raises
     ------

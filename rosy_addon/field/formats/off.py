@@ -1,6 +1,6 @@
 """Read Object File Format (.off) text files: vertices and faces.
 
-The colors, normals and texture coordinates of the variants are ignored.
+Colors, normals and texture coordinates, which variants of the format have, are ignored.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ _KEYWORD = re.compile(rb"(ST)?C?N?OFF$", re.IGNORECASE)
 def read_off(path: Path) -> Polygons:
     """Read a text .off file.
 
-    The counts may be on the line of the keyword or on the next one. Comments may be anywhere.
+    The numbers of vertices and faces may be on the line of the keyword ``OFF`` or on the next line.
+    Comments may be anywhere.
 
     Raises
     ------
@@ -47,7 +48,10 @@ def read_off(path: Path) -> Polygons:
 
 
 def _after_keyword(rows: TextRows) -> TextRows:
-    """Return the rows from the counts on. The keyword is optional; the counts may share its line."""
+    """Return the rows of an .off file from the row of counts on, without the keyword.
+
+    The keyword is optional. The counts may be on the same line.
+    """
     if not len(rows) or rows.words[0][0].isdigit():
         return rows
     keyword, *rest = rows.words[0]
@@ -59,7 +63,7 @@ def _after_keyword(rows: TextRows) -> TextRows:
 
 
 def _faces(rows: TextRows, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return `corner_vertex` and `face_start` of `Polygons`, from one row for each face."""
+    """Return `corner_vertex` and `face_start` of `Polygons`, given one row of text for each face."""
     first_words = TextRows(rows.path, [words[:1] for words in rows.words], rows.line_numbers)
     sizes = first_words.ints("number of corners of a face")
     for row, (size, words) in enumerate(zip(sizes.tolist(), rows.words, strict=True)):

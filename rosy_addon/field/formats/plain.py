@@ -1,6 +1,7 @@
 """Read and write fields as plain tables of numbers: text and `.npy` files.
 
-A row holds one member vector (3 numbers), all N directions (3 N) or a symmetric tensor (9).
+A row holds one of the N member vectors (3 numbers), all N directions (3 N numbers) or a symmetric tensor (9
+numbers).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from .text_rows import read_rows
 #: Largest difference between a symmetric matrix and its transpose, relative to its largest entry.
 SYMMETRY_TOLERANCE = 1e-5
 
-#: The readers of the header of an `.npy` file, by version.
+#: The functions of numpy that read the header of an `.npy` file, by the version of the format.
 _NPY_HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -36,7 +37,7 @@ def read_text(path: Path) -> RawField:
     Raises
     ------
     RosyError
-        If the file cannot be read, holds no numbers, or its rows differ in length.
+        If the file cannot be read or holds no numbers, or if its rows differ in length.
     """
     data = read_bytes(path, reject_binary=True).replace(b",", b" ")
     rows = read_rows(path, data=data)
@@ -54,7 +55,7 @@ def read_text(path: Path) -> RawField:
 
 
 def _check_npy_size(data: bytes) -> None:
-    """Raise `ValueError` if the header of an `.npy` file declares more than the file contains."""
+    """Raise `ValueError` if the header of an `.npy` file declares more data than the file contains."""
     file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     if version in _NPY_HEADERS:
@@ -69,7 +70,7 @@ def read_npy(path: Path) -> RawField:
     Raises
     ------
     RosyError
-        If the file cannot be read, or is not a real array of such a shape.
+        If the file cannot be read, or does not contain an array of real numbers with such a shape.
     """
     data = read_bytes(path)
     try:
@@ -92,23 +93,23 @@ def read_npy(path: Path) -> RawField:
 
 
 def read_guide_strokes(path: Path) -> list[np.ndarray]:
-    """Read the polylines of a guide stroke file.
+    """Read guide strokes from a text file: rows x y z, with an empty line between two strokes.
 
     Returns
     -------
     list of (n, 3) float64 ndarray
-        The points of each stroke, in the space of the mesh (object space). Strokes of a single
-        point are left out.
+        The points of each stroke (a polyline), in the space of the mesh (object space). Strokes with a
+        single point are left out.
 
     Raises
     ------
     RosyError
-        If the file is missing, is not such a file, or has no stroke of at least two points.
+        If the file is missing, is malformed, or has no stroke of at least two points.
     """
     path = Path(path)
     rows = read_rows(path)
     points = rows.points("point")
-    # Rows leave out empty lines, so a gap in the line numbers separates two strokes.
+    # `TextRows` has no empty lines, so a gap in the line numbers separates two strokes.
     ends = np.flatnonzero(np.diff(rows.line_numbers) > 1) + 1
     strokes = [stroke for stroke in np.split(points, ends) if len(stroke) > 1]
     if not strokes:
@@ -119,14 +120,14 @@ def read_guide_strokes(path: Path) -> list[np.ndarray]:
 
 
 def npy_bytes(directions: np.ndarray) -> bytes:
-    """Return the contents of an `.npy` file with (F, N, 3) directions, stored as (F, 3 N)."""
+    """Return the contents of an `.npy` file that stores (F, N, 3) directions as an array (F, 3 N)."""
     file = io.BytesIO()
     np.save(file, directions.reshape(len(directions), -1))
     return file.getvalue()
 
 
 def _check_columns(source: str, columns: int) -> None:
-    """Raise an error unless a row has 3 numbers for each of 1 to `MAX_DEGREE` directions."""
+    """Raise a `RosyError` unless a row has 3 N numbers for a degree N from 1 to `MAX_DEGREE`."""
     if columns % 3 or not 3 <= columns <= 3 * MAX_DEGREE:
         raise RosyError(
             f"{source}: has {counted(columns, 'number')} per row, expected 3 for each of up to {MAX_DEGREE} "
@@ -135,7 +136,10 @@ def _check_columns(source: str, columns: int) -> None:
 
 
 def _raw_field(values: np.ndarray) -> RawField:
-    """Classify (n, k) values as members, directions or, if all are symmetric, tensors."""
+    """Return (n, k) values as a `RawField` of member vectors, directions or tensors.
+
+    Rows of 9 values are tensors if all of them are symmetric 3 x 3 matrices, and 3 directions otherwise.
+    """
     matrices = values.reshape(len(values), -1, 3)
     if values.shape[1] == 9 and _are_symmetric(matrices):
         return RawField(matrices, 4, tensors=True)
@@ -143,7 +147,7 @@ def _raw_field(values: np.ndarray) -> RawField:
 
 
 def _are_symmetric(matrices: np.ndarray) -> bool:
-    """Return whether all (n, 3, 3) matrices are symmetric, except those that are not finite."""
+    """Return whether all (n, 3, 3) matrices are symmetric; matrices that are not finite are ignored."""
     matrices = matrices[np.isfinite(matrices).all(axis=(1, 2))]
     scale = np.abs(matrices).max(axis=(1, 2), keepdims=True, initial=0.0)
     matrices = matrices / np.where(scale > 0, scale, 1.0)

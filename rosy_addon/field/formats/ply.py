@@ -1,6 +1,7 @@
-"""Read Stanford .ply files, text and binary: the elements `vertex` and `face`.
+"""Read Stanford .ply files, text and binary.
 
-Other elements are skipped.
+A .ply file consists of *elements*: tables with a name, rows and named *properties* (columns). The elements
+`vertex` and `face` are read. Other elements are skipped.
 """
 
 from __future__ import annotations
@@ -34,24 +35,25 @@ _CORNER_PROPERTIES = ("vertex_indices", "vertex_index")
 
 @dataclass(frozen=True)
 class _Property:
-    """A property of an element, as the header declares it; types are numpy type codes."""
+    """A property (column) of an element, as the header declares it; types are numpy type codes."""
 
     name: str
     type: str
-    #: Type of the count that precedes a list; None for a scalar property.
+    #: Type of the number that precedes each list and is its length; None for a scalar property.
     count_type: str | None = None
 
 
 @dataclass(frozen=True)
 class _Element:
-    """An element, as the header declares it; `count` is its number of rows."""
+    """An element (table) of a .ply file, as the header declares it; `count` is its number of rows."""
 
     name: str
     count: int
     properties: list[_Property] = field(default_factory=list)
 
 
-#: Values of an element by property: scalars as arrays, lists as (values, starts).
+#: Values of an element by the names of its properties: an array for a scalar property, and (values, starts)
+#: for a list property. The list of row i is ``values[starts[i] : starts[i + 1]]``.
 _Columns = dict[str, "np.ndarray | tuple[np.ndarray, np.ndarray]"]
 
 
@@ -61,8 +63,8 @@ def read_ply(path: Path) -> Polygons:
     Raises
     ------
     RosyError
-        If the file cannot be read, is malformed or truncated, has no vertices or faces, or an index
-        is out of range.
+        If the file cannot be read, is malformed or truncated, or has no vertices or faces, or if an index is
+        out of range.
     """
     columns, _ = _read_columns(path)
     try:
@@ -87,24 +89,24 @@ def read_ply(path: Path) -> Polygons:
 
 
 def _is_index(values: np.ndarray, count: int) -> np.ndarray:
-    """Return (n,) bool, whether numbers are whole ones from 0 to `count` - 1."""
+    """Return (n,) bool: whether each value is a whole number from 0 to `count` - 1."""
     in_range = (values >= 0) & (values < count)
     return in_range & (np.where(in_range, values, 0) % 1 == 0)
 
 
 def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
-    """Read the scalar vertex properties of a .ply file other than the position.
+    """Read the scalar vertex properties of a .ply file, such as colors, except the position.
 
     Returns
     -------
     dict of str to (V,) float64 ndarray
-        By property name. Integers are divided by the largest value of their type, so that colors
-        range from 0 to 1.
+        Values of each property, by its name. Integers are divided by the largest value of their type, so that
+        colors range from 0 to 1.
 
     Raises
     ------
     RosyError
-        If the file cannot be read, is malformed or truncated.
+        If the file cannot be read, or is malformed or truncated.
     """
     columns, elements = _read_columns(path)
     values = {}
@@ -118,7 +120,7 @@ def read_vertex_values(path: Path) -> dict[str, np.ndarray]:
 
 
 def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
-    """Return all values of a file by element and property, and the elements that its header declares."""
+    """Read a .ply file: return its values by element and property, and the elements of its header."""
     data = read_bytes(path)
     byte_order, elements, offset = _header(path, data)
     if byte_order == "":
@@ -127,7 +129,7 @@ def _read_columns(path: Path) -> tuple[dict[str, _Columns], list[_Element]]:
 
 
 def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
-    """Return the byte order ("" for text), the elements, and the offset of the data in bytes."""
+    """Parse the header: return the byte order ("" for text), the elements and the byte offset of the data."""
     if data[:3] != b"ply":
         raise RosyError(f"{path}:1: expected 'ply', found {abbreviate(data[:3])}")
     end = re.compile(rb"^end_header[ \t]*\r?\n", re.MULTILINE).search(data)
@@ -170,14 +172,14 @@ def _header(path: Path, data: bytes) -> tuple[str, list[_Element], int]:
 def _check_unique(
     path: Path, line_number: int, kind: str, name: str, earlier: list[_Element] | list[_Property]
 ) -> None:
-    """Raise an error if an earlier element or property has the same name."""
+    """Raise a `RosyError` if one of the earlier elements or properties has the same name."""
     if any(item.name == name for item in earlier):
         raise RosyError(f"{path}:{line_number}: {kind} '{name}' is declared twice")
 
 
 def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[str, _Columns]:
-    """Return the values of all elements of a text file."""
-    # The header is included, so that rows have the line numbers of the file.
+    """Return the values of all elements of a text file, by element and property."""
+    # Parse the header as well, so that rows have the line numbers of the file.
     rows = read_rows(path, comment=None, data=data)
     first = next(row for row, words in enumerate(rows.words) if words[0] == b"end_header") + 1
     columns = {}
@@ -191,7 +193,7 @@ def _text_elements(path: Path, data: bytes, elements: list[_Element]) -> dict[st
 
 
 def _text_columns(rows: TextRows, element: _Element) -> _Columns:
-    """Return the values of one element, given its rows."""
+    """Return the values of one element of a text file by property, given its rows."""
     starts = offsets_from_sizes([len(words) for words in rows.words])
     values = rows.floats(f"value of a {element.name}")
     position = starts[:-1]
@@ -220,7 +222,11 @@ def _text_columns(rows: TextRows, element: _Element) -> _Columns:
 def _check_row_lengths(
     rows: TextRows, element: _Element, end: np.ndarray, starts: np.ndarray
 ) -> None:
-    """Raise an error if a row ends before word `end`, counted like `starts` over all rows."""
+    """Raise a `RosyError` if a row has too few values.
+
+    All words of `rows` are numbered consecutively. Row i has the words ``starts[i] .. starts[i + 1] - 1``,
+    and needs the words up to ``end[i] - 1``.
+    """
     short = end > starts[1:]
     if short.any():
         row = int(np.argmax(short))
@@ -231,9 +237,10 @@ def _check_row_lengths(
 def _binary_elements(
     path: Path, data: bytes, offset: int, byte_order: str, elements: list[_Element]
 ) -> dict[str, _Columns]:
-    """Return the values of all elements of a binary file, whose data begin at `offset`.
+    """Return the values of all elements of a binary file, whose data begin at the byte `offset`.
 
-    If all rows of an element have the same list lengths, it is read as one structured array.
+    An element in which lists have the same lengths in all rows is read as one structured array, which is
+    faster.
     """
     columns = {}
     for element in elements:
@@ -274,9 +281,9 @@ def _binary_elements(
 def _read_rows(
     path: Path, data: bytes, offset: int, byte_order: str, element: _Element, row_count: int
 ) -> tuple[_Columns, int]:
-    """Return the values of the first rows of an element, and the offset of what follows them.
+    """Return the values of the first `row_count` rows of a binary element, and the offset of their end.
 
-    Each row begins where the previous one ends, so the rows are read in a loop.
+    The position of a row depends on the lists in all rows before it, so the rows are read in a loop.
     """
     types = [np.dtype(byte_order + prop.type) for prop in element.properties]
     counts = [
@@ -308,14 +315,14 @@ def _read_rows(
 
 
 def _list_length(path: Path, element: _Element, row: int, length) -> int:
-    """Return the count of a list as an int; raises an error if it is negative or not a whole number."""
+    """Return the length of a list as an int; raise a `RosyError` if it is negative or not a whole number."""
     if not (0 <= length < np.inf and length == int(length)):
         raise RosyError(f"{path}: {element.name} {row} has a list of length {length}")
     return int(length)
 
 
 def _truncated(path: Path, element: _Element, row_count: int) -> RosyError:
-    """Return the error for a file that ends after `row_count` rows of an element."""
+    """Return the error to raise for a file that ends after `row_count` rows of an element."""
     return RosyError(
         f"{path}: declares {counted(element.count, 'row')} of element '{element.name}', but ends after {row_count}"
     )

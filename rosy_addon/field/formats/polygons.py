@@ -1,4 +1,4 @@
-"""What readers return: polygons as flat arrays, and the unchecked contents of a field file."""
+"""The results of file readers: polygons as flat arrays, and the unchecked contents of a field file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Polygons(NamedTuple):
-    """Vertices and polygons, in the order of the file.
+    """The vertices and polygons of a mesh file, as flat arrays in the order of the file.
 
     Attributes
     ----------
@@ -40,14 +40,14 @@ class RawField:
     Attributes
     ----------
     values : (n, k, 3) float64 ndarray
-        k vectors per row: one member (k = 1), all N directions (k = N), or the rows of a tensor
-        (k = 3).
+        k vectors for each row of the file: one of the N member vectors (k = 1), all N directions (k = N), or
+        the rows of a tensor (k = 3).
     degree : int or None
         N; None if the file does not state it.
     header_count : int or None
-        Number of rows that the header declares; None if there is no such header.
+        Number of rows that the header declares; None if the header does not declare it.
     domain : {"face", "vertex"} or None
-        The mesh elements that the rows belong to; None to infer them from the number of rows.
+        The mesh elements to which the rows belong; None to infer it from the number of rows.
     tensors : bool
         Whether `values` are symmetric 3 x 3 tensors.
     polygons : Polygons or None
@@ -63,12 +63,12 @@ class RawField:
 
     @property
     def columns(self) -> int:
-        """3 k, the count of numbers per row."""
+        """Count of numbers in each row of the file: 3 k."""
         return int(np.prod(self.values.shape[1:]))
 
 
 def offsets_from_sizes(sizes: np.ndarray | list[int]) -> np.ndarray:
-    """Return (n + 1,) int64 offsets of n consecutive ranges of these sizes; the last is the total size.
+    """Return the (n + 1,) int64 start offsets of n consecutive ranges of these sizes, and the total size.
 
     Examples
     --------

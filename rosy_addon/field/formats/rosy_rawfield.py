@@ -1,4 +1,4 @@
-"""Read and write `.rosy` (a member vector per row) and `.rawfield` (N directions per row) files.
+"""Read and write `.rosy` files (one of the N vectors per row) and `.rawfield` files (N directions per row).
 
 `.rawfield` is a format of the library Directional.
 """
@@ -16,9 +16,9 @@ from .text_rows import TextRows, abbreviate, format_lines, read_rows
 
 
 def read_rosy(path: Path) -> RawField:
-    """Read a `.rosy` file: a count, N, and rows x y z.
+    """Read a `.rosy` file: the number of rows, the degree N, and rows x y z.
 
-    Count and N may be on one line or on two.
+    The first two numbers may be on one line or on two lines.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def read_rosy(path: Path) -> RawField:
 
 
 def read_rawfield(path: Path) -> RawField:
-    """Read a `.rawfield` file: N, a count, and rows of N vectors.
+    """Read a `.rawfield` file: the degree N, the number of rows, and rows of N vectors.
 
     Raises
     ------
@@ -47,18 +47,21 @@ def read_rawfield(path: Path) -> RawField:
 
 
 def rosy_text(field: RosyField) -> str:
-    """Format the member vectors of a field as a `.rosy` file."""
+    """Return the text of a `.rosy` file with the member vectors of a field."""
     return f"{len(field.vectors)}\n{field.degree}\n{format_lines(field.vectors)}"
 
 
 def rawfield_text(directions: np.ndarray) -> str:
-    """Format (F, N, 3) directions as a `.rawfield` file."""
+    """Return the text of a `.rawfield` file with (F, N, 3) directions."""
     count, degree = directions.shape[:2]
     return f"{degree} {count}\n{format_lines(directions.reshape(count, -1))}"
 
 
 def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
-    """Return the first two integers of the file, on one line or on two; `names` are for messages."""
+    """Return the first two integers of a file, which are on one line or on two.
+
+    `names` are their names in messages.
+    """
     words = [word for line in rows.words[:2] for word in line][:2]
     values = []
     for index, name in enumerate(names):
@@ -74,7 +77,7 @@ def _read_header(rows: TextRows, *names: str) -> tuple[int, int]:
 
 
 def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
-    """Return `check_degree(degree)`, with the file and the line of the word in its error."""
+    """Return the result of `check_degree(degree)`. Its error names the file and the line of word `word`."""
     try:
         return check_degree(degree)
     except RosyError as reason:
@@ -82,9 +85,9 @@ def _validated_degree(rows: TextRows, word: int, degree: int) -> int:
 
 
 def _vector_table(rows: TextRows, columns: int, count: int) -> np.ndarray:
-    """Return (n, columns) float64 numbers after the header; line breaks have no meaning.
+    """Return the numbers after the header as (n, columns) float64. Line breaks in the file are ignored.
 
-    `count` is the number of rows that the header declares, for the message.
+    `count` is the number of rows that the header declares; it is used in the error message.
     """
     row_count, remainder = divmod(sum(map(len, rows.words)) - 2, columns)
     if remainder:

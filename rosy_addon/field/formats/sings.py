@@ -1,6 +1,7 @@
 """Read and write the singularities of a field (`.sings` and `.sing` files of Directional).
 
-A file holds the degree, a count, and rows with an element and its singularity index.
+A file holds the degree, the number of singularities, and for each a row with the mesh element (a vertex or a
+face) and its singularity index.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
     degree : int
         N, the degree of the field.
     element : (K,) int64 ndarray
-        Singular elements, counted from 0: vertices if the field is on faces.
+        Singular mesh elements, counted from 0: vertices if the field is on faces, faces if it is on vertices.
     index : (K,) int64 ndarray
         Singularity indices in units of 1 / N.
 
@@ -44,6 +45,6 @@ def read_sings(path: Path) -> tuple[int, np.ndarray, np.ndarray]:
 
 
 def sings_text(degree: int, element: np.ndarray, index: np.ndarray) -> str:
-    """Format singularities as a `.sings` file; the parameters are the results of `read_sings`."""
+    """Return the text of a `.sings` file; the parameters are as in the result of `read_sings`."""
     rows = np.stack([element, index], axis=1)
     return f"{degree} {len(element)}\n{format_lines(rows)}"

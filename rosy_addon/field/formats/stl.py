@@ -1,4 +1,4 @@
-"""Read stereolithography .stl files, text and binary, and merge equal corners into vertices."""
+"""Read stereolithography .stl files, text and binary, and merge corners at equal positions into vertices."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _TRIANGLE_DTYPE = np.dtype([("normal", "<f4", 3), ("points", "<f4", (3, 3)), ("a
 
 
 def read_stl(path: Path) -> Polygons:
-    """Read an .stl file; corners at exactly the same position share a vertex.
+    """Read the triangles of an .stl file. Corners at exactly the same position share a vertex.
 
     Raises
     ------
     RosyError
-        If the file cannot be read, is malformed or truncated.
+        If the file cannot be read, or is malformed or truncated.
     """
     data = read_bytes(path)
     count = int.from_bytes(data[80:_HEADER_BYTES], "little")
-    # Some binary files also begin with "solid"; the file size identifies them.
+    # Some binary files also begin with "solid" like text files. They are recognized by their size.
     is_binary = len(data) == _HEADER_BYTES + count * _TRIANGLE_DTYPE.itemsize
     if (
         not is_binary
@@ -54,7 +54,7 @@ def weld(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     vertices : (V, 3) ndarray
         The distinct points, in the order of their first occurrence.
     index : (P,) int64 ndarray
-        The index of the vertex of each point.
+        For each point, the index of its vertex.
     """
     points = points + 0.0  # turns -0 into 0
     order = np.lexsort(points.T)

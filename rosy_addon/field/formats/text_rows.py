@@ -13,21 +13,21 @@ from ...core.errors import RosyError, counted
 from ...core.file_io import read_bytes
 from ..blocks import row_blocks
 
-#: Rows and words of a text file that are parsed or written at once.
+#: Number of rows, and number of words, of a text file that are parsed or written at once.
 ROWS_PER_BLOCK, WORDS_PER_BLOCK = 1 << 14, 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
 class TextRows:
-    """The rows of a text file that are not empty, split at white space.
+    """The rows (nonempty lines) of a text file, split into words at white space.
 
     Attributes
     ----------
     path : Path
     words : list of sequence of bytes
-        The words of each row; at least one, unless a caller selects words.
+        The words of each row. A row has at least one word, except after `select`.
     line_numbers : list of int
-        The line of each row in the file, counted from 1.
+        Line number of each row in the file, counted from 1.
     """
 
     path: Path
@@ -41,7 +41,7 @@ class TextRows:
         return TextRows(self.path, self.words[rows], self.line_numbers[rows])
 
     def select(self, is_selected: np.ndarray, words: slice) -> TextRows:
-        """Return some of the rows, given as (rows,) bool, cut to some of their words."""
+        """Return the rows for which the (rows,) bool array is True, each reduced to a slice of its words."""
         rows = np.flatnonzero(is_selected).tolist()
         return TextRows(
             self.path,
@@ -50,21 +50,21 @@ class TextRows:
         )
 
     def error(self, row: int, message: str) -> RosyError:
-        """Return the error to raise for a row: names the file and, if the row exists, its line."""
+        """Return the error to raise for a row. It names the file and, if the row exists, its line."""
         if row < len(self.line_numbers):
             return RosyError(f"{self.path}:{self.line_numbers[row]}: {message}")
         return RosyError(f"{self.path}: {message}")
 
     def floats(self, label: str) -> np.ndarray:
-        """Parse all words of all rows as one float64 array; `label` is for messages."""
+        """Parse all words of all rows as a flat float64 array; `label` is the name of a value in messages."""
         return self._parse(float, np.float64, f"a number ({label})")
 
     def ints(self, label: str) -> np.ndarray:
-        """Parse all words of all rows as one int64 array; `label` is for messages."""
+        """Parse all words of all rows as a flat int64 array; `label` is the name of a value in messages."""
         return self._parse(int, np.int64, f"a whole number ({label})")
 
     def points(self, label: str) -> np.ndarray:
-        """Parse the first three words of each row as a point.
+        """Parse the first three words of each row as a point; `label` is the name of a point in messages.
 
         Returns
         -------
@@ -89,12 +89,12 @@ class TextRows:
         return points
 
     def row_of_word(self, word: int) -> int:
-        """Return the row that holds a word, which is counted from 0 over all rows."""
+        """Return the index of the row that contains a word. Words are counted from 0 over all rows."""
         ends = list(accumulate(map(len, self.words)))
         return int(np.searchsorted(ends, word, side="right"))
 
     def _parse(self, convert: Callable, dtype: type, expected: str) -> np.ndarray:
-        """Convert all words of all rows, or raise an error that names the first bad one."""
+        """Convert all words of all rows, or raise an error about the first word that cannot be converted."""
         count = sum(map(len, self.words))
         values = np.empty(count, dtype=dtype)
         words = chain.from_iterable(self.words)
@@ -107,7 +107,7 @@ class TextRows:
         return values
 
     def _parse_error(self, convert: Callable, expected: str, first_row: int) -> RosyError:
-        """Return the error for the first word that cannot be converted, which is not above `first_row`."""
+        """Return the error to raise for the first word that cannot be converted, from row `first_row` on."""
         for row, words in enumerate(self.words[first_row:], first_row):
             for word in words:
                 try:
@@ -119,7 +119,7 @@ class TextRows:
 
 
 def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = None) -> TextRows:
-    """Read the rows of a text file; empty lines are left out.
+    """Read the rows of a text file as words. Empty lines are left out.
 
     Parameters
     ----------
@@ -135,13 +135,13 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
         If the file cannot be read or is not text.
     """
     data = read_bytes(path, reject_binary=True) if data is None else data
-    # Also accept a lone CR, but not the other separators of `splitlines`.
+    # Accept a lone CR as the end of a line, too, but not the other separators of `splitlines`.
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     lines = data.split(b"\n")
     if comment is not None and comment in data:
         lines = [line.partition(comment)[0] for line in lines]
-    # The garbage collector soon stops visiting tuples of bytes, but not lists of them.
+    # Store words as tuples: Python's garbage collector stops tracking tuples of bytes, but not lists.
     words: list[Sequence[bytes]] = []
     line_numbers: list[int] = []
     for number, line in enumerate(lines, 1):
@@ -152,18 +152,18 @@ def read_rows(path: Path, *, comment: bytes | None = b"#", data: bytes | None = 
 
 
 def abbreviate(word: bytes) -> str:
-    """Quote a word for a message: printable characters only, at most 24 of its bytes."""
+    """Return a word in quotes for a message: at most 24 of its bytes, and printable characters only."""
     text = word[:24].decode("ascii", "backslashreplace")
     return repr("".join(c if c.isprintable() else "?" for c in text) + "..." * (len(word) > 24))
 
 
 def format_rows(rows: np.ndarray) -> list[str]:
-    """Format each row of (n, k) numbers as text that reads back as exactly the same float64."""
+    """Return each row of (n, k) numbers as text. Parsing it gives exactly the same float64 values."""
     return [" ".join(map(repr, row)) for row in rows.tolist()]
 
 
 def format_lines(rows: np.ndarray, prefix: str = "") -> str:
-    """Format (n, k) numbers as lines of text with a prefix; see `format_rows`."""
+    """Return (n, k) numbers as lines of text, each with a prefix; see `format_rows`."""
     # Strings of single rows take much more memory than the text, so they are joined block by block.
     blocks = row_blocks(len(rows), ROWS_PER_BLOCK)
     return "".join(

@@ -18,6 +18,7 @@ from ..compositor.flow import NO_DRIFT, Drift
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
+from ..gpu.background import draw_background
 from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
@@ -299,7 +300,7 @@ class ViewportSession:
         if self.progressive.is_prepared:
             background = view_background(context, depsgraph, view_input.camera, look)
             if background is not None:
-                renderer.draw_background(background)
+                draw_background(renderer.device, background)
         if view.texture is None:
             return
         opacity = OPACITY_IN_EDIT_MODE if context.mode.startswith("EDIT") else OPACITY

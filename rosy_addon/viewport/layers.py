@@ -246,7 +246,7 @@ class ReferenceImages:
         if image is None:
             return None
         reference = load_reference(scene, depsgraph, render_camera(scene), look, image)
-        key = file_key, reference.camera.view.tobytes(), reference.camera.projection.tobytes()
+        key = file_key, reference.camera.key
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference
         return self._current[scene.name][1]

@@ -421,13 +421,10 @@ def _pointers(context: bpy.types.Context) -> ViewPointers:
 
 def _picture_key(view_input: ViewInput) -> Hashable:
     """Return a key that changes whenever the picture of a view would change."""
-    camera = view_input.camera
     planes = view_input.clip_planes
     return (
         view_input.instances,
-        camera.view.tobytes(),
-        camera.projection.tobytes(),
-        (camera.width, camera.height),
+        view_input.camera.key,
         view_input.look,
         view_input.drift,
         None if planes is None else planes.tobytes(),

@@ -194,14 +194,15 @@ class Device:
         """
         if shader not in self._shaders:
             try:
-                self._shaders[shader] = self._gpu.shader.create_from_info(self._shader_info(shader))
+                self._shaders[shader] = self._compiled(shader)
             except Exception as error:
                 raise DeviceError(
                     f"the graphics driver cannot compile the shader '{shader.name}': {error}"
                 ) from error
         return self._shaders[shader]
 
-    def _shader_info(self, shader: ComputePass | RasterPass) -> Any:
+    def _compiled(self, shader: ComputePass | RasterPass) -> Any:
+        create = self._gpu.shader.create_from_info
         info = self._gpu.types.GPUShaderCreateInfo()
         for slot, name in enumerate(shader.textures):
             kind = "FLOAT_2D_ARRAY" if name.endswith("[]") else "FLOAT_2D"
@@ -217,7 +218,7 @@ class Device:
                 info.image(slot, format_, kind, _base_name(name), qualifiers={"WRITE"})
             info.local_group_size(*WORKGROUP_SIZE)
             info.compute_source(defines + shader.source)
-            return info
+            return create(info)
         interface = self._gpu.types.GPUStageInterfaceInfo(f"rosy_{shader.name}")
         for name, kind in shader.varyings:
             (interface.flat if name == "triangle_id" else interface.smooth)(kind.upper(), name)
@@ -226,7 +227,7 @@ class Device:
         info.fragment_out(0, "VEC4", shader.output)
         info.vertex_source(defines + shader.vertex_source)
         info.fragment_source(defines + shader.fragment_source)
-        return info
+        return create(info)
 
 
 _device: Device | None = None

@@ -199,7 +199,7 @@ def mesh_buffers(
     ----------
     surface : Surface
     linear : (3, 3) ndarray
-        Of `split_matrix`.
+        The linear part from `split_matrix`.
     field : RosyField or None
         None for a mesh that only occludes.
     display : {"smooth", "flat"}
@@ -207,7 +207,7 @@ def mesh_buffers(
         What each layer of the image of field channels contains, for all fields of this degree.
     tone : SurfaceTone, optional
     color_values : (C,) float32 ndarray, optional
-        As of `MeshInstance`.
+        See `MeshInstance`.
 
     Raises
     ------

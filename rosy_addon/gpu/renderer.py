@@ -1,6 +1,6 @@
 """The GPU renderer: the passes from meshes, fields and a camera to a picture, in their order.
 
-The stages are those of the numpy rooms. They work on images instead of lists of pixels. A streamline
+The numpy rooms have the same stages. Here they work on images instead of lists of pixels. A streamline
 is traced from every pixel and line: unlike `fast_lic`, no averages are shared between pixels.
 """
 

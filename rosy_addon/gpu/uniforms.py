@@ -175,7 +175,7 @@ def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> 
 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
-    """Return the uniforms of each light, or those of a black headlight if there is none."""
+    """Return the uniforms of each light; if there is none, the uniforms of a black headlight."""
     if look.light == "headlight":
         return [{"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (1.0,) * 4}]
     result = [
@@ -278,7 +278,7 @@ def screen_direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) 
 def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that evaluates the even lines of one instance.
 
-    `camera` is that of the frame.
+    `camera` is the camera of the frame.
     """
     spacing = instance_line_spacing(look, camera, item.instance)
     asked_pixels = 0.0 if look.pixel_size else look.line_distance

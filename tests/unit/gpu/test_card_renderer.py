@@ -134,11 +134,11 @@ def test_nothing_is_compiled_or_sent_after_the_preparation(device):
     card = GpuRenderer(device)
     run(card.prepare_steps([ball()], "smooth"))
     prepared = {shader for shader in passes.all_passes() if not shader.switches}
-    assert set(device._programs) >= prepared and kept_kinds(card) == ["mesh"]
+    assert set(device._shaders) >= prepared and kept_kinds(card) == ["mesh"]
     card_rgba(card, [ball()])
-    programs = dict(device._programs)  # now with the switches of this look
+    shaders = dict(device._shaders)  # now with the switches of this look
     card_rgba(card, [ball()], replace(LOOK, gain=2.0))
-    assert device._programs == programs and kept_kinds(card).count("mesh") == 1
+    assert device._shaders == shaders and kept_kinds(card).count("mesh") == 1
     assert not list(card.prepare_steps([ball()], "smooth"))
 
 

@@ -113,8 +113,8 @@ class ViewportSession:
         self._app_handlers = [
             (handlers.depsgraph_update_post, self.layers.invalidate),
             (handlers.frame_change_post, self.layers.invalidate),
-            (handlers.undo_post, self._on_undo),
-            (handlers.redo_post, self._on_undo),
+            (handlers.undo_post, self.layers.forget),
+            (handlers.redo_post, self.layers.forget),
             (handlers.load_pre, self._on_load),
         ]
         for handler_list, handler in self._app_handlers:
@@ -175,9 +175,6 @@ class ViewportSession:
         redraw_sidebars()
 
     # --- handlers and timers ---------------------------------------------------------------------
-
-    def _on_undo(self, *_: Any) -> None:
-        self.layers.forget()
 
     def _on_load(self, *_: Any) -> None:
         stop()

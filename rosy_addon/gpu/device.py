@@ -115,12 +115,10 @@ class Device:
         """Draw batches, each with its own uniforms, into a color and a depth texture."""
         state = self._gpu.state
         framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
-        saved_state = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
+        saved = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         with framebuffer.bind():
             framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-            state.depth_test_set("LESS")
-            state.depth_mask_set(True)
-            state.blend_set("NONE")
+            self._set_state("LESS", True, "NONE")
             try:
                 # Front faces first: cards skip what is hidden behind them.
                 for culled in ("BACK", "FRONT"):
@@ -128,9 +126,7 @@ class Device:
                     self._draw_batches(shader, batches, {}, {})
             finally:
                 state.face_culling_set("NONE")
-                state.depth_test_set(saved_state[0])
-                state.depth_mask_set(saved_state[1])
-                state.blend_set(saved_state[2])
+                self._set_state(*saved)
 
     def draw_to_view(
         self,
@@ -140,17 +136,18 @@ class Device:
         uniforms: NamedValues,
     ) -> None:
         """Draw batches into the current view, with its depth test."""
-        state = self._gpu.state
-        state.depth_test_set("LESS_EQUAL")
         # With depth writes, the picture is drawn once where surfaces overlap.
-        state.depth_mask_set(True)
-        state.blend_set("ALPHA")
+        self._set_state("LESS_EQUAL", True, "ALPHA")
         try:
             self._draw_batches(shader, batches, textures, uniforms)
         finally:
-            state.blend_set("NONE")
-            state.depth_mask_set(False)
-            state.depth_test_set("NONE")
+            self._set_state("NONE", False, "NONE")
+
+    def _set_state(self, depth_test: str, depth_mask: bool, blend: str) -> None:
+        """Set how triangles are drawn from now on."""
+        self._gpu.state.depth_test_set(depth_test)
+        self._gpu.state.depth_mask_set(depth_mask)
+        self._gpu.state.blend_set(blend)
 
     def viewport(self) -> tuple[int, int, int, int]:
         """Return left, bottom, width and height of the current view in its frame buffer."""

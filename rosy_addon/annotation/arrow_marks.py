@@ -4,7 +4,7 @@ Arrowheads are at places of the surface that do not depend on the view, so a mov
 places. The places are ordered in levels: the distance between places decreases from level to level, and
 the first places of the order are spread evenly over the surface. A picture takes the places in this order,
 if they are visible and not too near to a place that was taken before. In a close view, the places of the
-finest level are too far apart. Then points of `projection.progressive_samples` follow after them. Around
+finest level are too far apart. Then points of `progressive_samples` follow after them. Around
 each place, a field of N directions has N arrowheads.
 """
 
@@ -24,15 +24,15 @@ from ..field.surface import Surface
 from ..projection.camera import Camera
 from ..projection.gbuffer import GBuffer, MeshInstance
 from ..projection.pixel_neighbors import screen_jacobians
-from ..projection.progressive_samples import (
+from ..projection.project import surface_points
+from ..projection.surface_points import SurfacePoints
+from ..projection.visible_vertices import ProjectedPoints, project_points
+from .progressive_samples import (
     matrix_scale,
     progressive_samples,
     rest_areas,
     surface_samples,
 )
-from ..projection.project import surface_points
-from ..projection.surface_points import SurfacePoints
-from ..projection.visible_vertices import ProjectedPoints, project_points
 
 #: Colors of arrowheads and of their outlines.
 FILL_COLOR, OUTLINE_COLOR = "#141414", "#ffffff"

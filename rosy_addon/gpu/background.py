@@ -25,7 +25,7 @@ def draw_texture(
     ----------
     device : Device
     texture : texture
-        Of any size: it fills the view.
+        The picture. It may have any size, and fills the view.
     batches : sequence of (batch, dict)
         Where the picture is drawn, with the uniforms of `uniforms.clip_uniforms`.
     opacity : float

@@ -54,7 +54,7 @@ SUN_LIGHT, POINT_LIGHT, HEADLIGHT = range(3)
 #: Edges of creases in a row of threads, and threads for each edge.
 CREASES_PER_ROW, CREASE_SLICES = 1024, 16
 
-#: Bit of a pixel that contains an edge, besides those of borders in `outline`.
+#: Bit of a pixel that contains an edge. The bits of borders are in `outline`.
 EDGE_BIT = 4
 
 #: Side of the blocks of pixels that one run of `MAX_REDUCE` reduces to one.

@@ -115,12 +115,10 @@ class Device:
         """Draw batches, each with its own uniforms, into a color and a depth texture."""
         state = self._gpu.state
         framebuffer = self._gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
-        saved_state = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
+        saved = state.depth_test_get(), state.depth_mask_get(), state.blend_get()
         with framebuffer.bind():
             framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
-            state.depth_test_set("LESS")
-            state.depth_mask_set(True)
-            state.blend_set("NONE")
+            self._set_state("LESS", True, "NONE")
             try:
                 # Front faces first: cards skip what is hidden behind them.
                 for culled in ("BACK", "FRONT"):
@@ -128,9 +126,7 @@ class Device:
                     self._draw_batches(shader, batches, {}, {})
             finally:
                 state.face_culling_set("NONE")
-                state.depth_test_set(saved_state[0])
-                state.depth_mask_set(saved_state[1])
-                state.blend_set(saved_state[2])
+                self._set_state(*saved)
 
     def draw_to_view(
         self,
@@ -140,17 +136,18 @@ class Device:
         uniforms: NamedValues,
     ) -> None:
         """Draw batches into the current view, with its depth test."""
-        state = self._gpu.state
-        state.depth_test_set("LESS_EQUAL")
         # With depth writes, the picture is drawn once where surfaces overlap.
-        state.depth_mask_set(True)
-        state.blend_set("ALPHA")
+        self._set_state("LESS_EQUAL", True, "ALPHA")
         try:
             self._draw_batches(shader, batches, textures, uniforms)
         finally:
-            state.blend_set("NONE")
-            state.depth_mask_set(False)
-            state.depth_test_set("NONE")
+            self._set_state("NONE", False, "NONE")
+
+    def _set_state(self, depth_test: str, depth_mask: bool, blend: str) -> None:
+        """Set how triangles are drawn from now on."""
+        self._gpu.state.depth_test_set(depth_test)
+        self._gpu.state.depth_mask_set(depth_mask)
+        self._gpu.state.blend_set(blend)
 
     def viewport(self) -> tuple[int, int, int, int]:
         """Return left, bottom, width and height of the current view in its frame buffer."""
@@ -194,14 +191,15 @@ class Device:
         """
         if shader not in self._shaders:
             try:
-                self._shaders[shader] = self._gpu.shader.create_from_info(self._shader_info(shader))
+                self._shaders[shader] = self._compiled(shader)
             except Exception as error:
                 raise DeviceError(
                     f"the graphics driver cannot compile the shader '{shader.name}': {error}"
                 ) from error
         return self._shaders[shader]
 
-    def _shader_info(self, shader: ComputePass | RasterPass) -> Any:
+    def _compiled(self, shader: ComputePass | RasterPass) -> Any:
+        create = self._gpu.shader.create_from_info
         info = self._gpu.types.GPUShaderCreateInfo()
         for slot, name in enumerate(shader.textures):
             kind = "FLOAT_2D_ARRAY" if name.endswith("[]") else "FLOAT_2D"
@@ -217,7 +215,7 @@ class Device:
                 info.image(slot, format_, kind, _base_name(name), qualifiers={"WRITE"})
             info.local_group_size(*WORKGROUP_SIZE)
             info.compute_source(defines + shader.source)
-            return info
+            return create(info)
         interface = self._gpu.types.GPUStageInterfaceInfo(f"rosy_{shader.name}")
         for name, kind in shader.varyings:
             (interface.flat if name == "triangle_id" else interface.smooth)(kind.upper(), name)
@@ -226,7 +224,7 @@ class Device:
         info.fragment_out(0, "VEC4", shader.output)
         info.vertex_source(defines + shader.vertex_source)
         info.fragment_source(defines + shader.fragment_source)
-        return info
+        return create(info)
 
 
 _device: Device | None = None

@@ -58,7 +58,7 @@ class Frame:
     items : sequence of DrawItem
     view : ViewInput
     camera : Camera
-        Of the pixels of the frame: those of the picture, or its samples.
+        A pixel of the frame is a pixel of the picture, or one of its samples.
     look : PixelLook
         In these pixels.
     samples : Frame or None
@@ -68,7 +68,7 @@ class Frame:
     prepared : dict
         What was computed from the meshes for this picture, by the keys of the stages.
     passes : list of FramePass
-        Those that are still to be run, also on the samples.
+        The passes that are still to be run, including the passes over the samples.
     """
 
     resources: GpuResources
@@ -168,7 +168,7 @@ class Frame:
         box : Box
         textures, images : dict of str to texture
         uniforms : dict
-            In addition to those of the instance.
+            Further uniforms, besides the uniforms of the instance.
         """
         records = {"triangle_records": self.items[instance_id].mesh.records_texture}
         uniforms = {**self.instance_uniforms(instance_id), **uniforms}
@@ -205,7 +205,8 @@ class Frame:
         images : dict of str to texture
             What the pass writes.
         uniforms : dict
-            In addition to those of the camera, and to the settings of the look by their own names.
+            Further uniforms, besides the uniforms of the camera and the settings of the look, which have
+            their own names.
         layers : int
             Layers of array images.
         pause : float, optional

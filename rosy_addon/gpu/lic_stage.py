@@ -49,7 +49,7 @@ def even_line_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
 def render_even_lines(frame: Frame) -> None:
     """Render the lines of all instances into ``frame.textures["line_image"]``.
 
-    The method is that of `even_lines.even_lines`. The lines that replace crowded ones are in the
+    `even_lines.even_lines` is the same with numpy. The lines that replace crowded ones are in the
     layers after the others, whether any are crowded or not. Nothing is rendered for other looks.
     """
     if not is_even(frame.look):
@@ -82,7 +82,7 @@ def render_fields(frame: Frame, kind: FieldKind, box: Box, picture: Any) -> None
     box : Box
         Pixels to draw.
     picture : texture
-        Of the size of the frame.
+        The picture, in the size of the frame.
     """
     look, resources = frame.look, frame.resources
     is_antialiased = int(frame.samples is not None)

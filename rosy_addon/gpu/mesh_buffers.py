@@ -199,7 +199,7 @@ def mesh_buffers(
     ----------
     surface : Surface
     linear : (3, 3) ndarray
-        Of `split_matrix`.
+        The linear part from `split_matrix`.
     field : RosyField or None
         None for a mesh that only occludes.
     display : {"smooth", "flat"}
@@ -207,7 +207,7 @@ def mesh_buffers(
         What each layer of the image of field channels contains, for all fields of this degree.
     tone : SurfaceTone, optional
     color_values : (C,) float32 ndarray, optional
-        As of `MeshInstance`.
+        See `MeshInstance`.
 
     Raises
     ------
@@ -242,16 +242,11 @@ def mesh_buffers(
             tone_values, None if values is None else values[surface.triangles],
         )  # fmt: skip
     has_tone = field is not None and tone is not None
-    return MeshBuffers(
-        corners.reshape(-1, 4),
-        center,
-        rows,
-        texels,
-        bounds - center,
-        has_tone,
-        None if values is None else value_range(values),
-        -1 if values is None else record_texels(len(channels)) - 1,
-    )
+    numbers = (None, -1)
+    if values is not None:
+        numbers = value_range(values), record_texels(len(channels)) - 1
+    corners, bounds = corners.reshape(-1, 4), bounds - center
+    return MeshBuffers(corners, center, rows, texels, bounds, has_tone, *numbers)
 
 
 def _empty_records(count: int, texels: int) -> tuple[np.ndarray, np.ndarray]:
@@ -301,10 +296,8 @@ def _write_records(
             texel = VALUE_TEXEL + 2 + 2 * layer
             _write_values(part, texel, part_values, rotation_order(channel, degree), layer)
         if numbers is not None:
-            texel, known = (
-                record_texels(len(channels)) - 1,
-                np.isfinite(numbers[extent]).all(axis=1),
-            )
+            texel = record_texels(len(channels)) - 1
+            known = np.isfinite(numbers[extent]).all(axis=1)
             part[known, texel, :3] = numbers[extent][known]
             part[:, texel, 3] = known
         if tone is not None:

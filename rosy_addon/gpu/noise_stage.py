@@ -52,7 +52,7 @@ def render_noise(frame: Frame) -> None:
 def _render_wobble(frame: Frame) -> None:
     """Render the angle by which lines wobble, as ``frame.textures["wobble_angles"]``.
 
-    The method is that of `wobble.wobble_angle`.
+    `wobble.wobble_angle` is the same with numpy.
     """
     if not has_wobble(frame.look):
         frame.textures["wobble_angles"] = lookup_tables.palette(frame.resources)

@@ -30,7 +30,7 @@ def outline_lookups(frame: Frame) -> dict[Hashable, Callable[[], Any]]:
 def render_outline(frame: Frame) -> None:
     """Render the outline of a look that has one: the share of pixels that it covers.
 
-    It is ``frame.textures["outline_coverage"]``. The method is that of `compositor.outline`. If pixels
+    It is ``frame.textures["outline_coverage"]``. `compositor.outline` is the same with numpy. If pixels
     have several samples, it is drawn at these.
     """
     if not has_outline(frame.look):

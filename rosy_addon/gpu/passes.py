@@ -41,11 +41,11 @@ class Source(NamedTuple):
     textures : tuple of str
         Textures that are read. Names that end in ``[]`` are texture arrays.
     images : dict of str to str
-        Formats of the images that are written, by their names, as those of textures.
+        Formats of the images that are written, by name. Names of array images end in ``[]``, too.
     uniforms : tuple of (str, str)
         Names and GLSL types.
     outputs : tuple of (str, str)
-        The same of what a shader of vertices or fragments returns.
+        Names and GLSL types of what a vertex or fragment shader returns.
     switches : tuple of str
         Uniforms whose values are compiled in.
     """
@@ -100,7 +100,7 @@ class ComputePass:
     Attributes
     ----------
     name : str
-        Of the source file.
+        Name of the source file.
     formats : tuple of (str, str)
         Names and formats of the images that do not have the format of their declarations.
     constants : tuple of (str, int)
@@ -135,7 +135,7 @@ class ComputePass:
 
     @property
     def images(self) -> tuple[tuple[str, str], ...]:
-        """Images that it writes, with their formats. Names as those of textures."""
+        """Images that it writes, with their formats. Names of array images end in ``[]``."""
         return tuple({**self._declared.images, **dict(self.formats)}.items())
 
     @property
@@ -161,7 +161,7 @@ class RasterPass:
     Attributes
     ----------
     name : str
-        Of the source files.
+        Name of the two source files.
     """
 
     name: str

@@ -1,12 +1,12 @@
 """The GPU renderer: the passes from meshes, fields and a camera to a picture, in their order.
 
-The stages are those of the numpy rooms. They work on images instead of lists of pixels. A streamline
+The numpy rooms have the same stages. Here they work on images instead of lists of pixels. A streamline
 is traced from every pixel and line: unlike `fast_lic`, no averages are shared between pixels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -25,10 +25,11 @@ from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..projection.project import check_instances, raise_nothing_in_view
 from ..rendering.marks import has_marks, with_marks
-from ..rendering.view_input import Background, ViewInput
+from ..rendering.renderer import ViewportRenderer
+from ..rendering.view_input import ViewInput
 from ..worker.job import Call, Step, Steps
 from . import lookup_tables
-from .background import draw_background, draw_texture
+from .background import draw_texture
 from .device import Device
 from .frame import Frame, box_size, is_empty, screen_box, union_box
 from .gbuffer_stage import render_gbuffer
@@ -44,7 +45,7 @@ from .uniforms import clip_uniforms
 #: How much closer to the eye than the surface its picture is drawn, in normalized depth.
 COMPOSITE_DEPTH_BIAS = 2e-5
 
-#: LIC methods that the card does not have, and those that it draws in 3D views instead.
+#: LIC methods that the card does not have, and the methods that it draws in 3D views instead.
 STAND_INS = {"members": "brute", "ibfv": "sheets"}
 
 
@@ -57,8 +58,8 @@ def check_method(look: Look) -> None:
         )
 
 
-class GpuRenderer:
-    """Draws pictures on a graphics card. Implements `ViewportRenderer`.
+class GpuRenderer(ViewportRenderer):
+    """Draw pictures on a graphics card, for 3D views and for bakes.
 
     Parameters
     ----------
@@ -66,25 +67,25 @@ class GpuRenderer:
 
     Attributes
     ----------
-    downscale_factors, needs_occluders, stand_ins
-        See `ViewportRenderer`.
+    resources : GpuResources
+        What stays on the device from picture to picture.
     """
 
     downscale_factors = 2, 1
-    needs_occluders = False
-    stand_ins: Mapping[str, str] = STAND_INS
+    stand_ins = STAND_INS
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.resources = GpuResources(device)
 
     def picture_steps(self, view: ViewInput) -> Steps[Picture]:
-        """Draw a picture into memory, as `draw_picture`. It has no layers.
+        """Draw a picture and read it back.
 
         Raises
         ------
         RosyError
-            As `draw_picture`. Also if the driver rejects the shaders or the size.
+            If an input is invalid, nothing is in view (`draw_picture`), or the driver rejects the
+            shaders or the size.
         DeviceError
             If the card does not have the look's method.
         """
@@ -104,28 +105,27 @@ class GpuRenderer:
         return picture
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
-        """As `ViewportRenderer.prepare_steps`."""
+        """Compile the shaders without switches, and send the meshes to the device."""
         # Those with switches are compiled when their values are known.
         shaders = [shader for shader in all_passes() if not shader.switches]
         meshes = self.resources.mesh_lookups(instances, display)
         return prepare_steps([*compile_lookups(self.device, shaders), *meshes])
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[DrawItem]:
-        """As `ViewportRenderer.upload`."""
+        """Return draw items of mesh instances. Meshes on the device are not sent again."""
         return self.resources.upload(instances, display)
 
     def covered_pixels(self, items: Sequence[DrawItem], camera: Camera) -> int:
-        """As `ViewportRenderer.covered_pixels`."""
+        """Return the number of pixels in the box around all meshes on screen."""
         width, height = box_size(union_box([screen_box(item, camera) for item in items]))
         return width * height
 
     def texture_steps(
         self, items: Sequence[DrawItem], view: ViewInput, target_key: Hashable = None
     ) -> Steps[Any]:
-        """As `ViewportRenderer.texture_steps`.
+        """Draw a picture into a texture, which later pictures with the same key reuse.
 
-        The streamlines of the covering are traced, whatever the look's method is. The texture is reused by
-        later pictures.
+        Streamlines are traced on the covering, whatever the method of the look is.
 
         Raises
         ------
@@ -210,7 +210,7 @@ class GpuRenderer:
     def composite(
         self, texture: Any, items: Sequence[DrawItem], view: ViewInput, opacity: float = 1.0
     ) -> None:
-        """As `ViewportRenderer.composite`: the surfaces are drawn with the picture on them."""
+        """Draw the surfaces again, with the picture on them."""
         batches = [
             (item.mesh.batch, clip_uniforms(item, view.camera, view.clip_planes))
             for item in items
@@ -218,16 +218,12 @@ class GpuRenderer:
         ]
         draw_texture(self.device, texture, batches, opacity, depth_bias=COMPOSITE_DEPTH_BIAS)
 
-    def draw_background(self, background: Background) -> None:
-        """As `ViewportRenderer.draw_background`."""
-        draw_background(self.device, background)
-
     def finish(self) -> None:
-        """As `ViewportRenderer.finish`."""
+        """Wait until the device has done all work: reading a texture waits for it."""
         self.device.read(lookup_tables.palette(self.resources), len(PALETTE), 1)
 
     def release(self) -> None:
-        """As `ViewportRenderer.release`."""
+        """Free all meshes, images and textures."""
         self.resources.release()
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from dataclasses import field as dataclass_field
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,12 +30,9 @@ from .mesh_buffers import (
 from .preparation import Preparation, prepare_steps
 from .surface_records import feature_records, line_records, outline_records
 
-#: Uploads, of all views together, after which images and meshes that were not used are freed. Each
-#: frame of an animation has new meshes.
-IMAGE_LIFETIME_UPLOADS, MESH_LIFETIME_UPLOADS = 32, 2
-
-#: Textures of even lines that are kept for each mesh: two for each distance.
-MAX_LINE_TEXTURES = 6
+#: Numbers of uploads, of all views together, for which something that is not used stays on the device: images,
+#: meshes (each frame of an animation has new ones), and tables that are computed from meshes.
+IMAGE_LIFETIME, MESH_LIFETIME, TABLE_LIFETIME = 32, 2, 4
 
 #: Seconds for each triangle of a mesh: of its buffers and outlines, of even lines, and of features.
 BUFFER_SECONDS, LINE_SECONDS, FEATURE_SECONDS = 1e-6, 6e-6, 1e-5
@@ -70,7 +66,7 @@ class DrawItem:
         return matrix_scale(self.instance.matrix)
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class GpuMesh:
     """A mesh with its field on the device.
 
@@ -78,37 +74,26 @@ class GpuMesh:
     ----------
     buffers : MeshBuffers
     batch : handle
-        Of `Device.batch`.
+        A batch of `Device.batch`.
     records_texture : texture or None
         The triangle records; None without a field.
-    keep_alive : tuple
-        Surface, field, tone and numbers: the key of the mesh contains their ids.
     tone_atlas : MipAtlas or None
-    outline_textures : OutlineTextures or None
-        Those of the last crease angle.
-    last_used : int
-        Number of the upload that used it last.
-    line_textures : dict
-        The latest results of `GpuResources.line_records`, by their settings.
+    instance : MeshInstance
+        The instance whose mesh was sent. It keeps the arrays alive whose ids are in the key of the mesh.
     """
 
     buffers: MeshBuffers
     batch: Any
     records_texture: Any
-    keep_alive: tuple[Any, ...]
-    tone_atlas: MipAtlas | None = None
-    outline_textures: OutlineTextures | None = None
-    last_used: int = 0
-    line_textures: dict[tuple, tuple[Any, int]] = dataclass_field(default_factory=dict)
+    tone_atlas: MipAtlas | None
+    instance: MeshInstance
 
 
-@dataclass(frozen=True, eq=False)
-class OutlineTextures:
+class OutlineTextures(NamedTuple):
     """The creases and parts of a mesh (`outline_mesh.OutlineMesh`) as textures.
 
     Attributes
     ----------
-    crease_angle : float or None
     crease_points : texture or None
         The two ends of each edge, relative to the center of the mesh, in rows of `ROW_TEXELS`.
     crease_count : int
@@ -116,7 +101,6 @@ class OutlineTextures:
         The parts of four triangles in each texel. None if there is only one part.
     """
 
-    crease_angle: float | None
     crease_points: Any
     crease_count: int
     triangle_parts: Any
@@ -143,7 +127,7 @@ class MipAtlas:
 
 
 class GpuResources:
-    """The meshes, images and textures on a device. Those not used for some uploads are freed.
+    """The meshes, images and textures on a device. What is not used for some uploads is freed.
 
     Parameters
     ----------
@@ -156,16 +140,15 @@ class GpuResources:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        self._meshes: dict[tuple, GpuMesh] = {}
-        self._images: dict[tuple, Any] = {}
-        self._last_used: dict[tuple, int] = {}
+        #: What is on the device, and the last upload after which it stays there unused, by key.
+        self._kept: dict[Hashable, tuple[Any, int]] = {}
         self._lookup_textures: dict[str, tuple[Any, Any]] = {}
         self._upload_count = 0
 
     def release(self) -> None:
         """Free all resources."""
-        for cache in (self._meshes, self._images, self._last_used, self._lookup_textures):
-            cache.clear()
+        self._kept.clear()
+        self._lookup_textures.clear()
 
     def mesh_lookups(
         self, instances: Sequence[MeshInstance], display: str
@@ -183,19 +166,17 @@ class GpuResources:
             If a mesh has too many triangles for the device.
         """
         self._upload_count += 1
-        self._evict_images()
         kinds = field_kinds(instance.field for instance in instances if instance.field is not None)
         meshes = run(prepare_steps(self.mesh_lookups(instances, display)))
         items = []
         for instance, mesh in zip(instances, meshes, strict=True):
-            mesh.last_used = self._upload_count
             kind = None if instance.field is None else kinds[instance.field.degree]
             _, model_matrix = split_matrix(instance.matrix)
             model_matrix = model_matrix @ translation_matrix(mesh.buffers.center)
             items.append(DrawItem(instance, mesh, model_matrix, kind))
-        oldest_kept = self._upload_count - MESH_LIFETIME_UPLOADS
-        for key in [key for key, mesh in self._meshes.items() if mesh.last_used < oldest_kept]:
-            del self._meshes[key]
+        self._kept = {
+            key: kept for key, kept in self._kept.items() if kept[1] >= self._upload_count
+        }
         return items
 
     def feature_curvature(self, surface: Surface) -> Any:
@@ -203,54 +184,66 @@ class GpuResources:
 
         See `field.feature_curvature`. It is a texture, or a `Preparation` of it.
         """
+        call = Call(feature_records, (surface,), label="measuring features")
         key = "feature curvature", surface.rest_shape_key
-        if key not in self._images:
-
-            def send(rows: np.ndarray) -> Any:
-                return self._cached(key, partial(self._texture_of, rows))
-
-            call = Call(feature_records, (surface,), label="measuring features")
-            return Preparation(call, FEATURE_SECONDS * len(surface.triangles), send)
-        self._last_used[key] = self._upload_count
-        return self._images[key]
+        seconds = FEATURE_SECONDS * len(surface.triangles)
+        return self._look_up(key, call, seconds, self._texture)
 
     def outline_textures(
         self, item: DrawItem, crease_angle: float | None
     ) -> OutlineTextures | Preparation:
-        """Look up the creases and parts of the mesh of an item. They stay on the device with it.
+        """Look up the creases and parts of the mesh of an item.
 
         Raises
         ------
         RosyError
             When they are sent: if there are too many for the device.
         """
-        mesh, surface = item.mesh, item.instance.surface
-        current = mesh.outline_textures
-        if current is not None and current.crease_angle == crease_angle:
-            return current
+        surface = item.instance.surface
+        linear, _ = split_matrix(item.instance.matrix)
 
         def send(records: tuple[np.ndarray | None, int, np.ndarray | None]) -> OutlineTextures:
             points, crease_count, parts = records
-            textures = []
-            for rows in (points, parts):
-                if rows is not None and len(rows) > self.device.max_texture_size:
-                    raise RosyError(
-                        f"{surface.name}: has too many creases for this graphics card: choose the "
-                        "processor"
-                    )
-                textures.append(None if rows is None else self._texture_of(rows))
-            mesh.outline_textures = OutlineTextures(
-                crease_angle, textures[0], crease_count, textures[1]
+            points, parts = (
+                None if rows is None else self._rows_texture(rows, surface, "its creases")
+                for rows in (points, parts)
             )
-            return mesh.outline_textures
+            return OutlineTextures(points, crease_count, parts)
 
-        linear, _ = split_matrix(item.instance.matrix)
-        call = Call(
-            outline_records,
-            (surface, linear, mesh.buffers.center, crease_angle),
-            label="finding outlines",
-        )
-        return Preparation(call, BUFFER_SECONDS * len(surface.triangles), send)
+        arguments = surface, linear, item.mesh.buffers.center, crease_angle
+        call = Call(outline_records, arguments, label="finding outlines")
+        key = "outline", surface, linear.tobytes(), crease_angle
+        return self._look_up(key, call, BUFFER_SECONDS * len(surface.triangles), send)
+
+    def line_records(
+        self, item: DrawItem, display: str, spacing: float
+    ) -> tuple[Any, int] | Preparation:
+        """Look up the texture of `surface_records.line_rows` for an instance, and its node count.
+
+        Parameters
+        ----------
+        item : DrawItem
+            With a field.
+        display : {"smooth", "flat"}
+        spacing : float
+            Distance between lines, in Blender units.
+
+        Raises
+        ------
+        RosyError
+            When it is sent: if the lines do not fit into a texture.
+        """
+        surface, matrix, field = item.instance.surface, item.instance.matrix, item.instance.field
+
+        def send(records: tuple[np.ndarray, int, int]) -> tuple[Any, int]:
+            rows, node_count, triangle_count = records
+            what = f"even lines on {triangle_count} triangles"
+            remedy = "choose wider lines, or the processor"
+            return self._rows_texture(rows, surface, what, remedy), node_count
+
+        call = Call(line_records, (surface, matrix, field, display, spacing), label="spacing lines")
+        key = "lines", surface, field, rest_matrix(matrix).tobytes(), display, spacing
+        return self._look_up(key, call, LINE_SECONDS * len(surface.triangles), send)
 
     def image(
         self,
@@ -261,8 +254,10 @@ class GpuResources:
         layers: int = 0,
     ) -> Any:
         """Return the image of a name, size and format. Its contents are those of its last use."""
-        key = name, width, height, texel_format, layers
-        return self._cached(key, lambda: self.device.texture(width, height, texel_format, layers))
+        size_and_format = width, height, texel_format, layers
+        key = "image", name, *size_and_format
+        texture = self._kept[key][0] if key in self._kept else self.device.texture(*size_and_format)
+        return self._keep(key, texture, IMAGE_LIFETIME)
 
     def lookup_texture(
         self,
@@ -290,52 +285,9 @@ class GpuResources:
             and texture.height >= min_size[1]
         )
         if not is_kept:
-            texture = self._texture_of(create())
+            texture = self._texture(create())
             self._lookup_textures[name] = key, texture
         return texture
-
-    def line_records(
-        self, item: DrawItem, display: str, spacing: float
-    ) -> tuple[Any, int] | Preparation:
-        """Look up the texture of `surface_records.line_rows` for an instance, and its node count.
-
-        Parameters
-        ----------
-        item : DrawItem
-            With a field.
-        display : {"smooth", "flat"}
-        spacing : float
-            Distance between lines, in Blender units.
-
-        Raises
-        ------
-        RosyError
-            When it is sent: if the lines do not fit into a texture.
-        """
-        instance, textures = item.instance, item.mesh.line_textures
-        surface = instance.surface
-        key = rest_matrix(instance.matrix).tobytes(), display, spacing
-        if key in textures:
-            return textures[key]
-
-        def send(records: tuple[np.ndarray, int, int]) -> tuple[Any, int]:
-            rows, node_count, triangle_count = records
-            if len(rows) > self.device.max_texture_size:
-                raise RosyError(
-                    f"{surface.name}: even lines on {triangle_count} triangles are too many "
-                    "for this graphics card: choose wider lines, or the processor"
-                )
-            while len(textures) >= MAX_LINE_TEXTURES:
-                del textures[next(iter(textures))]
-            textures[key] = self._texture_of(rows), node_count
-            return textures[key]
-
-        call = Call(
-            line_records,
-            (surface, instance.matrix, instance.field, display, spacing),
-            label="spacing lines",
-        )
-        return Preparation(call, LINE_SECONDS * len(surface.triangles), send)
 
     def reference_atlas(self, reference: ReferenceRender) -> MipAtlas:
         """Return the image that the tone "picture" is sampled from."""
@@ -345,63 +297,62 @@ class GpuResources:
             self._lookup_textures["rendered"] = cached
         return cached[1]
 
-    def _texture_of(self, values: np.ndarray) -> Any:
-        height, width, channels = values.shape
-        data = np.pad(values, ((0, 0), (0, 0), (0, 4 - channels))) if channels < 4 else values
-        return self.device.texture(width, height, "RGBA32F", data=data)
+    def _look_up(
+        self,
+        key: Hashable,
+        call: Call,
+        seconds: float,
+        send: Callable[[Any], Any],
+        lifetime: int = TABLE_LIFETIME,
+    ) -> Any:
+        """Return what is kept under a key, or a `Preparation` of it with the other arguments."""
+        if key in self._kept:
+            return self._keep(key, self._kept[key][0], lifetime)
+        return Preparation(call, seconds, lambda answer: self._keep(key, send(answer), lifetime))
 
-    def _cached(self, key: tuple, create: Callable[[], Any]) -> Any:
-        if key not in self._images:
-            self._images[key] = create()
-        self._last_used[key] = self._upload_count
-        return self._images[key]
-
-    def _evict_images(self) -> None:
-        """Free images of names and sizes that were not used for some uploads."""
-        oldest_kept = self._upload_count - IMAGE_LIFETIME_UPLOADS
-        for key in [key for key, last_used in self._last_used.items() if last_used < oldest_kept]:
-            del self._images[key], self._last_used[key]
+    def _keep(self, key: Hashable, handle: Any, lifetime: int) -> Any:
+        """Keep a handle until it has not been used for a number of uploads, and return it."""
+        self._kept[key] = handle, self._upload_count + lifetime
+        return handle
 
     def _mesh(
         self, instance: MeshInstance, display: str, kinds: dict[int, FieldKind]
     ) -> GpuMesh | Preparation:
         """Look up the mesh of an instance."""
-        surface, field = instance.surface, instance.field
+        surface, field, tone = instance.surface, instance.field, instance.tone
         linear, _ = split_matrix(instance.matrix)
         channels = () if field is None else kinds[field.degree].channels
-        sources = surface, field, instance.tone, instance.color_values
-        key = (*map(id, sources), linear.tobytes(), display, channels)
-        if key in self._meshes:
-            return self._meshes[key]
 
         def send(buffers: MeshBuffers) -> GpuMesh:
-            mesh = self._meshes[key] = self._send_mesh(instance, buffers)
-            return mesh
+            records, atlas = buffers.triangle_records, None
+            if records is not None:
+                what = f"{len(surface.triangles)} triangles"
+                records = self._rows_texture(records, surface, what)
+            if buffers.has_tone and tone.image is not None:
+                atlas = self._upload_atlas(tone.mip_map)
+            return GpuMesh(buffers, self.device.batch(buffers.corners), records, atlas, instance)
 
-        call = Call(
-            mesh_buffers,
-            (surface, linear, field, display, channels, instance.tone, instance.color_values),
-            label=f"preparing the mesh of {surface.name}",
-        )
-        return Preparation(call, BUFFER_SECONDS * len(surface.triangles), send)
+        label = f"preparing the mesh of {surface.name}"
+        arguments = surface, linear, field, display, channels, tone, instance.color_values
+        call = Call(mesh_buffers, arguments, label=label)
+        sources = surface, field, tone, instance.color_values
+        key = "mesh", *map(id, sources), linear.tobytes(), display, channels
+        seconds = BUFFER_SECONDS * len(surface.triangles)
+        return self._look_up(key, call, seconds, send, MESH_LIFETIME)
 
-    def _send_mesh(self, instance: MeshInstance, buffers: MeshBuffers) -> GpuMesh:
-        surface, tone, rows = instance.surface, instance.tone, buffers.triangle_records
-        records_texture = tone_atlas = None
-        if rows is not None:
-            if len(rows) > self.device.max_texture_size:
-                raise RosyError(
-                    f"{surface.name}: {len(surface.triangles)} triangles are too many for this "
-                    "graphics card: choose the processor"
-                )
-            records_texture = self._texture_of(rows)
-        if buffers.has_tone and tone.image is not None:
-            tone_atlas = self._upload_atlas(tone.mip_map)
-        batch = self.device.batch(buffers.corners)
-        sources = surface, instance.field, tone, instance.color_values
-        return GpuMesh(
-            buffers, batch, records_texture, sources, tone_atlas, last_used=self._upload_count
-        )
+    def _rows_texture(
+        self, rows: np.ndarray, surface: Surface, what: str, remedy: str = "choose the processor"
+    ) -> Any:
+        """Return rows of `ROW_TEXELS` as a texture, or raise a `RosyError` if there are too many."""
+        if len(rows) > self.device.max_texture_size:
+            raise RosyError(f"{surface.name}: {what} are too many for this graphics card: {remedy}")
+        return self._texture(rows)
+
+    def _texture(self, values: np.ndarray) -> Any:
+        """Return (H, W, C) values as a texture; its other channels are 0."""
+        height, width, channels = values.shape
+        data = np.pad(values, ((0, 0), (0, 0), (0, 4 - channels))) if channels < 4 else values
+        return self.device.texture(width, height, "RGBA32F", data=data)
 
     def _upload_atlas(self, mip_map: MipMap) -> MipAtlas:
         max_side = min(MAX_TONE_IMAGE_SIDE, self.device.max_texture_size // 2)

@@ -37,7 +37,7 @@ def select_device(device: str, look: Look) -> str:
     Returns
     -------
     {"cpu", "gpu"}
-        Part of cache keys: the pixels of the two differ slightly.
+        A part of cache keys, because the pixels of the two differ slightly.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def look_in_view(look: Look, renderer: ViewportRenderer) -> tuple[Look, str | No
     Returns
     -------
     look : Look
-        Of a method that the renderer has.
+        The look, with a method that the renderer has.
     message : str or None
     """
     method = renderer.stand_ins.get(look.method)

@@ -75,9 +75,9 @@ def outline_records(
     ----------
     surface : Surface
     linear : (3, 3) ndarray
-        Of `mesh_buffers.split_matrix`.
+        The linear part from `mesh_buffers.split_matrix`.
     center : (3,) ndarray
-        Of `MeshBuffers`.
+        `MeshBuffers.center`.
     crease_angle : float or None
 
     Returns

@@ -18,7 +18,7 @@ from .uniforms import light_uniforms, light_view_uniforms, shadow_uniforms, tone
 def render_target_tones(frame: Frame) -> None:
     """Render the target tone of each pixel, as ``frame.textures["tones"]``.
 
-    The method is that of `target_tone.target_tone`. The light alone is in the texture ``lighting``. If
+    `target_tone.target_tone` is the same with numpy. The light alone is in the texture ``lighting``. If
     numbers are colored, their places in the color map are in the last component, or -1.
     """
     look, reference = frame.look, frame.view.reference

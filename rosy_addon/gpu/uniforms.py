@@ -175,7 +175,7 @@ def _paper_grain_depth(look: PixelLook, statistics: StreakStatistics | None) -> 
 
 
 def light_uniforms(look: Look, lights: Sequence[Light]) -> list[dict[str, Any]]:
-    """Return the uniforms of each light, or those of a black headlight if there is none."""
+    """Return the uniforms of each light; if there is none, the uniforms of a black headlight."""
     if look.light == "headlight":
         return [{"light_kind": HEADLIGHT, "light_vector": (0.0,) * 4, "light_color": (1.0,) * 4}]
     result = [
@@ -249,25 +249,18 @@ def covering_uniforms(kind: FieldKind) -> dict[str, Any]:
     }
 
 
-def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms of the pass that unfolds the covering."""
-    return {
-        **covering_uniforms(kind),
-        **screen_direction_uniforms(kind, look, camera),
-        "min_normal_cosine": min_normal_cosine(look),
-    }
-
-
 def min_normal_cosine(look: PixelLook) -> float:
     """Return the cosine of the largest angle between the normals of pixels that continue each other."""
     angle = crease_angle_of(look)
     return -2.0 if angle is None else float(np.cos(angle))
 
 
-def screen_direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict[str, Any]:
-    """Return the uniforms that map members to directions on screen."""
+def direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) -> dict[str, Any]:
+    """Return the uniforms that unfold the covering, and map members to directions on screen."""
     orders = kind.harmonic_orders
     return {
+        **covering_uniforms(kind),
+        "min_normal_cosine": min_normal_cosine(look),
         "camera_to_pixels": camera_to_pixels(camera),
         "harmonic_count": len(orders),
         "first_harmonic": orders[0] if orders else 0,
@@ -278,13 +271,12 @@ def screen_direction_uniforms(kind: FieldKind, look: PixelLook, camera: Camera) 
 def even_line_uniforms(look: PixelLook, item: DrawItem, camera: Camera) -> dict[str, Any]:
     """Return the uniforms of the pass that evaluates the even lines of one instance.
 
-    `camera` is that of the frame.
+    `camera` is the camera of the frame.
     """
     spacing = instance_line_spacing(look, camera, item.instance)
     asked_pixels = 0.0 if look.pixel_size else look.line_distance
     return {
-        **covering_uniforms(item.kind),
-        **screen_direction_uniforms(item.kind, look, camera),
+        **direction_uniforms(item.kind, look, camera),
         "wobble_shift": WOBBLE_SHIFT / WOBBLE_STD,
         "spacing_pixels": spacing * camera.pixels_per_unit,
         "asked_pixels": asked_pixels,

@@ -33,7 +33,7 @@ def barycentrics(
     Returns
     -------
     weights : (P, 3) float32 ndarray
-        Of a point of the triangle, also if the pixel center is outside of it. 1 / 3 each for triangles
+        A point in the triangle, even if the pixel center is outside of it. 1 / 3 each for triangles
         that have no area on screen.
     front_facing : (P,) bool ndarray
         Whether the corners run counter-clockwise on screen.

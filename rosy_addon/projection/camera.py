@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +77,11 @@ class Camera:
         object.__setattr__(self, "height", height)
         object.__setattr__(self, "view", _validated_view(self.view, self.name))
         object.__setattr__(self, "projection", _validated_projection(self.projection, self.name))
+
+    @property
+    def key(self) -> Hashable:
+        """The values of the camera without its name, for keys of caches."""
+        return self.view.tobytes(), self.projection.tobytes(), self.width, self.height
 
     @property
     def is_perspective(self) -> bool:

@@ -60,8 +60,8 @@ class CornerField:
     geometric_normal : (3, T) float32 ndarray
         Unit normals of the triangles, oriented by the order of their corners.
     channels : dict of FieldChannel to (3, T) complex64 ndarray
-        z, and the other values of the field, at each corner. Those of corners 1 and 2 are transported
-        along the arc to n_0.
+        z, and the other values of the field, at each corner. The values at corners 1 and 2 are
+        transported along the arc to n_0.
     """
 
     corner_normals: np.ndarray

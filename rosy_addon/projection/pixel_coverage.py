@@ -1,8 +1,8 @@
 """How much of a pixel each surface covers, from several samples of the pixel.
 
 Only the visible triangle is found at every sample. All else is computed once for a pixel, at its
-center. The samples show the surface that is there, as a rule. Where they do not, at silhouettes and
-creases, they show that of a pixel beside it.
+center. Most samples show the same surface as the center. At silhouettes and creases, a sample may show the
+surface of a neighboring pixel instead.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class _OtherSamples(NamedTuple):
     x, y : (E,) float32 ndarray
         Position in pixels.
     depth : (E,) float32 ndarray
-        Linear on screen for planes, as of `pixel_neighbors.depth_slopes`.
+        Linear on screen for planes; see `pixel_neighbors.depth_slopes`.
     instance_id : (E,) int32 ndarray
         Mesh instance of the visible triangle.
     normal : (3, E) float32 ndarray

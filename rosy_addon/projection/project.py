@@ -229,9 +229,8 @@ def cached_project(
     The key consists of the instances (by identity), the camera (by value), the display and the
     number of samples.
     """
-    camera_key = camera.view.tobytes(), camera.projection.tobytes(), camera.width, camera.height
     return cache.get_or_create(
-        ("G-buffer", tuple(instances), camera_key, camera.name, display, samples),
+        ("G-buffer", tuple(instances), camera.key, camera.name, display, samples),
         partial(project, instances, camera, display, cache, samples),
     )
 

@@ -184,27 +184,13 @@ def _leaf_directions(
     heading : (2, L) float32 ndarray
         See `SurfaceLines`.
     """
-    geometric_normal = corner_field.geometric_normal
-    x, y = tangent_frame_components(geometric_normal)
+    x, y = tangent_frame_components(corner_field.geometric_normal)
     corners = points.take(surface.triangle_vertex, axis=0)
-    sides = corners - corners[:, :1]
+    sides = (corners - corners[:, :1]).transpose(1, 2, 0)
     offset = np.stack(
-        [
-            dot_components(sides[:, corner].T, x) + 1j * dot_components(sides[:, corner].T, y)
-            for corner in range(3)
-        ],
-        axis=1,
+        [dot_components(side, x) + 1j * dot_components(side, y) for side in sides], axis=1
     )
-    reference_x, reference_y = tangent_frame_components(corner_field.corner_normals[0])
-    to_plane = []
-    for corner, normal in enumerate(corner_field.corner_normals):
-        phase = transport_phase(normal, geometric_normal, x, y).astype(np.complex128)
-        if corner:
-            to_reference = transport_phase(
-                normal, corner_field.corner_normals[0], reference_x, reference_y
-            )
-            phase *= to_reference.conj()
-        to_plane.append(phase)
+    to_plane = _rotations_to_planes(corner_field)
     weights = tree.leaf_weights.astype(np.float64)
 
     def at_leaves(values: np.ndarray, order: int) -> np.ndarray:
@@ -221,21 +207,12 @@ def _leaf_directions(
     mean = z.sum(axis=1)
     mean_angle = np.angle(mean) / degree
     angle = mean_angle[:, None] + np.angle(z * mean.conj()[:, None]) / degree
-    deviation = None
-    if symmetry.harmonic_orders:
-        harmonics = [
-            (number, at_leaves(values, rotation_order((kind, number), degree)))
-            for (kind, number), values in corner_field.channels.items()
-            if kind == "deviation"
-        ]
-        deviation = np.empty((*angle.shape, degree), dtype=np.complex128)
-        for direction in range(degree):
-            member = np.exp(1j * (angle + 2 * np.pi * direction / degree))
-            ratio = evaluate_harmonics(harmonics, member)
-            modulus = np.abs(ratio)
-            deviation[..., direction] = np.divide(
-                ratio, modulus, out=np.ones_like(ratio), where=modulus > 0
-            )
+    harmonics = [
+        (number, at_leaves(values, rotation_order((kind, number), degree)))
+        for (kind, number), values in corner_field.channels.items()
+        if kind == "deviation"
+    ]
+    deviation = _deviations(harmonics, angle, degree) if symmetry.harmonic_orders else None
     leaf_offset = np.einsum("lcr,lr->lc", weights, offset.take(tree.leaf_root, axis=0))
     root_area = (offset[:, 1].conj() * offset[:, 2]).imag
     defined = corner_field.representation.any(axis=0) & (root_area > 0)
@@ -253,3 +230,34 @@ def _leaf_directions(
     heading = np.stack([(unit.conj() * second).imag, (first.conj() * unit).imag]) / area
     heading *= directions.defined
     return directions, heading.astype(np.float32)
+
+
+def _rotations_to_planes(corner_field: CornerField) -> list[np.ndarray]:
+    """Return 3 (T,) complex128 rotations of corner values to the frames of the planes of triangles.
+
+    Values of a corner field were transported to corner 0; this is undone first.
+    """
+    plane_frame = tangent_frame_components(corner_field.geometric_normal)
+    first_normal = corner_field.corner_normals[0]
+    first_frame = tangent_frame_components(first_normal)
+    rotations = []
+    for corner, normal in enumerate(corner_field.corner_normals):
+        phase = transport_phase(normal, corner_field.geometric_normal, *plane_frame)
+        phase = phase.astype(np.complex128)
+        if corner:
+            phase *= transport_phase(normal, first_normal, *first_frame).conj()
+        rotations.append(phase)
+    return rotations
+
+
+def _deviations(
+    harmonics: list[tuple[int, np.ndarray]], angle: np.ndarray, degree: int
+) -> np.ndarray:
+    """Return the (L, 3, N) unit rotations of N directions at corners from a RoSy with (L, 3) angles."""
+    members = np.exp(1j * (angle[..., None] + 2 * np.pi * np.arange(degree) / degree))
+    result = np.ones_like(members)
+    for direction in range(degree):
+        ratio = evaluate_harmonics(harmonics, members[..., direction])
+        modulus = np.abs(ratio)
+        np.divide(ratio, modulus, out=result[..., direction], where=modulus > 0)
+    return result

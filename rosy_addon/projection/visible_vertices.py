@@ -265,9 +265,9 @@ class _Scene:
         ----------
         triangle : (n,) ndarray of int
         ndc : (n, 2) float64 ndarray
-            Of the points.
+            Positions of the points, from -1 to 1.
         distance : (n,) float64 ndarray
-            Of the points, along the axis of the camera.
+            Depths of the points, along the axis of the camera.
         """
         corner = self.triangles[triangle]
         a, b, c = np.moveaxis(self.clip[corner][..., (0, 1, 3)], 1, 0)

@@ -22,7 +22,7 @@ from ..projection.gbuffer import MeshInstance
 from .view_input import ViewInput
 
 #: Length of an arrowhead, relative to the least distance between places. The arrowheads of up to five directions
-#: reach 1.75 lengths from their place, outline included, so half a length stays free between those of neighbors.
+#: reach 1.75 lengths from their place, outline included, so half a length stays free between arrowheads of neighbors.
 ARROW_LENGTH = 0.25
 
 #: Least length of an arrowhead, pixels. In a smaller one, the outline leaves nothing of the fill.

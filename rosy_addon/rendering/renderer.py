@@ -1,41 +1,45 @@
-"""`ViewportRenderer`: the protocol of the renderers of 3D views."""
+"""`ViewportRenderer`: the interface of the renderers of 3D views."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
 from ..worker.job import Steps
-from .view_input import Background, ViewInput
+from .view_input import ViewInput
 
 
-class ViewportRenderer(Protocol):
-    """Draws pictures that stay on the graphics card, and composites them over a 3D view.
+class ViewportRenderer:
+    """Draw pictures that stay on the graphics card, and composite them over a 3D view.
 
     Draw items and textures are opaque handles.
 
     Attributes
     ----------
+    device : Device
+        The graphics context of the 3D views (`gpu.device.Device`).
     downscale_factors : (int, int)
         View pixels per picture pixel, each way: of a preview, and of the final picture.
     needs_occluders : bool
         Whether the meshes must include those without a field. Otherwise the view's own depth
         buffer hides what is occluded.
     stand_ins : mapping of str to str
-        LIC methods that it does not have, and those that it draws instead.
+        LIC methods that it does not have, and the methods that it draws instead.
     """
 
+    device: Any
     downscale_factors: tuple[int, int]
-    needs_occluders: bool
-    stand_ins: Mapping[str, str]
+    needs_occluders = False
+    stand_ins: Mapping[str, str] = {}
 
     def prepare_steps(self, instances: Sequence[MeshInstance], display: str) -> Steps[Any]:
         """Do what takes long before a picture: compile shaders, prepare meshes and upload them.
 
         Each step is named before it begins. There are none if everything is prepared.
         """
+        raise NotImplementedError
 
     def upload(self, instances: Sequence[MeshInstance], display: str) -> list[Any]:
         """Return draw items of mesh instances. Meshes that are on the card are not sent again.
@@ -46,9 +50,11 @@ class ViewportRenderer(Protocol):
         display : {"smooth", "flat"}
             `Look.display` of the views that are drawn with them.
         """
+        return list(instances)
 
     def covered_pixels(self, items: Sequence[Any], camera: Camera) -> int:
         """Return an upper bound of the number of pixels that must be drawn."""
+        return camera.width * camera.height
 
     def texture_steps(
         self, items: Sequence[Any], view: ViewInput, target_key: Hashable = None
@@ -69,6 +75,7 @@ class ViewportRenderer(Protocol):
             (H, W, 4), linear, of the size of `view.camera`. None if no mesh with a field is
             visible.
         """
+        raise NotImplementedError
 
     def composite(
         self, texture: Any, items: Sequence[Any], view: ViewInput, opacity: float = 1.0
@@ -84,9 +91,7 @@ class ViewportRenderer(Protocol):
             With the camera and the clip planes of the 3D view.
         opacity : float
         """
-
-    def draw_background(self, background: Background) -> None:
-        """Fill a part of the 3D view that is being drawn, wherever its depth is at the far end."""
+        raise NotImplementedError
 
     def finish(self) -> None:
         """Wait until the device has done all work."""

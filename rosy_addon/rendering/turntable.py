@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
@@ -59,8 +59,8 @@ def turntable_views(
     perspective: bool = True,
     lights: Sequence[Light] = (),
     still: bool = False,
-) -> Iterator[ViewInput]:
-    """Yield the views of a camera that orbits a mesh once, counter-clockwise.
+) -> list[ViewInput]:
+    """Return the views of a camera that orbits a mesh once, counter-clockwise.
 
     Streaks that drift do so by whole cycles, so that the video is a loop.
 
@@ -80,18 +80,16 @@ def turntable_views(
         World space. The camera moves, the lights do not.
     still : bool
         Whether the camera stays at the first view, so that only streaks drift.
-
-    Yields
-    ------
-    ViewInput
     """
     points = instance.face_points() if still else _swept_hull(instance.face_points())
+    views = []
     for index in range(count):
         azimuth = view_angles[0] + (0 if still else 360 * index / count)
         camera = orbit_camera(points, azimuth, view_angles[1], *size, perspective=perspective)
         camera_lights = tuple(light.transformed(camera.view) for light in lights)
         drift = drift_at(look, index, count)
-        yield ViewInput((instance,), camera, look, camera_lights, drift=drift)
+        views.append(ViewInput((instance,), camera, look, camera_lights, drift=drift))
+    return views
 
 
 def draw_next(view: ViewInput, cache: Cache, **options: Any) -> Picture:
@@ -112,7 +110,7 @@ def check_still(look: Look, still: bool, name: str) -> None:
 
 def turntable(
     draw: Callable[[ViewInput], Picture],
-    views: Iterator[ViewInput],
+    views: Iterable[ViewInput],
     count: int,
     path: Path,
     fps: float,
@@ -125,8 +123,8 @@ def turntable(
     ----------
     draw : function
         Draws a view.
-    views : iterator of ViewInput
-        Result of `turntable_views`.
+    views : iterable of ViewInput
+        The result of `turntable_views`, or the views of another video.
     count : int
         Number of views.
     path : Path
@@ -168,7 +166,7 @@ def turntable(
 
 def video_steps(
     draw: Callable[[ViewInput], Steps[Any]],
-    views: Iterator[ViewInput],
+    views: Iterable[ViewInput],
     count: int,
     path: Path,
     fps: float,

@@ -7,6 +7,7 @@ import time
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -113,8 +114,8 @@ class LayerStates:
         """Drop all layers."""
         self._layers.clear()
 
-    def forget(self) -> None:
-        """Read everything again, except what is cached by its contents."""
+    def forget(self, *_: Any) -> None:
+        """Read everything again, except what is cached by its contents. Called by Blender after an undo."""
         self._layers = {
             key: LayerState(SceneReader(layer.reader.cache), is_starting=layer.is_starting)
             for key, layer in self._layers.items()
@@ -246,7 +247,7 @@ class ReferenceImages:
         if image is None:
             return None
         reference = load_reference(scene, depsgraph, render_camera(scene), look, image)
-        key = file_key, reference.camera.view.tobytes(), reference.camera.projection.tobytes()
+        key = file_key, reference.camera.key
         if scene.name not in self._current or self._current[scene.name][0] != key:
             self._current[scene.name] = key, reference
         return self._current[scene.name][1]

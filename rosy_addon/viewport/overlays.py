@@ -288,16 +288,15 @@ def draw_labels(
     blf.color(font_id, 1.0, 1.0, 1.0, 1.0)
     blf.enable(font_id, blf.SHADOW)
     blf.shadow(font_id, 5, 0.0, 0.0, 0.0, 1.0)
-    places, indices, degrees = [], [], []
+    labels = []
     for dots in objects:
         if len(dots.index) > MAX_LABELS:
             continue
         for point, index in zip(dots.points, dots.index.tolist(), strict=True):
             place = location_3d_to_region_2d(context.region, context.region_data, Vector(point))
             if place is not None and not is_occluded(context, point):
-                places.append(place)
-                indices.append(index)
-                degrees.append(dots.degree)
+                labels.append((place, index, dots.degree))
+    places, indices, degrees = zip(*labels, strict=True) if labels else ((), (), ())
     for text, left, bottom in place_indices(
         np.array(places),
         np.array(indices),
@@ -335,23 +334,15 @@ def draw_view_arrowheads(
     overlay: ViewOverlay,
     cache: Cache,
 ) -> None:
-    """Draw arrowheads over the lines of a view. They are placed again if the key of the view changes."""
+    """Draw arrowheads over the lines of a view. Surfaces in front hide them.
+
+    They are placed again if the key of the view changes.
+    """
     if overlay.arrowheads is None or overlay.arrowheads[0] != key:
         triangles = sum(len(instance.surface.triangles) for instance in view.instances)
         is_exact = triangles <= MAX_EXACT_TRIANGLES
         overlay.arrowheads = key, view_arrows(view, cache, is_exact=is_exact)
-    draw_arrowheads(context, overlay.arrowheads[1])
-
-
-def draw_arrowheads(context: bpy.types.Context, marks: ArrowMarks) -> None:
-    """Draw arrowheads in a view. Surfaces in front hide them.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-    marks : ArrowMarks
-        Arrowheads of this view.
-    """
+    marks = overlay.arrowheads[1]
     gpu.state.depth_test_set("LESS_EQUAL")
     for grown, code, nearness in (
         (marks.outline, arrow_marks.OUTLINE_COLOR, NEARNESS - OUTLINE_DISTANCE),

@@ -18,6 +18,7 @@ from ..compositor.flow import NO_DRIFT, Drift
 from ..compositor.look import Look, has_flow
 from ..core.cache import Cache
 from ..core.errors import REPORTED_ERRORS, DeviceError, RosyError, counted, error_text
+from ..gpu.background import draw_background
 from ..gpu.select import look_in_view, select_viewport_renderer
 from ..rendering.view_input import ViewInput
 from ..scene.cameras import camera_of_view
@@ -112,8 +113,8 @@ class ViewportSession:
         self._app_handlers = [
             (handlers.depsgraph_update_post, self.layers.invalidate),
             (handlers.frame_change_post, self.layers.invalidate),
-            (handlers.undo_post, self._on_undo),
-            (handlers.redo_post, self._on_undo),
+            (handlers.undo_post, self.layers.forget),
+            (handlers.redo_post, self.layers.forget),
             (handlers.load_pre, self._on_load),
         ]
         for handler_list, handler in self._app_handlers:
@@ -174,9 +175,6 @@ class ViewportSession:
         redraw_sidebars()
 
     # --- handlers and timers ---------------------------------------------------------------------
-
-    def _on_undo(self, *_: Any) -> None:
-        self.layers.forget()
 
     def _on_load(self, *_: Any) -> None:
         stop()
@@ -299,7 +297,7 @@ class ViewportSession:
         if self.progressive.is_prepared:
             background = view_background(context, depsgraph, view_input.camera, look)
             if background is not None:
-                renderer.draw_background(background)
+                draw_background(renderer.device, background)
         if view.texture is None:
             return
         opacity = OPACITY_IN_EDIT_MODE if context.mode.startswith("EDIT") else OPACITY
@@ -420,13 +418,10 @@ def _pointers(context: bpy.types.Context) -> ViewPointers:
 
 def _picture_key(view_input: ViewInput) -> Hashable:
     """Return a key that changes whenever the picture of a view would change."""
-    camera = view_input.camera
     planes = view_input.clip_planes
     return (
         view_input.instances,
-        camera.view.tobytes(),
-        camera.projection.tobytes(),
-        (camera.width, camera.height),
+        view_input.camera.key,
         view_input.look,
         view_input.drift,
         None if planes is None else planes.tobytes(),

@@ -1,4 +1,4 @@
-"""`Helper`: a process that computes for this one."""
+"""`Helper`: a process that makes long numeric calls for this one."""
 
 from __future__ import annotations
 

@@ -56,22 +56,44 @@ class Step(NamedTuple):
     fraction: float
     label: str
 
+    def __call__(self) -> None:
+        """Report the progress."""
+        report(self.fraction, self.label)
+
 
 #: A job: it yields calls and steps, and results are sent to it. Closing the generator cancels the job.
 Steps = Generator[Call | Step, Any, Result]
 
 
+def advance(steps: Steps[Any], outcome: Callable[[], Any] | None = None) -> Call | Step:
+    """Run a job up to its next call or step, and return it.
+
+    Parameters
+    ----------
+    steps : Steps
+    outcome : callable, optional
+        Returns the result of the last call, or raises its error in the job. None for a job that begins.
+
+    Raises
+    ------
+    StopIteration
+        With the result, if the job is done.
+    """
+    if outcome is None:
+        return next(steps)
+    try:
+        answer = outcome()
+    except Exception as error:
+        return steps.throw(error)
+    return steps.send(answer)
+
+
 def run(steps: Steps[Result]) -> Result:
     """Run a job to its end in this process, and return its result."""
+    step = None
     try:
-        step = next(steps)
         while True:
-            try:
-                answer = step() if isinstance(step, Call) else report(*step)
-            except Exception as error:
-                step = steps.throw(error)
-            else:
-                step = steps.send(answer)
+            step = advance(steps, step)
     except StopIteration as end:
         return end.value
 

@@ -66,76 +66,58 @@ class Pool:
         helper_count = max(min(count or core_count(), len(arguments)) - 1, 0)
         while len(self.helpers) < helper_count:
             self.helpers.append(Helper(ENVIRONMENT))
-        helpers = self.helpers[:helper_count]
-        return _SharedCalls(helpers, function, arguments, function_here or function).make()
+        free = self.helpers[:helper_count]
+        results: list[Any] = [None] * len(arguments)
+        waiting = deque(range(len(arguments)))
+        #: The number of the call of each busy helper.
+        given: dict[Helper, int] = {}
+        report = current_report()
+
+        def attend_to_helpers() -> None:
+            """Take results and give out waiting calls. The calls of lost helpers wait again."""
+            for helper, number in list(given.items()):
+                try:
+                    outcome = helper.poll()
+                    if outcome is not None:
+                        free.append(helper)
+                        del given[helper]
+                        results[number] = outcome()
+                except HelperLostError:
+                    waiting.appendleft(number)
+                    del given[helper]
+            while waiting and free:
+                helper = free.pop()
+                with suppress(HelperLostError):
+                    helper.submit(function, *arguments[waiting[0]])
+                    given[helper] = waiting.popleft()
+
+        def hear(fraction: float, label: str) -> None:
+            """Report the progress of this process, and serve the helpers."""
+            attend_to_helpers()
+            done = len(arguments) - len(waiting) - len(given) - 1
+            report((done + fraction) / len(arguments), label)
+
+        try:
+            while waiting or given:
+                attend_to_helpers()
+                if waiting:
+                    number = waiting.popleft()
+                    with listening(hear):
+                        results[number] = (function_here or function)(*arguments[number])
+                elif given:
+                    wait([helper.connection for helper in given], WAIT_SECONDS)
+                    hear(1.0, "waiting for other processes")
+        except BaseException:
+            for helper in given:
+                helper.close()
+            raise
+        return results
 
     def close(self) -> None:
         """End all helpers."""
         for helper in self.helpers:
             helper.close()
         self.helpers.clear()
-
-
-class _SharedCalls:
-    """Calls that are shared between this process and some helpers."""
-
-    def __init__(
-        self,
-        helpers: Sequence[Helper],
-        function: Callable[..., Any],
-        arguments: Sequence[tuple[Any, ...]],
-        function_here: Callable[..., Any],
-    ) -> None:
-        self._function, self._arguments = function, arguments
-        self._function_here = function_here
-        self._results: list[Any] = [None] * len(arguments)
-        #: Numbers of the calls that have not started, and the number of the call of each busy helper.
-        self._waiting = deque(range(len(arguments)))
-        self._given: dict[Helper, int] = {}
-        self._free = list(helpers)
-        self._report = current_report()
-
-    def make(self) -> list[Any]:
-        """Make all calls, and return their results in order."""
-        try:
-            while self._waiting or self._given:
-                self._attend_to_helpers()
-                if self._waiting:
-                    number = self._waiting.popleft()
-                    with listening(self._hear):
-                        self._results[number] = self._function_here(*self._arguments[number])
-                elif self._given:
-                    wait([helper.connection for helper in self._given], WAIT_SECONDS)
-                    self._hear(1.0, "waiting for other processes")
-        except BaseException:
-            for helper in self._given:
-                helper.close()
-            raise
-        return self._results
-
-    def _hear(self, fraction: float, label: str) -> None:
-        """Report the progress of this process, and serve the helpers."""
-        self._attend_to_helpers()
-        done = len(self._arguments) - len(self._waiting) - len(self._given) - 1
-        self._report((done + fraction) / len(self._arguments), label)
-
-    def _attend_to_helpers(self) -> None:
-        """Take results of helpers and give them waiting calls. The calls of lost helpers wait again."""
-        for helper, number in list(self._given.items()):
-            try:
-                outcome = helper.poll()
-                if outcome is not None:
-                    self._free.append(helper)
-                    del self._given[helper]
-                    self._results[number] = outcome()
-            except HelperLostError:
-                self._waiting.appendleft(number)
-                del self._given[helper]
-        while self._waiting and self._free:
-            helper = self._free.pop()
-            with suppress(HelperLostError):
-                helper.submit(self._function, *self._arguments[self._waiting[0]])
-                self._given[helper] = self._waiting.popleft()
 
 
 #: The helpers of this process.

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any, NoReturn
 
 from ..core.errors import RosyError
 from .helper import Helper, HelperLostError
-from .job import Call, Step, Steps
+from .job import Call, Step, Steps, advance
 
 
 class StepRunner:
@@ -71,11 +70,7 @@ class StepRunner:
                 self._is_submitted, self._is_repeated = False, True
                 return False
             if lost.has_started:
-                problem = (
-                    "the process that computes has ended twice, as it does without enough memory"
-                )
-                error = RosyError(f"{problem}: choose a smaller size or a smaller mesh")
-                self._outcome = partial(_raise, error)
+                self._outcome = _raise_lost
             else:
                 self._helper.is_usable, self.is_in_place = False, True
                 self._outcome = self._call
@@ -94,7 +89,7 @@ class StepRunner:
         outcome, self._call, self._outcome = self._outcome, None, None
         self.is_in_place = self._is_submitted = self._is_repeated = False
         try:
-            step = next(self._steps) if outcome is None else self._continued(outcome)
+            step = advance(self._steps, outcome)
         except BaseException:
             self.is_done = True
             raise
@@ -105,14 +100,6 @@ class StepRunner:
             self.step = step
         return self.step
 
-    def _continued(self, outcome: Callable[[], Any]) -> Call | Step:
-        """Send the result or the error of the call to the steps."""
-        try:
-            answer = outcome()
-        except Exception as error:
-            return self._steps.throw(error)
-        return self._steps.send(answer)
-
     def close(self) -> None:
         """Stop, and end the helper if it works for these steps."""
         if self._is_submitted and self._outcome is None:
@@ -122,5 +109,8 @@ class StepRunner:
         self._steps.close()
 
 
-def _raise(error: Exception) -> NoReturn:
-    raise error
+def _raise_lost() -> NoReturn:
+    raise RosyError(
+        "the process that computes has ended twice, as it does without enough memory: choose a smaller "
+        "size or a smaller mesh"
+    )

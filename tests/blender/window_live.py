@@ -460,7 +460,7 @@ def nothing_is_left():
         switch("ON")
         yield from wait_for_final_pictures()
         held = session_module()._session.progressive.renderer.resources
-        assert held._meshes and held._images
+        assert held._kept
         if ending == "OFF":
             switch("OFF")
         elif ending == "FILE":
@@ -468,7 +468,7 @@ def nothing_is_left():
         else:
             bpy.ops.preferences.addon_disable(module="bl_ext.user_default.rosy")
         yield 0.5
-        assert not (held._meshes or held._images or held._lookup_textures), ending
+        assert not (held._kept or held._lookup_textures), ending
         check_nothing_is_left()
     os.remove(path)
 

@@ -1,7 +1,4 @@
-"""`EglDevice`: runs the shaders without Blender, on OpenGL with an EGL context.
-
-It has the same interface as `rosy_addon.gpu.device.Device`.
-"""
+"""`EglDevice`: runs the shaders without Blender, on OpenGL with an EGL context."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from rosy_addon.gpu.device import NamedValues
+from rosy_addon.gpu.device import Device, NamedValues
 from rosy_addon.gpu.passes import WORKGROUP_SIZE, ComputePass, RasterPass
 
 #: Components and data type of each texel format.
@@ -21,26 +18,18 @@ FORMATS = {"RGBA32F": (4, "f4"), "RGBA16F": (4, "f2"), "RG32F": (2, "f4"), "R32F
 BLENDER_DEFINES = "#define blender_srgb_to_framebuffer_space(color) (color)\n"
 
 
-class EglDevice:
-    """A device on an EGL context, with the interface of `rosy_addon.gpu.device.Device`."""
+class EglDevice(Device):
+    """A device on an EGL context."""
 
     def __init__(self) -> None:
         self.context = moderngl.create_standalone_context(backend="egl", require=430)
-        self._programs: dict[ComputePass | RasterPass, Any] = {}
+        self._shaders: dict[ComputePass | RasterPass, Any] = {}
         self.max_texture_size: int = self.context.info["GL_MAX_TEXTURE_SIZE"]
 
     @property
     def name(self) -> str:
         """The name of the renderer that the driver reports."""
         return self.context.info["GL_RENDERER"]
-
-    def is_compiled(self, shader: ComputePass | RasterPass) -> bool:
-        """As `Device.is_compiled`."""
-        return shader in self._programs
-
-    def compile(self, shader: ComputePass | RasterPass) -> None:
-        """As `Device.compile`."""
-        self._programs[shader] = self._compile(shader)
 
     def texture(
         self,
@@ -50,7 +39,6 @@ class EglDevice:
         layers: int = 0,
         data: np.ndarray | None = None,
     ) -> Any:
-        """As `Device.texture`."""
         if texel_format == "DEPTH_COMPONENT32F":
             return self.context.depth_texture((width, height))
         components, dtype = FORMATS[texel_format]
@@ -62,7 +50,6 @@ class EglDevice:
         return self.context.texture((width, height), components, data, dtype=dtype)
 
     def batch(self, vertices: np.ndarray) -> Any:
-        """As `Device.batch`."""
         return self.context.buffer(np.ascontiguousarray(vertices, dtype=np.float32))
 
     def compute(
@@ -73,7 +60,6 @@ class EglDevice:
         images: NamedValues,
         uniforms: NamedValues,
     ) -> None:
-        """As `Device.compute`."""
         program = self._bind(shader, textures, uniforms)
         for slot, (name, _) in enumerate(shader.images):
             images[_base_name(name)].bind_to_image(slot, read=False, write=True)
@@ -88,7 +74,6 @@ class EglDevice:
         color: Any,
         depth: Any,
     ) -> None:
-        """As `Device.draw`."""
         framebuffer = self.context.framebuffer([color], depth)
         framebuffer.use()
         framebuffer.clear(depth=1.0)
@@ -100,7 +85,6 @@ class EglDevice:
                 self.context.vertex_array(program, [(batch, "4f", "vertex_data")]).render()
 
     def read(self, texture: Any, width: int, height: int) -> np.ndarray:
-        """As `Device.read`."""
         return np.frombuffer(texture.read(), np.float32).reshape(height, width, 4)
 
     def finish(self) -> None:
@@ -110,9 +94,7 @@ class EglDevice:
     def _bind(
         self, shader: ComputePass | RasterPass, textures: NamedValues, uniforms: NamedValues
     ) -> Any:
-        if shader not in self._programs:
-            self._programs[shader] = self._compile(shader)
-        program = self._programs[shader]
+        program = self._program(shader)
         for slot, name in enumerate(shader.textures):
             textures[_base_name(name)].use(slot)
             if _base_name(name) in program:
@@ -123,7 +105,7 @@ class EglDevice:
                 program[name] = uniforms[name]
         return program
 
-    def _compile(self, shader: ComputePass | RasterPass) -> Any:
+    def _compiled(self, shader: ComputePass | RasterPass) -> Any:
         header = "#version 430\n"
         for name in shader.textures:
             header += f"uniform sampler2D{'Array' * name.endswith('[]')} {_base_name(name)};\n"

@@ -1,4 +1,4 @@
-"""Compare the G-buffers and pictures of the graphics card with those of numpy."""
+"""Compare the G-buffers and pictures of the graphics card with the results of numpy."""
 
 from __future__ import annotations
 
@@ -201,7 +201,7 @@ def agreement(
     images : dict of str to (H, W, 4) ndarray
         The G-buffer of the card; see `read_gbuffer`.
     is_center : (P,) bool ndarray, optional
-        As of `Pair`.
+        See `Pair`.
     """
     camera, pixel = gbuffer.camera, gbuffer.pixel
     normals, values = (images[name].reshape(-1, 4) for name in ("normals", "field_values"))

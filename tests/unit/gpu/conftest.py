@@ -13,3 +13,11 @@ def device():
         return EglDevice()
     except Exception as error:
         pytest.skip(f"no OpenGL context through EGL: {error}")
+
+
+@pytest.fixture(scope="module")
+def card(device):
+    """The renderer on this context."""
+    from rosy_addon.gpu.renderer import GpuRenderer
+
+    return GpuRenderer(device)

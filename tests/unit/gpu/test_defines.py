@@ -35,14 +35,10 @@ def literals_of(code):
     }
 
 
-@pytest.mark.parametrize("name", SOURCES)
-def test_every_constant_is_defined(name):
-    local = set(re.findall(r"#define\s+(\w+)", "".join(SOURCES.values())))
-    assert constants_of(SOURCES[name]) <= local | set(DEFINED)
-
-
-def test_every_define_is_used():
-    assert set(DEFINED) <= constants_of("".join(SOURCES.values()))
+def test_every_constant_is_defined_and_used():
+    code = "".join(SOURCES.values())
+    local = set(re.findall(r"#define\s+(\w+)", code))
+    assert set(DEFINED) <= constants_of(code) <= local | set(DEFINED)
 
 
 @pytest.mark.parametrize("name", SOURCES)
@@ -70,10 +66,3 @@ def test_literals_round_to_the_same_number(name):
     text = DEFINED[name].strip("()")
     assert "." in text or "e" in text, "GLSL would read an integer"
     assert np.float32(text) == np.float32(defines.CONSTANTS[name])
-
-
-@pytest.mark.parametrize("shader", passes.all_passes(), ids=lambda shader: shader.name)
-def test_sources_begin_with_the_defines(shader):
-    is_compute = isinstance(shader, passes.ComputePass)
-    source = shader.source if is_compute else shader.fragment_source
-    assert source.startswith(defines.shader_defines())

@@ -19,9 +19,9 @@ import numpy as np
 
 from ..field.blocks import concatenated_ranges
 from ..field.surface import Surface
-from .camera import Camera
-from .gbuffer import MeshInstance
-from .project import all_triangles
+from ..projection.camera import Camera
+from ..projection.gbuffer import MeshInstance
+from ..projection.project import all_triangles
 
 #: Points in the area of a square whose side is the spacing.
 POINTS_PER_SPACING = 8

@@ -1,0 +1,355 @@
+"""Looks, lights, tones and colors: pictures of the card and of numpy, of the same pixels by brute force.
+
+These tests are skipped without moderngl or without a context (EGL; software OpenGL is enough).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import long, mainly
+from harness.gpu_parity import draw_pair
+from harness.gpu_scenes import (
+    BALL,
+    FREE,
+    LOOK,
+    ROSY,
+    assert_parity,
+    ball,
+    card_rgba,
+    draw,
+    face_centers,
+    field_of,
+    shown,
+    smooth_field,
+    view,
+)
+from shapes import plane
+
+from rosy_addon.compositor.flow import NO_DRIFT, Drift
+from rosy_addon.compositor.shading import Light
+from rosy_addon.compositor.target_tone import ReferenceRender
+from rosy_addon.field.rosy_field import RosyField
+from rosy_addon.preset_files.store import load_preset
+from rosy_addon.projection.surface_tone import SurfaceTone
+from rosy_addon.rendering.view_input import ViewInput
+
+
+@pytest.mark.parametrize("perspective", [True, False])
+@pytest.mark.parametrize("degree", [1, 3, 4, 12, *long(2, 5, 6, 7)])
+def test_all_degrees(card, degree, perspective):
+    assert_parity(card, [ball(degree)], view(perspective=perspective))
+
+
+BOTH = {"hue": "magnitude", "magnitude_length": True}
+ON_SURFACE = {"anchor": "surface"}
+HATCH = {"ink": "hatch", "shading": 0.9, "line_width": 2.5}
+LIGHT_INK = HATCH | {"ink_color": "#ffd060", "paper_color": "#101020"}
+EVEN = {"ink": "even", "shading": 0.9, "line_width": 3.0, "line_distance": 6.0}
+UNEVEN = {"wobble": 0.7, "breaks": 0.4, "paper_grain": 0.5}
+#: Streaks that drift, at a phase at which no kernel is where it is at rest.
+DRIFTING = {"flow": 2.0, "drift": Drift(0.2)}
+
+#: The first half of these looks has every part of the shaders; `make test LONG=1` draws all.
+LOOKS = {
+    "color noise": {"hue": "noise"},
+    "magnitude as color, with a range": {"hue": "magnitude", "color_range": (0.0, 0.8)},
+    "magnitude as both, with an inverted range": BOTH | {"color_range": (1.1, 0.6)},
+    "magnitude as length": {"magnitude_length": True},
+    "magnitude as both": BOTH | {"color_map": "magma"},
+    "families, of a field without families": {"hue": "families"},
+    "oriented, three directions": {"fade": "tail", "degree": 3, "density": 0.03},
+    "supersampled color noise": {"supersampling": 2, "hue": "noise", "degree": 3},
+    "guided, five directions": {"guiding_angle": -2.5, "degree": 5},
+    "flat": {"display": "flat"},
+    "shaded": {"shading": 0.7},
+    "coarse noise": {"line_width": 5.0, "seed": 7},
+    "on the surface, supersampled": ON_SURFACE | {"supersampling": 2, "seed": 3},
+    "on the surface, color noise": ON_SURFACE | {"hue": "noise", "high_pass": 0.0},
+    "in Blender units": ON_SURFACE | {"unit_size": 0.007},
+    "fine on small features": ON_SURFACE | {"detail": 0.7, "line_width": 2.5},
+    "hatched": {"ink": "hatch", "shading": 1.0, "line_width": 3.0},
+    "hatched, oriented": HATCH | {"fade": "tail", "degree": 5, "breaks": 0.4},
+    "hatched, breaks and length by magnitude": HATCH | BOTH | {"breaks": 0.8, "degree": 3},
+    "hatched on paper grain, supersampled": HATCH
+    | {"paper_grain": 0.6, "supersampling": 2, "crispness": 0.3, "seed": 5},
+    "hatched, an ink per family": HATCH | {"hue": "families", "degree": 6, "layering": 0.1},
+    "hatched, ink ramp, light on dark": LIGHT_INK | {"hue": "tone", "ink_color_light": "#fff0f0"},
+    "hatched in Blender units, uneven": ON_SURFACE
+    | HATCH
+    | UNEVEN
+    | {"unit_size": 0.012, "overshoot": 5.0},
+    "hatched by families, with an outline": LIGHT_INK
+    | {"hue": "families", "outline": 1.5, "supersampling": 2},
+    "hatched, overshoot": HATCH | {"light": "lamp", "shadows": True, "overshoot": 9.0, "length": 7},
+    "hatched, all effects": HATCH
+    | ON_SURFACE
+    | UNEVEN
+    | {"hue": "families", "degree": 5, "guiding_angle": 0.5, "supersampling": 2},
+    "even lines, supersampled": EVEN
+    | {"light": "lamp", "supersampling": 2, "degree": 6, "layers": 2, "guiding_angle": 0.5},
+    "even lines of an odd degree, soft": EVEN | {"degree": 3, "crispness": 0.3, "hue": "families"},
+    "even lines in Blender units, uneven": ON_SURFACE
+    | EVEN
+    | UNEVEN
+    | {"unit_size": 0.012, "overshoot": 5.0},
+    "the method members": {"method": "members", "weights": "none", "view_plane": False},
+    "drifting": DRIFTING,
+    "drifting, oriented": DRIFTING | {"fade": "tail", "degree": 1, "density": 0.03},
+    "drifting, three directions": DRIFTING
+    | {"fade": "ends", "degree": 3, "drift": Drift(0.2, 0.4)},
+    "drifting on the surface": DRIFTING | ON_SURFACE,
+    "drifting, hatched, breaks and length by magnitude": DRIFTING
+    | HATCH
+    | {"breaks": 0.8, "magnitude_length": True, "degree": 3, "overshoot": 15.0},
+    "drifting breaks of even lines": DRIFTING | EVEN | {"breaks": 0.7, "degree": 2},
+}
+FURTHER_LOOKS = {
+    "default": {},
+    "color noise, three directions": {"hue": "noise", "degree": 3},
+    "magnitude as gray": {"hue": "magnitude", "color_map": "gray"},
+    "magnitude as length, with a range": {"magnitude_length": True, "color_range": (0.0, 1.5)},
+    "magnitude as both, two directions": BOTH | {"color_range": (0.0, 0.9), "degree": 2},
+    "oriented, of lines without a direction": {"fade": "tail"},
+    "supersampled": {"supersampling": 2},
+    "guided": {"guiding_angle": 0.7},
+    "flat, across creases": {"display": "flat", "crease_angle": 3.1416},
+    "white noise": {"density": 0.5, "high_pass": 0.0, "gain": 1.0},
+    "long": {"length": 200},
+    "in Blender units, anchored to the picture": {"unit_size": 0.03, "supersampling": 2},
+    "hatched, with breaks": HATCH | {"breaks": 1.0, "length": 60},
+    "hatched, wobbling with the surface": HATCH
+    | ON_SURFACE
+    | {"wobble": 1.0, "supersampling": 2, "degree": 3},
+    "hatched light on dark, overshoot by magnitude": LIGHT_INK
+    | {"overshoot": 20.0, "magnitude_length": True},
+    "even lines": EVEN,
+    "the method brute": {"method": "brute"},
+    "drifting, two directions, guided": DRIFTING | {"degree": 2, "guiding_angle": 0.9},
+    "drifting, magnitude as both": DRIFTING | BOTH,
+    "drifting, short streaks": DRIFTING
+    | {"length": 9, "drift": Drift(0.2, 4.4), "supersampling": 2},
+    "color noise, which does not drift": DRIFTING | {"hue": "noise"},
+}
+
+
+def look_of(look_settings):
+    """Return a look, the degree of its field, and how far its streaks have drifted."""
+    look_settings = {"degree": 4, "drift": NO_DRIFT, **look_settings}
+    degree, drift = look_settings.pop("degree"), look_settings.pop("drift")
+    return LOOK.with_settings(look_settings), degree, drift
+
+
+@pytest.mark.parametrize("name", mainly(LOOKS, LOOKS | FURTHER_LOOKS))
+def test_looks(card, name):
+    look, degree, drift = look_of((LOOKS | FURTHER_LOOKS)[name])
+    assert_parity(card, [ball(degree)], look=look, drift=drift)
+
+
+UNDEFINED_LOOKS = {
+    "soft": {},
+    "hatched": HATCH,
+    "hatched, all effects": LOOKS["hatched, all effects"],
+    "drifting, hatched": DRIFTING | HATCH | {"fade": "ends"},
+}
+FURTHER_UNDEFINED_LOOKS = {
+    "families": {"hue": "families"},
+    "magnitude": BOTH,
+    "even lines": EVEN,
+    "drifting": DRIFTING,
+}
+
+
+@pytest.mark.parametrize("name", mainly(UNDEFINED_LOOKS, UNDEFINED_LOOKS | FURTHER_UNDEFINED_LOOKS))
+@pytest.mark.parametrize("degree", [3, *long(4)])
+def test_where_the_field_is_undefined(card, degree, name):
+    look, _, drift = look_of((UNDEFINED_LOOKS | FURTHER_UNDEFINED_LOOKS)[name])
+    center = face_centers(BALL)
+    is_undefined = (center[:, :1] > 0.2) | (center[:, 2:] > 0.6)
+    vectors = np.where(is_undefined, 0.0, smooth_field(BALL, degree).vectors)
+    field = RosyField(degree, vectors, family_count=2 if degree == 4 else 3)
+    assert_parity(card, [shown(BALL, field)], look=look, drift=drift)
+
+
+@pytest.mark.parametrize("look_settings", [{}, BOTH, {"hue": "families"}], ids=str)
+def test_a_field_that_is_undefined_everywhere(card, look_settings):
+    field = RosyField(4, np.zeros((BALL.face_count, 3)))
+    rgba = card_rgba(card, [shown(BALL, field)], replace(LOOK, **look_settings))
+    assert np.isfinite(rgba).all() and rgba[..., 3].any()
+
+
+@pytest.mark.parametrize("side", [3, *long(2)])
+def test_subpixels(card, side):
+    """Borders have the color of their covered part."""
+    pair = assert_parity(card, [ball(2)], look=replace(LOOK, supersampling=side, line_width=3.0))
+    border = (pair.numpy[..., 3] > 0) & (pair.numpy[..., 3] < 1) & (pair.card[..., 3] > 0)
+    assert border.sum() > 100
+    colors = (picture[border][:, :3].mean() for picture in (pair.card, pair.numpy))
+    np.testing.assert_allclose(*colors, atol=0.01)
+
+
+@pytest.mark.parametrize("preset", ["default", "plaid", "cross-hatch", "charcoal"])
+def test_samples_show_what_numpy_draws(card, preset):
+    """Tone and contrast of the default method, whose streaks are smooth in another way."""
+    look = replace(load_preset(preset).look, supersampling=2)
+    view_input = ViewInput((ball(),), view((240, 216)), look)
+    drawn = [draw(renderer, view_input).rgba for renderer in (card, None)]
+    inside = np.logical_and(*(rgba[..., 3] == 1 for rgba in drawn))
+    of_card, of_numpy = (rgba[inside][:, :3] for rgba in drawn)
+    assert inside.sum() > 10_000
+    np.testing.assert_allclose(of_card.mean(), of_numpy.mean(), rtol=0.01)
+    np.testing.assert_allclose(of_card.std(), of_numpy.std(), rtol=0.03)
+    assert np.corrcoef(of_card.ravel(), of_numpy.ravel())[0, 1] > 0.94
+
+
+@pytest.mark.parametrize("paper", ["#ffffff00", "#e0c08080"])
+@pytest.mark.parametrize("hue", ["one", "families"])
+def test_ink_on_paper_that_is_not_opaque(card, hue, paper):
+    look = replace(LOOK, ink="hatch", shading=1.0, paper_color=paper, hue=hue, line_width=3.0)
+    pair = draw_pair(ROSY, card, [ball()], view(), look)
+    card_alpha, numpy_alpha = (picture[..., 3] for picture in (pair.card, pair.numpy))
+    assert 0.2 < numpy_alpha[numpy_alpha > 0].mean() < 0.8
+    assert np.corrcoef(card_alpha.ravel(), numpy_alpha.ravel())[0, 1] > 0.98
+    both = (card_alpha > 0.2) & (numpy_alpha > 0.2)
+    medians = (np.median(picture[both], axis=0) for picture in (pair.card, pair.numpy))
+    np.testing.assert_allclose(*medians, atol=0.01)
+
+
+# --- light ---------------------------------------------------------------------------------------
+
+SUN = Light("sun", np.array([0.6, 0.0, 0.8]), np.array([1.0, 0.6, 0.3]), 0.9)
+POINT = Light("point", np.array([-1.0, 0.5, -2.0]), np.array([0.2, 0.5, 1.0]), 3.0)
+NEAR_POINT = replace(POINT, vector=np.array([0.1, 1.3, -4.0]))
+
+
+@pytest.mark.parametrize("lights", [[], [SUN], [POINT], [SUN, POINT]])
+@pytest.mark.parametrize("perspective", [True, False])
+def test_lights_of_the_scene(card, lights, perspective):
+    look = replace(LOOK, shading=0.8, light="scene")
+    assert_parity(card, [ball()], view(perspective=perspective), look, lights)
+
+
+def test_a_headlight_ignores_lights(card):
+    look = replace(LOOK, shading=0.8)
+    dark, lit = (card_rgba(card, [ball()], look, lights=lights) for lights in ((), (SUN,)))
+    np.testing.assert_array_equal(dark, lit)
+
+
+@pytest.mark.parametrize("lights", [[SUN, POINT], *long([SUN], [POINT], [NEAR_POINT])])
+@pytest.mark.parametrize("ink", ["soft", "hatch"])
+def test_shadows(card, lights, ink):
+    """On the ground, on each other, and of an occluder; with one shadow map of a light or six."""
+    ground = plane(4, 4)
+    instances = [
+        shown(ground, field_of(ground, 4), 2.0, (0, 0, -0.6)),
+        ball(4, 0.5, (-0.5, 0.2, 0)),
+        shown(BALL, None, 0.3, (0.6, -0.3, 0.1)),
+    ]
+    look = replace(LOOK, light="scene", shading=0.9, shadows=True, ink=ink)
+    shaded = assert_parity(card, instances, look=look, lights=lights, agreement=0.995)
+    bare = card_rgba(card, instances, replace(look, shadows=False), lights=tuple(lights))
+    assert shaded.card[..., :3].mean() < 0.98 * bare[..., :3].mean()
+
+
+# --- tones and numbers ---------------------------------------------------------------------------
+
+TONED = {
+    "unchanged": {},
+    "lit": {"tone_lit": True, "light": "lamp", "shading": 0.8},
+    "tone curve": {"tone_levels": (0.2, 0.7, 1.8)},
+    "inverted": {"tone_levels": (1.0, 0.0, 1.0)},
+    "hatched": {"ink": "hatch", "line_width": 3.0},
+}
+
+
+def toned(tone, field=None, linear=1.0, shift=(0, 0, 0)):
+    """Return a ball with a surface tone."""
+    return replace(shown(BALL, field or field_of(BALL, 4), linear, shift), tone=tone)
+
+
+def waves():
+    """Return a tone of waves, as numbers at corners."""
+    values = 0.5 + 0.4 * np.sin(3 * BALL.vertices[BALL.corner_vertex] @ (1.0, 0.3, 0.5))
+    return SurfaceTone(values[:, None].astype(np.float32))
+
+
+def checkerboard(repeat):
+    """Return a checkerboard image and a UV map of the ball, on which some texels are very small."""
+    x, y, z = BALL.vertices[BALL.corner_vertex].T
+    uv = np.stack([0.5 + 0.5 * x + 0.1 * z, 0.5 + 0.5 * z - 0.1 * y], axis=1) * repeat
+    row, column = np.indices((200, 230))
+    board = 0.2 + 0.6 * ((row // 11 + column // 13) % 2)
+    return SurfaceTone(uv.astype(np.float32), board.astype(np.float32))
+
+
+def reference_of(resolution):
+    luminance = np.random.default_rng(1).random((18 * resolution, 20 * resolution))
+    return ReferenceRender(luminance.astype(np.float32), view(azimuth=0.5))
+
+
+@pytest.mark.parametrize("name", TONED)
+@pytest.mark.parametrize(("tone", "scale"), [("image", 0.5), ("image", 3), ("picture", 1)])
+@pytest.mark.parametrize("perspective", [True, *long(False)])
+def test_tones(card, name, tone, scale, perspective):
+    """Of images and of pictures, of more texels or fewer than the picture has pixels."""
+    look = replace(LOOK, tone=tone, **TONED[name])
+    instance = toned(checkerboard(scale) if tone == "image" else None)
+    reference = reference_of(scale) if tone == "picture" else None
+    camera = view(perspective=perspective)
+    assert_parity(card, [instance], camera, look, reference=reference)
+
+
+@pytest.mark.parametrize("name", TONED)
+@pytest.mark.parametrize("perspective", [True, False])
+def test_tones_of_attributes(card, name, perspective):
+    look = replace(LOOK, tone="attribute", **TONED[name])
+    assert_parity(card, [toned(waves())], view(perspective=perspective), look)
+
+
+def test_meshes_without_a_tone_use_the_light(card):
+    instances = [toned(waves(), None, 0.5, (-0.6, 0, 0)), ball(4, 0.5, (0.6, 0, 0))]
+    look = replace(LOOK, tone="attribute", tone_levels=(0.0, 1.0, 1.5), shading=0.8)
+    assert_parity(card, instances, look=look)
+
+
+COLORED = {
+    "soft": {},
+    "hatched": {"ink": "hatch", "line_width": 3.0, "outline": 2.0},
+    "light ink": {"ink": "hatch", "ink_color": "#f0f0e0", "paper_color": "#101018", "layers": 1},
+    "inks that are nearly paper": {"ink": "hatch", "shading": 0.95, "light": "lamp"}
+    | {"line_width": 3.0, "color_range": (-1.0, 1.0), "color_map": "gray"},
+    "a range, inverted": {"color_range": (0.8, 0.2), "color_map": "magma"},
+    "with tones": {"tone": "attribute", "tone_levels": (0.0, 1.0, 1.5)},
+}
+
+
+def numbered(tone=None, field=None, linear=1.0, shift=(0, 0, 0)):
+    """Return a ball with numbers of waves, and without some of them on one side."""
+    x = BALL.vertices[BALL.corner_vertex, 0]
+    values = np.where(x > 0.3, np.nan, waves().values[:, 0]).astype(np.float32)
+    return replace(toned(tone, field, linear, shift), color_values=values)
+
+
+@pytest.mark.parametrize("name", COLORED)
+def test_colors_of_numbers(card, name):
+    look = replace(LOOK, hue="values", **COLORED[name])
+    assert_parity(card, [numbered(waves() if look.tone == "attribute" else None)], look=look)
+
+
+def test_numbers_beside_meshes_without_them(card):
+    """The numbers that are out of view count for the range."""
+    hidden = numbered(linear=0.5, shift=(0, 0, 90))
+    hidden = replace(hidden, color_values=3 * hidden.color_values)
+    instances = [numbered(linear=0.5, shift=(-0.6, 0, 0)), ball(4, 0.5, (0.6, 0, 0)), hidden]
+    assert_parity(card, instances, look=replace(LOOK, hue="values"))
+
+
+@pytest.mark.parametrize("hue", ["one", "values"])
+def test_tones_and_numbers_with_free_directions(card, hue):
+    """The records then contain channels as well."""
+    field = FREE["two lines"](BALL)
+    instance = toned(waves(), field) if hue == "one" else numbered(waves(), field)
+    look = replace(LOOK, tone="attribute", hue=hue, anchor="surface" if hue == "one" else "picture")
+    assert_parity(card, [instance], look=look)

@@ -256,11 +256,8 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
     cell_noise[cell_of_pixel] = noise
     max_noise = max(float(np.abs(noise).max()), 1e-30)
     max_slope = 2 * max_noise / (SHORT_STEP if look.is_on_surface else 1.0)
-    quantize = [
-        np.float32(INT16_MAX),
-        np.float32(INT16_MAX / max_noise),
-        np.float32(INT16_MAX / max_slope),
-    ]
+    maxima = (1.0, max_noise, max_slope)
+    quantize = [np.float32(INT16_MAX / largest) for largest in maxima]
     state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
     for block in reported_blocks(count, "finding directions"):
         block_cells = cell_of_pixel[block]
@@ -278,13 +275,7 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
             step_x, step_y = _to_screen(field, block, *direction, look.is_on_surface)
             slope_x, slope_y = step_x, step_y
             if look.is_on_surface:
-                # Steps are at most one row or one column of pixels.
-                scale = 1 / np.maximum(np.maximum(np.abs(step_x), np.abs(step_y)), np.float32(1))
-                step_x, step_y = step_x * scale, step_y * scale
-                # A derivative to the left is multiplied by a distance to the left (see
-                # `streamline_batch`). Both are proportional to the length of the step.
-                square = np.maximum(step_x * step_x + step_y * step_y, np.float32(SHORT_STEP**2))
-                slope_x, slope_y = step_x / square, step_y / square
+                (step_x, step_y), (slope_x, slope_y) = _surface_steps(step_x, step_y)
             rows[:, 3::2] = np.rint(up * slope_x[:, None] - right * slope_y[:, None])
             step_x, step_y = step_x * quantize[0], step_y * quantize[0]
             rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
@@ -303,14 +294,22 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
         cell_of_pixel=cell_of_pixel,
         packed_phase=packed_phase,
         state_table=state_table.reshape(-1, state_table.shape[2]),
-        state_scales=(
-            1 / INT16_MAX,
-            max_noise / INT16_MAX,
-            max_slope / INT16_MAX,
-        ),
+        state_scales=tuple(largest / INT16_MAX for largest in maxima),
         seams=seams,
         has_directions=not field.symmetry.has_opposites,
     )
+
+
+def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Shorten steps to at most one row or column of pixels, and return factors of the noise gradient, too.
+
+    A derivative to the left is multiplied by a distance to the left (see `streamline_batch`). Both are
+    proportional to the length of the step, so the factors are divided by its square.
+    """
+    scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
+    x, y = x * scale, y * scale
+    square = np.maximum(x * x + y * y, np.float32(SHORT_STEP**2))
+    return [(x, y), (x / square, y / square)]
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:

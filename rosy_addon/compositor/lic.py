@@ -16,8 +16,7 @@ from .image_noise import NOISE_MEAN, image_noise
 from .lic_images import LicImages
 from .look import has_flow
 from .look_units import PixelLook
-from .member_decomposition import member_decomposition
-from .per_pixel_lic import brute_force
+from .per_pixel_lic import brute_force, member_decomposition
 from .pixel_field import PixelField
 from .strips import Strip
 

@@ -7,10 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..annotation.singularity_settings import (
-    singularity_dots_choice,
-    singularity_size_number,
-)
+from ..annotation.singularity_settings import singularity_dots_choice, singularity_size_number
 from ..core.errors import RosyError
 from ..core.settings import (
     Numbers,
@@ -90,10 +87,6 @@ def has_tone_inks(look: Any) -> bool:
     return is_hatched(look) and look.hue == "tone"
 
 
-#: Where the settings of singularities are shown, and the stage that they affect.
-_SINGULARITIES: dict[str, Any] = {"panel": "singularities", "stage": Stage.SHADING}
-
-
 def _shading(panel: str, applies: Callable[[Any], bool] = always) -> dict[str, Any]:
     """Return the arguments of settings that a panel shows, and that no LIC image depends on."""
     return {"panel": panel, "stage": Stage.SHADING, "applies": applies}
@@ -112,8 +105,8 @@ class Look:
     `unit_size` Blender units.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
-    this package, and declare and use the uniform of that name in the shader. A length is also a field
-    of `look_units.PixelLook`. All else is derived from the field; see `rosy_addon.core.settings`.
+    this package, and declare and use the uniform of that name in the shader. All else is derived from
+    the field; see `rosy_addon.core.settings`.
 
     Raises
     ------
@@ -473,8 +466,8 @@ class Look:
         is_pixel_length=True,
         **_ink(),
     )
-    singularity_dots: str = singularity_dots_choice(**_SINGULARITIES)
-    singularity_size: float = singularity_size_number(**_SINGULARITIES)
+    singularity_dots: str = singularity_dots_choice(panel="singularities", stage=Stage.SHADING)
+    singularity_size: float = singularity_size_number(panel="singularities", stage=Stage.SHADING)
     supersampling: int = number(
         1,
         1,

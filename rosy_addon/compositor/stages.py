@@ -91,7 +91,8 @@ class ComposeStages:
         if looks[0].method != "ibfv" or not has_flow(looks[0]):
             return self._convolved(partial(lic_lengths, strip=strip), field, looks)
         # The waves are the same at all times and speeds; see `ibfv`.
-        still = [replace(look, flow=1.0, flow_phase=0.0).lic_key() for look in looks]
+        settings = replace(looks[0].look, flow=1.0)
+        still = [replace(look, look=settings, flow_phase=0.0).lic_key() for look in looks]
         key = "streak waves", self._gbuffer, field.degree, *still
         compute = partial(self._convolved, streak_waves, field, looks)
         return wave_images(self._cache.get_or_create(key, compute), looks)

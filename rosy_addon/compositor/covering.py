@@ -31,7 +31,7 @@ from ..core.progress import report
 from ..field.directional_field import evaluate_harmonics
 from .flow import forward_share
 from .look_units import PixelLook
-from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized, pixel_window
 from .reported_blocks import reported_blocks
 
 #: The largest integer in `Covering.state_table`.
@@ -248,7 +248,8 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
     """
     degree, (count, channels) = field.degree, noise.shape
     line_count, per_turn = field.line_count, field.symmetry.sheets_per_turn
-    cell_of_pixel, width, cell_count = _pixel_window(field)
+    cell_of_pixel, (height, width) = pixel_window(field.pixel, field.width, 1)
+    cell_count = height * width
     report(0.0, "finding directions")
     # Streamlines that have ended stay in `SINK_CELL`.
     packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
@@ -331,15 +332,6 @@ def rows_as_scalars(table: np.ndarray) -> np.ndarray:
     """An (n,) view of an (n, k) array, with each row of 8 or 16 bytes as one complex scalar."""
     scalar_type = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
     return table.view(scalar_type)[:, 0]
-
-
-def _pixel_window(field: PixelField) -> tuple[np.ndarray, int, int]:
-    """The cell of each pixel, the width of the window, and its number of cells."""
-    row, column = np.divmod(field.pixel, np.int32(field.width))
-    bottom, left = row[0], column.min()
-    width = int(column.max() - left) + 3
-    cell = (row - (bottom - 1)) * np.int32(width) + (column - (left - 1))
-    return cell, width, (int(row[-1] - bottom) + 3) * width
 
 
 def _noise_gradient(

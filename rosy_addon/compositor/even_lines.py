@@ -85,9 +85,8 @@ class EvenLines:
 
     def part(self, extent: slice) -> EvenLines:
         """Return the lines at some of the pixels."""
-        growth = None if self.growth is None else self.growth[extent]
-        coarse = None if self.coarse_streaks is None else self.coarse_streaks[:, extent]
-        return EvenLines(self.streaks[:, extent], self.period[:, extent], growth, coarse)
+        arrays = self.streaks, self.period, self.growth, self.coarse_streaks
+        return EvenLines(*(None if values is None else values[..., extent] for values in arrays))
 
     def coverage(self, line: int, target_coverage: np.ndarray, look: PixelLook) -> np.ndarray:
         """Compute the coverage of each pixel by one line.

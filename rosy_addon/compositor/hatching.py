@@ -87,15 +87,7 @@ class LineModulation(NamedTuple):
 
     def part(self, extent: slice) -> LineModulation:
         """Return the modulation at some of the pixels."""
-        breaks, grain, tones, outline, undirected, even_lines = self
-        return LineModulation(
-            None if breaks is None else breaks.part(extent),
-            None if grain is None else grain[:, extent],
-            None if tones is None else tones[:, extent],
-            None if outline is None else outline[extent],
-            None if undirected is None else undirected[extent],
-            None if even_lines is None else even_lines.part(extent),
-        )
+        return LineModulation(*(_part(values, extent) for values in self))
 
     def relief(self, line: int, look: PixelLook) -> np.ndarray | np.float32:
         """Return what the paper adds to the streaks of a line: (P,) float32, or 0 without paper grain."""
@@ -113,6 +105,13 @@ class LineModulation(NamedTuple):
         """Return (P,) float32 streaks of the undirected texture, NaN where the field is defined."""
         std = np.float32(look_streak_statistics(look).disc_std)
         return self.undirected / std + self.relief(line, look)
+
+
+def _part(values: Any, extent: slice) -> Any:
+    """Return an array or other values at some of the pixels; None if there are none."""
+    if values is None:
+        return None
+    return values[..., extent] if isinstance(values, np.ndarray) else values.part(extent)
 
 
 def render_hatching(

@@ -1,16 +1,20 @@
-"""Image-space noise from an integer hash, and the variance of its mean along a streamline."""
+"""Image-space noise from an integer hash, and the variance of its mean along a streamline.
+
+Images that are anchored to the picture are computed for whole tiles. These do not change while the visible
+region changes a little, so they stay cached for later pictures.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
-from typing import Literal
+from collections.abc import Callable, Hashable, Sequence
+from functools import lru_cache, partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ..core.cache import Cache
 from ..core.progress import progress, report
 from .filter_kernel import Kernel
-from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks
 
 #: Mean and standard deviation of binary noise.
@@ -42,11 +46,19 @@ BLOCK_ROWS = 32
 #: Sample points along each side of a pixel. Noise is averaged over their square grid.
 TAPS_PER_SIDE = 3
 
-
 #: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
 HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
 SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
 FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
+
+#: Side of a tile in pixels.
+TILE_PIXELS = 256
+
+#: Maximum number of pixels of an image that is cached for the next picture.
+MAX_CACHED_PIXELS = 1 << 22
+
+#: The cached images. It holds eight of the largest.
+TILE_CACHE = Cache(max_bytes=8 * 4 * MAX_CACHED_PIXELS)
 
 
 def hash_bits(
@@ -81,6 +93,66 @@ def hash_bits(
     h ^= h >> np.uint32(15)
     h *= np.uint32(FINALIZER_FACTORS[1])
     return h >> np.uint32(8) < np.uint32(round(density * 2**24))
+
+
+class TileRectangle(NamedTuple):
+    """A rectangle of the picture that consists of whole tiles; rows from the bottom, in pixels."""
+
+    left: int
+    right: int
+    bottom: int
+    top: int
+
+    def index(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Return the flat indices of pixels in the rectangle, row by row."""
+        return (row - self.bottom) * np.int32(self.right - self.left) + (column - self.left)
+
+
+def tile_rectangle(
+    pixel: np.ndarray, width: int, subpixels: int = 1, extra_columns: int = 0
+) -> TileRectangle:
+    """Return the rectangle that covers some pixels.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixel indices into a supersampled frame, ascending.
+    width : int
+        Width of that frame in pixels.
+    subpixels : int
+        Subpixels along each side of a pixel. The rectangle is in pixels, not in subpixels.
+    extra_columns : int
+        Columns that are added at the right.
+    """
+    column = pixel % np.int32(width)
+    left, right = int(column.min()) // subpixels, int(column.max()) // subpixels + 1
+    bottom, top = (int(end) // width // subpixels for end in pixel[[0, -1]])
+    return TileRectangle(
+        *_round_outward(left, right + extra_columns), *_round_outward(bottom, top + 1)
+    )
+
+
+def _round_outward(start: int, stop: int) -> tuple[int, int]:
+    """Round a range of rows or columns outward to whole tiles."""
+    return start // TILE_PIXELS * TILE_PIXELS, -(-stop // TILE_PIXELS) * TILE_PIXELS
+
+
+def cached_tiles(
+    create: Callable[..., np.ndarray],
+    rectangle: TileRectangle,
+    *settings: Hashable,
+) -> np.ndarray:
+    """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
+
+    It is a flat image of the rectangle. Large images are not stored.
+    """
+    left, right, bottom, top = rectangle
+    if (right - left) * (top - bottom) > MAX_CACHED_PIXELS:
+        return create(rectangle, *settings)
+    key = create.__name__, rectangle, settings
+    image = TILE_CACHE.get_or_create(key, partial(create, rectangle, *settings))
+    TILE_CACHE.evict_over_limit()
+    return image
 
 
 def image_noise(

@@ -21,6 +21,7 @@ from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
 from ..projection.project import project_samples
 from .look import crease_angle_of
 from .look_units import PixelLook
+from .pixel_field import pixel_window
 from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
@@ -150,14 +151,14 @@ def _sample_outline(
 
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
     """(P,) bool: whether a marked pixel is in the square of this radius, in pixels, around a pixel."""
-    width, height = gbuffer.camera.width, gbuffer.camera.height
-    padded = np.zeros((height + 2 * radius, width + 2 * radius), dtype=bool)
-    row, column = np.divmod(gbuffer.pixel, np.int32(width))
-    padded[row[is_marked] + radius, column[is_marked] + radius] = True
+    cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, radius)
+    padded = np.zeros(shape, dtype=bool)
+    padded.reshape(-1)[cell[is_marked]] = True
     for axis in (0, 1):
         windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1, axis=axis)
         padded = windows.any(axis=-1)
-    return padded[row, column]
+    row, column = np.divmod(cell, np.int32(shape[1]))
+    return padded[row - radius, column - radius]
 
 
 class _Edges:

@@ -14,9 +14,16 @@ from typing import Any
 import numpy as np
 
 from ..core.progress import progress, report
-from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
+from .image_noise import (
+    BLOCK_ROWS,
+    TileRectangle,
+    box_radius,
+    cached_tiles,
+    gaussian_blur,
+    hash_bits,
+    tile_rectangle,
+)
 from .look_units import PixelLook
-from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -101,7 +100,7 @@ class PixelField:
     seam_steps: SeamSteps | None = None
     map_position: np.ndarray | None = None
 
-    @cached_property
+    @property
     def harmonics(self) -> list[tuple[int, np.ndarray]]:
         """Pairs of j and (P,) complex64 C_j (see `field.directional_field`). Empty for a RoSy."""
         return [
@@ -110,7 +109,7 @@ class PixelField:
             if kind == "deviation"
         ]
 
-    @cached_property
+    @property
     def symmetry(self) -> FieldSymmetry:
         """The symmetry of the directions: which of them share a line."""
         return FieldSymmetry(self.degree, tuple(j for j, _ in self.harmonics))
@@ -287,6 +286,32 @@ def entries_of_rows(pixel: np.ndarray, width: int, rows: tuple[int, int]) -> sli
     """Return the range of ascending flat pixels, (P,), that are in some rows of a frame."""
     first_pixels = np.array([max(rows[0], 0) * width, rows[1] * width])
     return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
+
+
+def pixel_window(pixel: np.ndarray, width: int, margin: int) -> tuple[np.ndarray, tuple[int, int]]:
+    """Return where pixels are in the smallest window around all of them, with an empty margin.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixels of a frame, ascending. At least one.
+    width : int
+        Of the frame.
+    margin : int
+        In pixels, on each side.
+
+    Returns
+    -------
+    cell : (P,) int32 ndarray
+        Flat indices into the window.
+    shape : (int, int)
+        Rows and columns of the window.
+    """
+    row, column = np.divmod(pixel, np.int32(width))
+    bottom, left = row[0] - margin, column.min() - margin
+    columns = int(column.max() - left) + 1 + margin
+    cell = (row - bottom) * np.int32(columns) + (column - left)
+    return cell, (int(row[-1] - bottom) + 1 + margin, columns)
 
 
 def mask_undefined(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -64,15 +64,7 @@ class Light:
 KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
 
 
-class HasLight(Protocol):
-    """A look or a style of strokes."""
-
-    @property
-    def light(self) -> str:
-        """The light: "headlight", "lamp" or "scene"."""
-
-
-def lights_of(look: HasLight, lights: Sequence[Light]) -> Sequence[Light]:
+def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
     """Return the lights that a look or a style of strokes uses, given those of the scene.
 
     There are none for the headlight.

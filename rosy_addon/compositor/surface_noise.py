@@ -28,6 +28,7 @@ from .image_noise import (
     gaussian_blur,
     hash_bits,
 )
+from .pixel_field import pixel_window
 from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
@@ -288,31 +289,22 @@ def _to_lattice_space(position: np.ndarray) -> np.ndarray:
 
 def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     """Subtract a Gaussian blur that ignores pixels outside the G-buffer from (K, P) `channels`."""
-    count, width = len(gbuffer.pixel), np.int32(gbuffer.camera.width)
-    column = gbuffer.pixel % width
+    count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
-    margin = 3 * box_radius(sigma)
-    bottom, left = int(gbuffer.pixel[0] // width) - margin, int(column.min()) - margin
-    height = int(gbuffer.pixel[-1] // width) - bottom + 1 + margin
-    image_width = int(column.max()) - left + 1 + margin
-    # Index of each pixel in the image that is blurred.
-    index = np.empty(count, dtype=np.int32)
-    for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
-        row = gbuffer.pixel[block] // width - np.int32(bottom)
-        index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
+    cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))
 
     def blurred_image(values: np.ndarray | None) -> np.ndarray:
         """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
-        image = np.zeros((height, image_width), dtype=np.float32)
+        image = np.zeros(shape, dtype=np.float32)
         for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
-            image.reshape(-1)[index[block]] = 1 if values is None else values[block]
+            image.reshape(-1)[cell[block]] = 1 if values is None else values[block]
         return gaussian_blur(image, sigma).reshape(-1)
 
     images = len(channels) + 1
     with progress(0.0, 1 / images):
-        weight = np.maximum(blurred_image(None).take(index), 1e-3)
+        weight = np.maximum(blurred_image(None).take(cell), 1e-3)
     for number, channel in enumerate(channels, start=1):
         with progress(number / images, (number + 1) / images):
             blurred = blurred_image(channel)
             for block in reported_blocks(count, STEP_LABEL, 1.0, 1.0):
-                channel[block] -= blurred.take(index[block]) / weight[block]
+                channel[block] -= blurred.take(cell[block]) / weight[block]

@@ -210,7 +210,7 @@ def uneven_width(
         Mean width, as a fraction of the distance between lines.
     look : PixelLook
     break_streak, paper_grain : (P,) ndarray or None
-        With mean 0 and standard deviation 1; see `hatching.line_coverage`.
+        With mean 0 and standard deviation 1; see `hatching.HatchedLines`.
 
     Returns
     -------

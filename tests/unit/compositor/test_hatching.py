@@ -18,7 +18,7 @@ from rosy_addon.compositor.even_lines import EvenLines
 from rosy_addon.compositor.family_hues import line_families
 from rosy_addon.compositor.fast_lic import fast_lic
 from rosy_addon.compositor.hatching import (
-    LineModulation,
+    HatchedLines,
     line_ink_indices,
     line_shares,
     render_hatching,
@@ -294,9 +294,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
         )
     (images,) = fast_lic(field, [look], noise)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
-    _, alpha = render_hatching(
-        field, images, look, tones, LineModulation(break_images, paper_grain)
-    )
+    _, alpha = render_hatching(field, HatchedLines(look, images, break_images, paper_grain), tones)
     # Streamlines end at the frame.
     return alpha.reshape(side, side)[40:-40, 40:-40]
 

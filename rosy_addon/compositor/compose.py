@@ -372,7 +372,7 @@ def _line_images(
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
-    """(M, n) means of the tones along lines, over the overshoot distance in each direction."""
+    """Return the (M, n) means of the tones along lines, over the overshoot distance in each direction."""
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.
@@ -392,7 +392,7 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
 
 
 def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> np.ndarray:
-    """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     if look.anchor == "picture":
         subpixels = look.supersampling
         line_width = look.line_width / subpixels
@@ -427,7 +427,7 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:
-    """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
+    """Return the (P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
 
     (P, K) `tone` is that of `streak_tone`. Pixels without a number are gray.
     """

@@ -160,14 +160,14 @@ class Covering:
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether states of a field of odd degree are its directions, not their opposites."""
+        """Return, (n,) bool, whether states of a field of odd degree are its directions, not their opposites."""
         sheet = state // np.int32(self.cell_count)
         if self.sheets_per_turn == 2 * self.line_count:
             return sheet % 2 == 0
         return sheet < self.line_count
 
     def forward_share(self, state: np.ndarray) -> np.ndarray:
-        """(n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
+        """Return the (n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
 
         Across seams, as of textures, there is no common angle, and lines without direction drift both ways.
         """
@@ -219,7 +219,7 @@ class Covering:
 
 
 def member_lines(field: PixelField) -> np.ndarray:
-    """(M,) intp index of the line of each member image.
+    """Return the (M,) intp index of the line of each member image.
 
     For a RoSy of odd degree, sheet 2 i is member i, and sheet 2 i - N is the other direction of its
     line.
@@ -314,12 +314,12 @@ def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.nd
 
 
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
-    """(n,) uint32 neighbor masks of cells, from their entries of `Covering.packed_phase`."""
+    """Return the (n,) uint32 neighbor masks of cells, given their entries of `Covering.packed_phase`."""
     return packed_phase.view(np.uint32) & np.uint32(ALL_NEIGHBORS)
 
 
 def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
-    """Phases with neighbor masks in the last bits of their mantissas."""
+    """Return phases with neighbor masks in the last bits of their mantissas."""
     return (phase.view(np.uint32) & ~np.uint32(ALL_NEIGHBORS) | bits).view(np.float32)
 
 
@@ -329,7 +329,7 @@ def scatter_rows(table: np.ndarray, index: np.ndarray, rows: np.ndarray) -> None
 
 
 def rows_as_scalars(table: np.ndarray) -> np.ndarray:
-    """An (n,) view of an (n, k) array, with each row of 8 or 16 bytes as one complex scalar."""
+    """Return an (n,) view of an (n, k) array, with each row of 8 or 16 bytes as one complex scalar."""
     scalar_type = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
     return table.view(scalar_type)[:, 0]
 
@@ -337,7 +337,7 @@ def rows_as_scalars(table: np.ndarray) -> np.ndarray:
 def _noise_gradient(
     noise: np.ndarray, cells: np.ndarray, width: int, mask: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, K) central differences of the (C, K) noise of cells, to the right and upward.
+    """Return the (n, K) central differences of the (C, K) noise at cells, to the right and upward.
 
     They are 0 where a neighbor is not linked.
     """
@@ -355,7 +355,7 @@ def _noise_gradient(
 def _nearest_member(
     z: np.ndarray, degree: int, guiding_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Angle, cosine and sine of the nearest member, relative to the guiding angle; 0 for z = 0."""
+    """Return angle, cosine and sine of the nearest member, relative to the guiding angle; 0 for z = 0."""
     x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
     angle = vector_angle(x, y)
     angle /= np.float32(degree)
@@ -369,7 +369,7 @@ def _nearest_member(
 
 
 def _length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Lengths of vectors, given by components. Their squares may overflow or underflow."""
+    """Return the lengths of vectors, given by components. Their squares may overflow or underflow."""
     with np.errstate(over="ignore"):
         square = x * x + y * y
     length = np.sqrt(square)

@@ -125,7 +125,7 @@ class EvenLines:
         look: PixelLook,
         pixels: np.ndarray | slice = slice(None),
     ) -> np.ndarray:
-        """(n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
+        """Return the (n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
         position = np.float32(0.5) - np.float32(0.5) * streak
         min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
         edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
@@ -170,13 +170,13 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
 
 
 def crowded_pixels(look: PixelLook) -> tuple[float, float]:
-    """`CROWDED_SHARES` as distances in pixels of the frame."""
+    """Return `CROWDED_SHARES` as distances in pixels of the frame."""
     low, high = CROWDED_SHARES
     return low * look.line_distance, high * look.line_distance
 
 
 def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """Coverage of an interval of the length `edge` by lines with the distance 1.
+    """Return the coverage of intervals of the length `edge` by lines at unit distance.
 
     Parameters
     ----------
@@ -231,13 +231,13 @@ def uneven_width(
 
 
 def look_width_table(look: PixelLook) -> np.ndarray:
-    """(COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
+    """Return the (COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
     return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
 
 @lru_cache(maxsize=16)
 def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> np.ndarray:
-    """(COVERAGE_STEPS,) widths to which normal variations are added, for mean widths from 0 to 1.
+    """Return the (COVERAGE_STEPS,) widths to which normal variations are added, for mean widths from 0 to 1.
 
     The mean of clip(m + s X, 0, 1) for a normal X is g(m) - g(m - 1), with g(x) = x F(x / s) +
     s f(x / s), where F is the distribution function and f the density of X. It is solved for m.
@@ -419,7 +419,7 @@ class _InstanceLines:
         return phases, period, octaves
 
     def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
-        """(n,) complex64 directions in the view plane, from (2, n) `SurfaceLines.heading`."""
+        """Return (n,) complex64 directions in the view plane, given the (2, n) `SurfaceLines.heading`."""
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]
         tangent = [

@@ -163,7 +163,7 @@ def _line_averages(
 def _pixels_to_cells(
     step_limit: np.ndarray | None, extent: slice, covering: Covering
 ) -> np.ndarray | None:
-    """(C,) intp step limits of cells, from the (P,) limits of pixels."""
+    """Return the (C,) intp step limits of cells, given the (P,) limits of pixels."""
     if step_limit is None:
         return None
     cell_limit = np.zeros(covering.cell_count, dtype=np.intp)
@@ -185,7 +185,7 @@ def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) 
 
 
 def _crop_rows(field: PixelField, extent: slice) -> PixelField:
-    """The pixels of some rows. Streamlines end at the first and the last row."""
+    """Return the pixels of some rows. Streamlines end at the first and the last row."""
     if extent.stop - extent.start == len(field.pixel):
         return field
     rows = field.part(extent)
@@ -240,11 +240,11 @@ class _LineAverages:
         return line[~is_known]
 
     def missing_lines(self) -> np.ndarray:
-        """Entries of the lines that need an average and have none yet."""
+        """Return the entries of the lines that need an average and have none yet."""
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
-        """The lines, among those given, that need an average and have none yet."""
+        """Return the lines, among those given, that need an average and have none yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
     def smooth(self, covering: Covering, cells: np.ndarray) -> None:
@@ -266,7 +266,7 @@ class _LineAverages:
             scatter_rows(self._values[line], cells, rows)
 
     def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """(M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
+        """Return the (M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
             for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
@@ -288,7 +288,7 @@ class _LineAverages:
         return values
 
     def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """(M, n, K + 1) float32 sums and effective samples of the lines of some cells."""
+        """Return the (M, n, K + 1) float32 sums and effective samples of the lines of some cells."""
         result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
         for line_index, out in zip(line, result, strict=True):
             rows_as_scalars(out)[:] = rows_as_scalars(self._values[line_index]).take(cell)
@@ -364,12 +364,12 @@ def _write_streamlines(
 
 
 def has_slopes(look: PixelLook) -> bool:
-    """Whether the images of a look have slopes; see `LicImages`."""
+    """Return whether the images of a look have slopes; see `LicImages`."""
     return is_fine(look) and is_hatched(look)
 
 
 def is_fine(look: PixelLook) -> bool:
-    """Whether streaks are drawn with more accuracy: in antialiased pictures, and if they drift.
+    """Return whether streaks are drawn more accurately: in antialiased pictures, and if they drift.
 
     Differences between neighboring streamlines do not drift. The eye sees them as a screen that stands still.
     """
@@ -377,7 +377,7 @@ def is_fine(look: PixelLook) -> bool:
 
 
 def _batch_size(half_length: int) -> int:
-    """The number of streamlines of a batch, by their steps in each direction."""
+    """Return the number of streamlines of a batch, given their steps in each direction."""
     return max(min(BATCH_SIZE, MAX_BATCH_STEPS // half_length), 1)
 
 
@@ -387,7 +387,7 @@ def _batches(seeds: np.ndarray, batch_size: int) -> list[np.ndarray]:
 
 
 def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np.ndarray:
-    """Lines on evenly spaced rows and columns of the window: those that cross the row or column.
+    """Return seeds on evenly spaced rows and columns of the window: the lines that cross the row or column.
 
     Streamlines from there run side by side. They miss few lines, pass few lines twice, and their
     memory accesses are close to each other.
@@ -418,17 +418,17 @@ def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np
 
 
 def _even_positions(size: int, spacing: int) -> np.ndarray:
-    """(n,) intp positions from 0 to `size`, evenly spaced, half a spacing from the ends."""
+    """Return (n,) intp positions from 0 to `size`, evenly spaced, half a spacing from the ends."""
     count = max(round(size / spacing), 1)
     return ((np.arange(count) + 0.5) * (size / count)).astype(np.intp)
 
 
 def _seed_priority(covering: Covering, line: np.ndarray) -> np.ndarray:
-    """(n,) float64 numbers from 0 to 1, of low discrepancy over rows and columns: the seeds are those below a share.
+    """Return (n,) float64 priorities from 0 to 1, evenly distributed over rows and columns.
 
-    They depend on nothing but the place of a line. If seeds were counted out of a list, a field that changes a
-    little would get other streamlines everywhere, and its pixels other averages: pictures of a series
-    would flicker.
+    The seeds of a round are the lines whose priorities are in a range. A priority depends on nothing but the
+    position of the line. With seeds at every n-th place of a list, a field that changes a little would get
+    other streamlines everywhere, and pictures of a series would flicker.
     """
     line_index, cell = np.divmod(line, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

@@ -339,7 +339,7 @@ def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | N
 
 
 def line_ranks(field: PixelField, look: PixelLook) -> list[np.ndarray]:
-    """M times (P,) float32: angle between each line and the guiding angle, scaled to 0 to M.
+    """Return M (P,) float32 arrays: the angle between each line and the guiding angle, scaled to 0 to M.
 
     A line has a rank from k to k + 1 if k other lines are nearer to the guiding angle. Where two
     lines swap ranks, both have the same integer rank.
@@ -353,7 +353,7 @@ def line_ranks(field: PixelField, look: PixelLook) -> list[np.ndarray]:
 
 
 def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
-    """Ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
+    """Return ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
 
     The result is at most `rank_count - 1`.
     """

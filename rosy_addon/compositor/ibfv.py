@@ -53,8 +53,8 @@ MIN_WEIGHT = 0.01
 #: restores what interpolation blurs, on average: streaks along the rows of pixels are not blurred, others are.
 SHARPENING = 0.02
 
-#: Factor of the contrast, which gives streaks the standard deviation of those of other methods: of streaks
-#: on one side of a pixel, which are carried further, and of those on both sides.
+#: Factors of the contrast, measured so that streaks have the same standard deviation as with other methods:
+#: for streaks on one side of a pixel, which are carried further, and for streaks on both sides.
 ONE_SIDED_MATCH, TWO_SIDED_MATCH = np.float32(1.06), np.float32(1.02)
 
 #: Weight of the noise at the pixel itself, relative to that of the first step. It is part of both sheets of
@@ -117,7 +117,7 @@ def streak_waves(
     Returns
     -------
     list of StreakWaves
-        Of each look.
+        One for each look.
     """
     look = looks[0]
     # Of the noise, the covering only needs the number of channels.
@@ -146,7 +146,7 @@ def streak_waves(
 
 
 def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
-    """What is summed along streamlines, as complex numbers.
+    """Return the noise that is summed along streamlines, as complex numbers.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
 
 
 def _step_turn(look: PixelLook) -> float:
-    """The angle by which the phase of the noise differs from that of the noise a step nearer."""
+    """Return the angle by which the phase of the noise changes with each step of the streamline."""
     if not has_flow(look):
         return 0.0
     angle = 2 * np.pi / look.flow_distance
@@ -183,24 +183,24 @@ def _step_turn(look: PixelLook) -> float:
 
 
 def _is_two_sided(field: PixelField, look: PixelLook) -> bool:
-    """Whether streaks are averages over both directions of a line, with equal weights."""
+    """Return whether streaks are averages over both directions of a line, with equal weights."""
     return field.symmetry.has_opposites and not has_flow(look)
 
 
 def _doubling_count(decay: float) -> int:
-    """How many doublings a sum needs whose weights have the ratio `decay`."""
+    """Return the number of doublings that a sum needs whose weights have the ratio `decay`."""
     steps = math.log(MIN_WEIGHT) / math.log(decay) if decay > 0 else 0
     return math.ceil(math.log2(max(steps, 1)))
 
 
 def _full_decay(field: PixelField, look: PixelLook) -> np.float32:
-    """The ratio q of the weights of successive steps of full streamlines."""
+    """Return the ratio q of the weights of successive steps of full streamlines."""
     samples = np.float64(full_sample_count(look.length, look.kernel))
     return np.float32(decay_of_samples(samples, _is_two_sided(field, look)))
 
 
 def _decay(field: PixelField, look: PixelLook) -> np.ndarray:
-    """(P,) or () float32 ratios q of the weights of successive steps."""
+    """Return the (P,) or () float32 ratios q of the weights of successive steps."""
     limits = magnitude_step_limits(field, look)
     if limits is None:
         return _full_decay(field, look)
@@ -237,7 +237,7 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
 
 
 def _square_sum(rest: np.ndarray | float, decay: np.ndarray) -> np.ndarray:
-    """The sum of the squares of the weights of a sheet up to the step whose weight is `rest`."""
+    """Return the sum of the squares of the weights of a sheet up to the step whose weight is `rest`."""
     return OWN_WEIGHT**2 + decay**2 * (1 - np.square(rest)) / (1 - decay**2)
 
 
@@ -270,7 +270,7 @@ class _Sums:
     decay : (P,) or () float32 ndarray
         q.
     turn : float
-        Angle by which the second source is turned at each step.
+        Angle by which the second source is rotated at each step.
     """
 
     def __init__(
@@ -279,7 +279,7 @@ class _Sums:
         self._sheets = sheets
         self.sources = sources
         self.decay = decay
-        # That of the steps by which the sums are doubled next.
+        # The weight of the steps by which the sums are doubled next.
         self.weight = decay
         self._turn = turn
         size = sheets.count * sheets.cell_count
@@ -289,7 +289,7 @@ class _Sums:
                 total[state] = source.take(sheets.cells[block])
 
     def weighted(self, place: int, values: np.ndarray, steps: int, block: slice) -> np.ndarray:
-        """Multiply sums that arrive from a number of steps by their weight, and turn them.
+        """Multiply sums that arrive from a number of steps by their weight, and rotate them.
 
         The arithmetic uses real numbers. Products of complex numbers are not rounded alike on all
         processors.
@@ -297,7 +297,7 @@ class _Sums:
         Parameters
         ----------
         place : int
-            Of the source.
+            Index of the source.
         values : (n,) complex64 ndarray
             At the pixels of a block.
         steps : int
@@ -344,7 +344,7 @@ def _doubled(
     Returns
     -------
     Origins
-        Of twice as many steps. Not if it is the last time.
+        The origins after twice as many steps. Empty if `is_last`.
     """
     doubled = [[values.copy() for values in total.values] for total in sums]
     result = Origins.ended(0 if is_last else len(origins.cell))

@@ -209,7 +209,7 @@ def _noise_tiles(
     density: float,
     high_pass: float,
 ) -> np.ndarray:
-    """Flat float32 noise of one channel in a rectangle of the picture, row by row, averaged over each pixel."""
+    """Return the flat float32 noise of one channel in a rectangle, row by row, averaged over each pixel."""
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
@@ -243,7 +243,7 @@ def high_pass_margin(high_pass: float) -> int:
 
 
 def box_radius(sigma: float) -> int:
-    """Radius in pixels of each of the three box filters of `gaussian_blur`."""
+    """Return the radius in pixels of each of the three box filters of `gaussian_blur`."""
     # A box filter of the width w has the variance (w^2 - 1) / 12.
     return max(int(np.rint((np.sqrt(4 * sigma**2 + 1) - 1) / 2)), 1)
 
@@ -278,7 +278,7 @@ def gaussian_blur(
 
 
 def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.ndarray:
-    """Mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
+    """Return the mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
     pads = [(0, 0), (0, 0)]
     pads[axis] = (radius + 1, radius)
     fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
@@ -369,7 +369,7 @@ def streak_moments(
 
 
 def _line_response(cycles: np.ndarray, kernel: Kernel) -> np.ndarray:
-    """Frequency response of the mean along a line, given the cycles of a wave along it."""
+    """Return the frequency response of the mean along a line, given the cycles of a wave along it."""
     if kernel == "taper":
         return np.sinc(cycles / 2) ** 2
     if kernel == "box":

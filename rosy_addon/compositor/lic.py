@@ -61,7 +61,7 @@ def lic_lengths(
 
 
 def look_noise(field: PixelField, look: PixelLook) -> np.ndarray:
-    """(P, K) float32 image-space noise of a look at the pixels of a field."""
+    """Return the (P, K) float32 image-space noise of a look at the pixels of a field."""
     return image_noise(field.pixel, field.width, **noise_args(look))
 
 

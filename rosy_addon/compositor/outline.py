@@ -150,7 +150,7 @@ def _sample_outline(
 
 
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
-    """(P,) bool: whether a marked pixel is in the square of this radius, in pixels, around a pixel."""
+    """Return, (P,) bool, whether a marked pixel is within `radius` columns and rows of each pixel."""
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, radius)
     padded = np.zeros(shape, dtype=bool)
     padded.reshape(-1)[cell[is_marked]] = True
@@ -397,7 +397,7 @@ def _extent_per_label(values: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _disc_offsets(radius: int) -> list[tuple[float, int, int]]:
-    """(distance, dx, dy) of the pixels within `radius` pixels of a pixel, itself included."""
+    """Return (distance, dx, dy) of the pixels within `radius` pixels of a pixel, itself included."""
     steps = range(-radius, radius + 1)
     offsets = [(float(np.hypot(dx, dy)), dx, dy) for dy in steps for dx in steps]
     return [offset for offset in offsets if offset[0] <= radius]

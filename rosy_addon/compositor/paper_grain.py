@@ -117,18 +117,18 @@ def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
 
 
 def line_offset(line_width: float) -> int:
-    """Pixels between the grain of successive lines, enough for it to be uncorrelated."""
+    """Return the pixels between the grain of successive lines, enough for it to be uncorrelated."""
     return int(np.ceil(3 * _band_sigmas(line_width)[-1]))
 
 
 def _band_sigmas(line_width: float) -> list[float]:
-    """Standard deviations in pixels of the blurs whose differences are the frequency bands."""
+    """Return the standard deviations in pixels of the blurs whose differences are the frequency bands."""
     finest_sigma = max(FINEST_SIGMA_WIDTHS * line_width, MIN_SIGMA_PIXELS)
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 
 
 def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.ndarray:
-    """Flat float32 heights in a rectangle of the picture, row by row."""
+    """Return the flat float32 heights in a rectangle of the picture, row by row."""
     sigmas = _band_sigmas(line_width)
     margin = 4 * box_radius(sigmas[-1])
     left, right, bottom, top = rectangle
@@ -145,7 +145,7 @@ def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.n
 
 
 def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
-    """Weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
+    """Return the weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
     total = np.zeros_like(white)
     finer = _blur(white, sigmas[0])
     for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
@@ -173,7 +173,7 @@ def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _band_noise_std(*sigmas: float) -> float:
-    """Standard deviation of `_band_noise` of binary noise, from its impulse response."""
+    """Return the standard deviation of `_band_noise` of binary noise, from its impulse response."""
     radius = 4 * box_radius(sigmas[-1])
     impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
     impulse[radius, radius] = 1

@@ -169,7 +169,7 @@ def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
 
 
 def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
-    """(P,) float32 weight of the first set in the blend."""
+    """Return the (P,) float32 weight of the first set in the blend."""
     if look.view_plane:
         weight = blend_weights(field, look.guiding_angle)
     else:
@@ -180,7 +180,7 @@ def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
 
 
 def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
-    """(M, P) complex64 directions, chosen among the members after projection to the screen.
+    """Return (M, P) complex64 directions, chosen among the members after projection to the screen.
 
     This reproduces the error in Figure 8 of the paper. On a tilted surface the angles between
     projected members are not 2 pi / N. The two sets of breaking points then come close to each

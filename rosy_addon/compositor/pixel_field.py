@@ -345,7 +345,7 @@ def mask_undefined(
 
 
 def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
-    """(P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
+    """Return the (P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
 
     phi is the guiding angle, and t is the angle of a member. The weight is 0 at the breaking points
     of the first set and 1 at the breaking points of the second.
@@ -355,7 +355,7 @@ def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
 
 
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
-    """(P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
+    """Return the (P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
 
     If two members are equally near, the one on the counter-clockwise side is returned, as in the
     paper.
@@ -378,6 +378,6 @@ def product(a: np.ndarray, b: np.ndarray | np.complex128) -> np.ndarray:
 
 
 def all_members(field: PixelField, guiding_angle: float) -> list[np.ndarray]:
-    """N times (P,) complex64: the member nearest to a guiding angle, then its N - 1 rotations."""
+    """Return N (P,) complex64 arrays: the member nearest to a guiding angle, then its N - 1 rotations."""
     nearest = nearest_member(field, guiding_angle)
     return [rotated(nearest, 2 * np.pi * k / field.degree) for k in range(field.degree)]

@@ -184,18 +184,18 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
 
 
 def break_steps(look: PixelLook) -> int:
-    """Steps in each direction of the short streaks that break lines into pieces."""
+    """Return the steps in each direction of the short streaks that break lines into pieces."""
     steps = min(BREAK_LENGTH_WIDTHS * look.line_width, MAX_BREAK_FRACTION * look.length)
     return max(round(steps), 1)
 
 
 def softness(crispness: float) -> float:
-    """Half the width of the step from paper to ink, in standard deviations of the streaks."""
+    """Return half the width of the step from paper to ink, in standard deviations of the streaks."""
     return MAX_SOFTNESS * (MIN_SOFTNESS / MAX_SOFTNESS) ** crispness
 
 
 def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
-    """(S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
+    """Return the (S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
 
     `half_width` is half the width of the step from paper to ink, in the unit of the samples.
     """
@@ -234,7 +234,7 @@ def _noise_sample(
 
 
 def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np.ndarray:
-    """(n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
+    """Return (n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
     if kernel == "ramp":
         # The weights of a window from column a on are 1 - 2 (j - middle) / length, for the column j.
         column = np.arange(noise.shape[1])
@@ -250,7 +250,7 @@ def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np
 
 
 def _window_means(rows: np.ndarray, window: int) -> np.ndarray:
-    """(n, width - window + 1) float64 means over windows of the rows of (n, width) values."""
+    """Return (n, width - window + 1) float64 means over windows of the rows of (n, width) values."""
     sums = np.cumsum(np.pad(rows, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
     return (sums[:, window:] - sums[:, :-window]) / window
 
@@ -262,6 +262,6 @@ def _standardized(means: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def smoothstep(x: np.ndarray) -> np.ndarray:
-    """Smooth step: 0 below 0, 1 above 1, and 3 x^2 - 2 x^3 between."""
+    """Return the smooth step: 0 below 0, 1 above 1, and 3 x^2 - 2 x^3 between."""
     x = np.clip(x, 0, 1)
     return x * x * (3 - 2 * x)

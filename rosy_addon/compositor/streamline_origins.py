@@ -28,7 +28,7 @@ STEP_LABEL = "tracing streamlines"
 class Origins(NamedTuple):
     """The points that (n,) states are reached from: cells, sheets, and offsets from the centers of cells.
 
-    The cell is `SINK_CELL` where the streamline has ended.
+    Cells and sheets are integers, offsets complex64, in pixels. The cell is `SINK_CELL` where the streamline has ended.
     """
 
     cell: np.ndarray
@@ -45,29 +45,32 @@ class Origins(NamedTuple):
         )
 
     def at(self, state: np.ndarray) -> Origins:
-        """Return those of some states."""
+        """Return the origins of some states."""
         return Origins(*(values.take(state) for values in self))
 
     def put(self, state: np.ndarray, origins: Origins) -> None:
-        """Replace those of some states."""
+        """Replace the origins of some states."""
         for values, new in zip(self, origins, strict=True):
             values[state] = new
 
 
 class _Surroundings(NamedTuple):
-    """The four pixels around (n,) points: that of the point, the next ones in x and y, and that in both.
+    """The four pixels around (n,) points, for bilinear interpolation.
+
+    They are the pixel that contains the point, the nearest one in the same row, the nearest one in the same
+    column, and the one diagonally opposite.
 
     Attributes
     ----------
     states : list of (n,) intp ndarray
-        Of these pixels, each with its own sheet. Where streamlines cannot step to a pixel, it is that of
-        the point.
+        The states of these pixels, on matching sheets. Where streamlines cannot step to a pixel, the state at
+        the point takes its place.
     unlinked : list of (m,) intp ndarray
-        The points whose streamlines cannot.
+        For each of the other three pixels: the points whose streamlines cannot step there.
     column, row : (n,) intp ndarray
-        The steps to the next pixels, 1 or -1.
+        The steps to the next column and row, 1 or -1.
     weights : list of (n,) float32 ndarray
-        Of bilinear interpolation.
+        The weights of bilinear interpolation.
     """
 
     states: list[np.ndarray]
@@ -77,7 +80,7 @@ class _Surroundings(NamedTuple):
     weights: list[np.ndarray]
 
     def interpolate(self, values: np.ndarray) -> np.ndarray:
-        """Return (n,) values at the points, given those of all states."""
+        """Return (n,) values at the points, given the values of all states."""
         total = values.take(self.states[0])
         total *= self.weights[0]
         for state, weight in zip(self.states[1:], self.weights[1:], strict=True):
@@ -177,7 +180,7 @@ class Sheets:
             between -= rows * width
             distance.real += between
             distance.imag += rows
-            # Of points that are reached from elsewhere, the distance to the pixel is taken.
+            # If a neighbor comes from elsewhere, its origin is taken to be as far away as its pixel.
             apart = np.abs(distance.view(np.float32))
             parted = np.maximum(apart[::2], apart[1::2]) > MAX_PARTING
             parted |= cells == SINK_CELL

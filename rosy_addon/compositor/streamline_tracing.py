@@ -221,7 +221,7 @@ class _LoopFinder:
         self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
 
     def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
-        """Indices of the streamlines that have returned to a state, and not ended otherwise."""
+        """Return the indices of the streamlines that have returned to a state, and not ended otherwise."""
         if step in (MIN_LOOP_STEPS, 2 * self._past_step):
             self._past_step, self._past_state = step, state
         elif step >= self._past_step + MIN_RETURN_STEPS:
@@ -235,21 +235,21 @@ class _LoopFinder:
 
 
 def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
+    """Return (n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
     lateral = position.imag * direction.real
     lateral -= position.real * direction.imag
     return lateral
 
 
 def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-    """(n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
+    """Return (n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
     square = direction.real * direction.real + direction.imag * direction.imag
     along = position.real * direction.real + position.imag * direction.imag
     return along / np.minimum(-step_scale * square, np.float32(-1))
 
 
 def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
-    """(n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
+    """Return (n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
 
     If all streamlines started at the centers, they would step to the next row of pixels at the same
     time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. They

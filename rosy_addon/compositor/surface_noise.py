@@ -256,7 +256,7 @@ def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
 
 
 def instance_hashes(names: Sequence[str]) -> np.ndarray:
-    """(B,) uint32 hashes of mesh instances, stable from picture to picture.
+    """Return the (B,) uint32 hashes of mesh instances, stable from picture to picture.
 
     A hash depends on the name of an instance and, if several instances have that name, on its
     position among them. The name of a mesh file is its path; the folder is ignored.
@@ -270,7 +270,7 @@ def instance_hashes(names: Sequence[str]) -> np.ndarray:
 
 
 def lattice_axes() -> np.ndarray:
-    """(3, 3) float32: the axes of the lattice in the rest space of a mesh instance, as rows."""
+    """Return the (3, 3) float32 axes of the lattice in the rest space of a mesh instance, as rows."""
     rotation = np.eye(3)
     for axis, angle in enumerate(LATTICE_ANGLES):
         first, second = (axis + 1) % 3, (axis + 2) % 3
@@ -282,7 +282,7 @@ def lattice_axes() -> np.ndarray:
 
 
 def _to_lattice_space(position: np.ndarray) -> np.ndarray:
-    """(3, P) positions in the space of the lattice, given (3, P) positions in rest space."""
+    """Return (3, P) positions in the space of the lattice, given (3, P) positions in rest space."""
     x, y, z = position
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in lattice_axes()])
 
@@ -294,7 +294,7 @@ def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))
 
     def blurred_image(values: np.ndarray | None) -> np.ndarray:
-        """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
+        """Return a flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
         image = np.zeros(shape, dtype=np.float32)
         for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
             image.reshape(-1)[cell[block]] = 1 if values is None else values[block]

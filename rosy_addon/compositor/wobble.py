@@ -39,12 +39,12 @@ UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
 
 
 def has_wobble(look: Any) -> bool:
-    """Whether lines wobble as if drawn by hand."""
+    """Return whether lines wobble as if drawn by hand."""
     return is_hatched(look) and look.wobble > 0
 
 
 def wave_table() -> np.ndarray:
-    """(WAVE_COUNT, 4) float32: frequency vector and phase of each wave.
+    """Return the (WAVE_COUNT, 4) float32 frequency vector and phase of each wave.
 
     Frequencies are in cycles per unit of length along x, y and z, phases in cycles. The directions
     form a spiral that covers a hemisphere evenly. The wavelengths are spread over one octave.

@@ -99,7 +99,7 @@ def compose(
     Returns
     -------
     Picture
-        Of these rows and, if they are not the last ones, of those in which the last strip fades into the
+        The rows of the strips and, if others follow, the rows in which the last strip fades into the
         one above.
 
     Raises
@@ -171,7 +171,7 @@ class _Canvas:
     ----------
     look : PixelLook
     degrees : list of int
-        Of the visible fields.
+        Degrees of the visible fields.
     tone_rgb : (P, 3) or (P, 1) float32 ndarray
     map_position : (P,) float32 ndarray or None
         Where the numbers of pixels are in the color map, if they are drawn.
@@ -205,7 +205,7 @@ class _Canvas:
         self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
-        """Return the picture of a strip, and that of the spread: the latter empty without thresholds."""
+        """Return the pictures of a strip: its colors, and its spread, which is empty without thresholds."""
         rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
             return rgba, rgba[:, :0]
@@ -219,7 +219,7 @@ class _Canvas:
         color : (P, 3) or (P, 1) float32 ndarray
             Linear, not premultiplied.
         rows : (int, int)
-            Of the supersampled frame: the first row of the image, and the row after its last one.
+            The first row of the image in the supersampled frame, and the row after its last one.
 
         Returns
         -------
@@ -277,7 +277,7 @@ class _Layer(NamedTuple):
         Without what depends on the strip. Their look is for the symmetry of the field and the range of its
         magnitudes.
     tone : (P,) float32 ndarray or None
-        Of hatched looks.
+        The tone, if the look is hatched.
     """
 
     field: PixelField
@@ -357,7 +357,7 @@ def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: St
 def _line_images(
     stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
 ) -> tuple[LicImages, LicImages | None]:
-    """Return the images of the lines at the pixels of a strip, and those of their breaks if they have any."""
+    """Return the images of the lines at the pixels of a strip, and of the short streaks that break them."""
     look, is_broken = layer.lines.look, has_breaks(layer.lines.look)
     looks = [look] if even_lines is None else []
     if is_broken:
@@ -410,7 +410,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> n
 
 
 def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:
-    """Correct the contrast of blended images: that of one image, times the gain of the look.
+    """Scale blended images to the contrast of one image, times the gain of the look.
 
     Returns
     -------
@@ -429,7 +429,7 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:
     """Return the (P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
 
-    (P, K) `tone` is that of `streak_tone`. Pixels without a number are gray.
+    `tone`, (P, K), is from `streak_tone`. Pixels without a number are gray.
     """
     hue, position = None, None
     if colors_magnitude(look):

@@ -76,7 +76,7 @@ def supersampling_gain(look: PixelLook) -> float:
     Parameters
     ----------
     look : PixelLook
-        Of the supersampled frame.
+        The look in pixels of the supersampled frame.
     """
     subpixels = look.supersampling
     supersampled_args = streak_args(look)

@@ -155,12 +155,12 @@ class Covering:
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
     def fold_to_line(self, state: np.ndarray) -> np.ndarray:
-        """Replace the indices of states by those of their lines, in place."""
+        """Replace the indices of states by the indices of their lines, in place."""
         entry_count = self.line_count * self.cell_count
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
-        """Return, (n,) bool, whether states of a field of odd degree are its directions, not their opposites."""
+        """Return an (n,) bool mask of states of a field of odd degree: its directions, not their opposites."""
         sheet = state // np.int32(self.cell_count)
         if self.sheets_per_turn == 2 * self.line_count:
             return sheet % 2 == 0
@@ -169,7 +169,7 @@ class Covering:
     def forward_share(self, state: np.ndarray) -> np.ndarray:
         """Return the (n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
 
-        Across seams, as of textures, there is no common angle, and lines without direction drift both ways.
+        If there are seams, the frames of the charts have no common angle, and lines without direction drift both ways.
         """
         if self.has_directions:
             return self.is_along_member(state).astype(np.float32)

@@ -29,9 +29,9 @@ class MovingKernel:
     Parameters
     ----------
     look : PixelLook
-        With flow.
+        A look that has flow.
     levels : int
-        Of the lengths of streamlines, if they depend on the magnitude.
+        Number of different lengths of streamlines, if the length depends on the magnitude.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class DriftingAverages:
     kernel : MovingKernel
     second_sums : (3, 2 R + 3, n) complex64 ndarray
         Row i + R + 2 of a channel is the sum of prefix sums of its noise up to step i, from -R - 2 to R.
-        The imaginary part is that of the derivative to the left.
+        The imaginary part is the same sum for the derivative to the left.
     """
 
     def __init__(self, kernel: MovingKernel, second_sums: np.ndarray) -> None:
@@ -257,7 +257,7 @@ def _kernel_terms(kind: Kernel, length, is_mirrored: bool) -> list[tuple]:
     length : int or ndarray of int
         Steps in each direction.
     is_mirrored : bool
-        Whether the weights are those of the opposite direction.
+        Whether the weights belong to the opposite direction.
     """
     width = length + 1
     terms = {

@@ -40,7 +40,7 @@ FADE_PIXELS = (1.3, 2.6)
 #: their place to lines in other directions.
 CROWDED_SHARES = (0.25, 0.5)
 
-#: Distance on the surface between the lines that replace crowded ones, relative to that of these.
+#: Distance on the surface between the lines that replace crowded ones, in distances between the crowded ones.
 COARSE_RATIO = 3.0
 
 #: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
@@ -163,7 +163,7 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
     period : ndarray
         Distance between lines, in pixels of the frame.
     supersampling : int
-        Of the frame.
+        Pixels of the frame along a side of a pixel of the picture.
     """
     low, high = (np.float32(pixels * supersampling) for pixels in FADE_PIXELS)
     return smoothstep((period - low) / (high - low))
@@ -183,7 +183,7 @@ def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> 
     position : (P,) float32 ndarray
         Distance of the center of the interval from the nearest line, 0 to 0.5.
     width : (P,) float32 ndarray
-        Of the lines, 0 to 1.
+        Width of the lines, 0 to 1.
     edge : (P,) float32 ndarray
         Above 0, at most 1.
     """
@@ -275,10 +275,10 @@ def even_lines(
     gbuffer : GBuffer
         With its mesh instances.
     field : PixelField
-        Of one degree, from `gbuffer`.
+        A field of one degree, from `gbuffer`.
     look : PixelLook
     wobble_angle : (P,) float32 ndarray, optional
-        Of the pixels of the field, from `wobble.wobble_angle`.
+        From `wobble.wobble_angle`, at the pixels of the field.
     cache : Cache, optional
         Stores what does not depend on the camera.
 
@@ -339,12 +339,12 @@ class _InstanceLines:
         ----------
         pixels : (n,) intp ndarray
         ratio : float
-            Distance between lines on the surface, relative to that of the look.
+            Distance between lines on the surface, in line distances of the look.
 
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            As in `EvenLines`. The period is that of the ratio 1.
+            See `EvenLines`. The period is for the ratio 1.
         growth : (n,) float32 ndarray
         """
         instance, look = self._instance, self._look

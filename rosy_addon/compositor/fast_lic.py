@@ -60,7 +60,7 @@ SEED_SPACING_FACTOR = 1.1
 #: remaining lines.
 RESEED_FACTOR = 1.75
 
-#: Maximum fraction of the lines that remain without a streamline after the last round, and that of
+#: Maximum fraction of the lines that remain without a streamline after the last round: in general, and for
 #: antialiased pictures. They take the average of a neighbor.
 MAX_UNCOVERED_FRACTION, FINE_UNCOVERED_FRACTION = 0.15, 0.05
 
@@ -70,8 +70,8 @@ MAX_ROUNDS = 8
 #: Neighbors that these averages are taken from, in order: pixels forward and pixels to the left.
 FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
 
-#: Factor of the contrast, and that of antialiased pictures. Directions are not interpolated here, so
-#: streaks are a little sharper than those of the method "brute"; this gives them the same standard
+#: Factor of the contrast, in general and for antialiased pictures. Directions are not interpolated here, so
+#: streaks are a little sharper than with the method "brute"; this gives them the same standard
 #: deviation.
 CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
@@ -93,7 +93,7 @@ def fast_lic(
     Returns
     -------
     list of LicImages
-        Of each look, at the pixels in the `Strip.averaged_rows`.
+        One for each look, at the pixels in the `Strip.averaged_rows`.
     """
     drawn = extent = slice(0, len(field.pixel))
     if strip is not None:
@@ -282,7 +282,7 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Replace (n, K + 1) values of lines without an average, in place, by those of others."""
+        """Replace (n, K + 1) values of lines without an average by the values `own`, in place."""
         unknown = np.flatnonzero(values[:, -1] <= 0)
         values[unknown] = own[unknown]
         return values

@@ -321,7 +321,7 @@ def is_shaded_by_pixel(look: Any) -> bool:
 def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the ink of each line at each pixel.
 
-    The ink is that of the line's family. If the field does not distinguish its lines, it is chosen
+    All lines of a family have the same ink. If the field does not distinguish its lines, it is chosen
     by the rank of the line, which is its distance to the guiding angle.
 
     Returns

@@ -21,7 +21,7 @@ the time. So the picture of any frame is a blend of three images, which serve al
 constant, the cosine and the sine part of the noise. Frames need no earlier ones, and loops close.
 
 Streaks of a field of odd degree are one-sided, along its directions. A line without direction is a pair of
-opposite sheets. Its streaks are those of both.
+opposite sheets. Its streaks are the mean of both.
 """
 
 from __future__ import annotations
@@ -49,15 +49,16 @@ from .streamline_origins import Origins, Sheets
 #: that they have.
 MIN_WEIGHT = 0.01
 
-#: How much the noise of a pixel is raised above that of each of its four neighbors, for each doubling. This
-#: restores what interpolation blurs, on average: streaks along the rows of pixels are not blurred, others are.
+#: Factor of the differences to the four neighbors that are added to the noise of a pixel, for each
+#: doubling. This restores what interpolation blurs, on average: streaks along the rows of pixels are not
+#: blurred, others are.
 SHARPENING = 0.02
 
 #: Factors of the contrast, measured so that streaks have the same standard deviation as with other methods:
 #: for streaks on one side of a pixel, which are carried further, and for streaks on both sides.
 ONE_SIDED_MATCH, TWO_SIDED_MATCH = np.float32(1.06), np.float32(1.02)
 
-#: Weight of the noise at the pixel itself, relative to that of the first step. It is part of both sheets of
+#: Weight of the noise at the pixel itself, relative to the weight of the first step. It is part of both sheets of
 #: a line.
 OWN_WEIGHT = 0.5
 
@@ -73,7 +74,7 @@ class StreakWaves:
     wave : (M, P) complex64 ndarray or None
         The real part of its product with exp(2 pi i phase) is added. None without flow.
     effective_samples : (P,) float32 ndarray
-        As in `LicImages`.
+        See `LicImages`.
     """
 
     constant: np.ndarray
@@ -156,7 +157,7 @@ def _noise_sources(noise: np.ndarray, look: PixelLook) -> list[np.ndarray]:
     Returns
     -------
     list of (P,) complex64 ndarray
-        The first has the noise, and 1 as its imaginary part, whose sum is that of the weights. The second
+        The first has the noise, and 1 as its imaginary part, so that its sum is the sum of the weights. The second
         has the other two channels of colored noise, or the wave of `StreakWaves`.
     """
     if has_flow(look):
@@ -217,7 +218,7 @@ def decay_of_samples(effective_samples: np.ndarray, two_sided: bool) -> np.ndarr
     effective_samples : float64 ndarray
         At least 1.
     two_sided : bool
-        Whether the kernel is that of both directions of a line.
+        Whether the kernel averages both directions of a line.
 
     Returns
     -------

@@ -314,13 +314,13 @@ def streak_moments(
     length : float
         Length of the streamlines in pixels.
     cell, high_pass : float
-        Of the noise, in pixels.
+        Cell size and high-pass width of the noise, in pixels.
     images : int
         M, the number of streamlines through a pixel. Their angles are multiples of pi / M.
     average : int
         Side in pixels of the squares that are averaged when the picture is downsampled.
     kernel : {"box", "taper", "ramp"}
-        The weights of the samples (see `filter_kernel`). With a ramp, the lines are those of a field of odd
+        The weights of the samples (see `filter_kernel`). With a ramp, the lines belong to a field of odd
         degree: every other one points against its angle.
 
     Returns

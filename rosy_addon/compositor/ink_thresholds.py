@@ -72,7 +72,7 @@ LAYER_CHANGE = 0.75
 
 
 def sharp_look(look: Look) -> Look:
-    """Return a look whose streak statistics are those of lines with sharp edges."""
+    """Return a look whose streak statistics are for lines with sharp edges."""
     return replace(look, crispness=1.0)
 
 
@@ -232,7 +232,7 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     ----------
     density : (M, P) float32 ndarray
     places : (L, M, P) float32 ndarray
-        As for `ordered_thresholds`, of the layers that are drawn.
+        See `ordered_thresholds`; for the layers that are drawn.
     table : (L, DENSITY_STEPS) float32 ndarray
         From `_layer_densities`.
 
@@ -281,7 +281,7 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     layers : int
         Number of lines.
     layering : float
-        Of the look.
+        The setting of the look.
     """
     weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
     total = np.add.reduce(weights)
@@ -303,7 +303,7 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
     (P, 4) float32 ndarray
         The thresholds in red, green and blue, rounded to multiples of 1 / 255; missing ones repeat the
         first. Alpha is the mean of (2 t - 1)^2 of the three thresholds t. Where pixels are averaged, it
-        exceeds that of the averages by the spread of the thresholds, so that what is finer than a
+        exceeds the same expression of the averages by the spread of the thresholds, so that what is finer than a
         pixel can be drawn as its mean.
     """
     resolved = np.broadcast_to(resolved, ordered.shape)
@@ -324,7 +324,7 @@ def picture_thresholds(
 ) -> np.ndarray:
     """Compute the thresholds of the pixels of a picture.
 
-    The lines are in the order in which they are drawn in a picture: that of their ranks. The outline has ink
+    The lines are in the order in which they are drawn in a picture, by rank. The outline has ink
     in any tone but the lightest. Antialiased pixels have the mean and the spread of a few thresholds across
     the lines.
 
@@ -339,7 +339,7 @@ def picture_thresholds(
     Returns
     -------
     (P, 4) float32 ndarray
-        As of `threshold_pixels`.
+        Channels as from `threshold_pixels`.
     """
     look, images, even_lines = lines.look, lines.images, lines.even_lines
     rank = np.stack([soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)])
@@ -393,7 +393,7 @@ def _even_sample(
 ) -> tuple[EvenLines, np.ndarray]:
     """Return even lines beside the centers of pixels, at a node of `PIXEL_NODES`, and their period.
 
-    `is_coarse`, (M, P) bool, says where they are replaced by those of larger distance.
+    `is_coarse`, (M, P) bool, says where lines at a larger distance replace them.
     """
     streaks, period = lines.streaks, lines.period
     if lines.coarse_streaks is not None:

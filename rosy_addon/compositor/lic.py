@@ -39,12 +39,12 @@ def lic_lengths(
     strip : Strip, optional
         With the method "sheets", the images are those at its `averaged_rows`.
     method : str
-        By default that of the looks.
+        By default the method of the looks.
 
     Returns
     -------
     list of LicImages
-        Of each look.
+        One for each look.
     """
     raise_mmap_threshold()
     method = method or looks[0].method

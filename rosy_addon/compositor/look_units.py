@@ -154,7 +154,7 @@ def pixel_look(
     ----------
     look : Look
     camera : Camera, optional
-        Of the frame. Needed if there are meshes.
+        The camera of the frame. Needed if there are meshes.
     instances : sequence of MeshInstance
         All meshes in the scene. Only those with a field affect the scale.
     supersampling : int
@@ -259,7 +259,7 @@ def preview_look(look: Look, downscale: int) -> Look:
 def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     """Return the width of a pixel, in Blender units, at the center of (n, 3) points in world space.
 
-    The center is that of their bounding box.
+    The center of the bounding box counts.
     """
     if not camera.is_perspective:
         return 1 / camera.pixels_per_unit
@@ -276,9 +276,9 @@ def instance_line_spacing(look: PixelLook, camera: Camera, instance: MeshInstanc
     ----------
     look : PixelLook
     camera : Camera
-        Of the frame.
+        The camera of the frame.
     instance : MeshInstance
-        If the lengths of the look are in pixels, the distance is that of pixels at its center.
+        If the lengths of the look are in pixels, they are pixels at the center of the instance.
     """
     if look.pixel_size:
         return look.line_distance * look.pixel_size

@@ -48,7 +48,7 @@ OUTLINE_SETTINGS = ("outline", "crease_angle", "supersampling", "display")
 #: Label of all steps.
 STEP_LABEL = "drawing outlines"
 
-#: (dx, dy, bit) of the four nearest neighbors. The bit is that of `neighbor_masks`.
+#: (dx, dy, bit) of the four nearest neighbors. The bit refers to `neighbor_masks`.
 NEIGHBORS_4 = ((1, 0, 5), (-1, 0, 3), (0, 1, 7), (0, -1, 1))
 
 
@@ -150,7 +150,7 @@ def _sample_outline(
 
 
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
-    """Return, (P,) bool, whether a marked pixel is within `radius` columns and rows of each pixel."""
+    """Return a (P,) bool mask of the pixels within `radius` columns and rows of a marked pixel."""
     cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, radius)
     padded = np.zeros(shape, dtype=bool)
     padded.reshape(-1)[cell[is_marked]] = True
@@ -233,7 +233,7 @@ class _Edges:
         return coverage
 
     def _neighbor(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
-        """Return the entries of the pixels beside those of some entries; -1 where there is none."""
+        """Return the entries of the neighbors at (dx, dy) of some entries; -1 where there is none."""
         return self._entry_of_cell.take(self._cell[entry] + (dy * self._stride + dx))
 
     def _is_linked(self, entry: np.ndarray | slice, bit: int) -> np.ndarray:
@@ -350,7 +350,7 @@ def _mark_strength(
     border : (n,) uint8 ndarray
         Bits `PART_BORDER` and `EMPTY_BORDER`.
     width : int
-        Of the frame.
+        Width of the frame.
     block_side : int
         Pixels of the frame in a pixel of the finished picture, along a side.
 

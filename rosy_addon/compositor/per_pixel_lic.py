@@ -360,8 +360,8 @@ def integrate_noise(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
-    A position is an entry of the pixel field and an offset from the center of that pixel. Steps are
-    those of the two-step Adams-Bashforth method, v = 3/2 d - 1/2 d_previous. It evaluates the
+    A position is an entry of the pixel field and an offset from the center of that pixel. Steps are taken
+    by the two-step Adams-Bashforth method, v = 3/2 d - 1/2 d_previous. It evaluates the
     direction once per step, like Euler's method, without its drift out of curves.
 
     Parameters

@@ -64,7 +64,7 @@ class PixelField:
     ----------
     degree : int
     width, height : int
-        Of the frame, in pixels.
+        Size of the frame in pixels.
     pixel : (P,) int32 ndarray
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
@@ -127,7 +127,7 @@ class PixelField:
     def part(self, extent: slice | np.ndarray) -> PixelField:
         """Return the field at some of the pixels, without its `seam_steps`.
 
-        Its `neighbor_mask` is that of all pixels.
+        Its `neighbor_mask` may refer to pixels that are left out.
         """
         index = self.gbuffer_index
         if not isinstance(index, slice):
@@ -296,7 +296,7 @@ def pixel_window(pixel: np.ndarray, width: int, margin: int) -> tuple[np.ndarray
     pixel : (P,) int32 ndarray
         Flat pixels of a frame, ascending. At least one.
     width : int
-        Of the frame.
+        Width of the frame.
     margin : int
         In pixels, on each side.
 
@@ -324,7 +324,7 @@ def mask_undefined(
     mask : (P,) uint16 ndarray
     pixel : (P,) int ndarray
     width, height : int
-        Of the frame. Pixels beyond it are undefined.
+        Size of the frame. Pixels beyond it are undefined.
     defined : (P,) bool ndarray
     """
     is_defined = np.zeros((height + 2, width + 2), dtype=bool)

@@ -87,7 +87,7 @@ class ComposeStages:
     def _new_lic(
         self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None
     ) -> list[LicImages]:
-        """Compute LIC images, those of the method "ibfv" with flow from waves that are in the cache."""
+        """Compute LIC images. Waves of the method "ibfv" with flow are kept in the cache."""
         if looks[0].method != "ibfv" or not has_flow(looks[0]):
             return self._convolved(partial(lic_lengths, strip=strip), field, looks)
         # The waves are the same at all times and speeds; see `ibfv`.

@@ -49,7 +49,7 @@ class StreamlineBatch:
     max_streamlines : int
         Size of the batch.
     interpolates : bool
-        Whether noise is interpolated across streamlines at every step. Otherwise it is that of the
+        Whether noise is interpolated across streamlines at every step. Otherwise it is the noise of the
         nearest pixel.
     """
 
@@ -169,7 +169,7 @@ class StreamlineBatch:
     def _drifting_averages(
         self, count: int, step_counts: np.ndarray, last_step: int
     ) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
-        """Yield what `trace` does, for kernels that move. The average is that of a single channel."""
+        """Yield what `trace` does, for kernels that move. The averages have a single channel."""
         lanes, covering = 2 * count, self._covering
         second_sums = self._whole_second_sums(count)
         averages = [DriftingAverages(kernel, second_sums) for kernel in self._moving_kernels]

@@ -91,13 +91,13 @@ class _Surroundings(NamedTuple):
 class Sheets:
     """The sheets that streamlines come from, and the steps between their states.
 
-    Of fields without opposites, only the directions or their opposites are needed. They are numbered from
+    If a field has no opposites, only the directions or their opposites are needed. They are numbered from
     0, and state (c, k) has the index k C + c.
 
     Parameters
     ----------
     covering : Covering
-        Without seams.
+        Without seams: no streamline crosses one.
     is_upstream : bool
         Whether streamlines come from where lines point away from.
 

@@ -18,7 +18,7 @@ MIN_RETURN_STEPS = 4
 #: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
 PLASTIC_NUMBER = 1.3247179572447460
 
-#: Columns by which the offsets of the seeds of a sheet are shifted against those of the sheet before.
+#: Columns by which the offsets of seeds are shifted from one sheet to the next.
 SHEET_SHIFT = 17
 
 #: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
@@ -130,7 +130,7 @@ class TracedLanes:
     def _move(self, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
         """Move positions by a step; return the (m,) complex64 pixels to the cells in which they are then.
 
-        The method is that of Adams and Bashforth with two steps, 3/2 d - 1/2 d_previous.
+        The method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
         """
         previous = self._previous_direction
         displacement = direction.copy() if previous is None else previous
@@ -211,7 +211,7 @@ class TracedLanes:
 
 
 class _LoopFinder:
-    """Finds streamlines that return to a state, in a number of steps like that of the loop.
+    """Finds streamlines that return to a state, in about as many steps as the loop has.
 
     Each state is compared with one state of the past, which is replaced at steps that are powers of
     two (Brent, An improved Monte Carlo factorization algorithm, 1980).

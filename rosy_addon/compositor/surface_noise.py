@@ -96,7 +96,7 @@ def surface_noise(
     detail : float
         Cells on small features are smaller by up to this fraction; see `feature_scale`.
     curvature : (P,) float32 ndarray, optional
-        Of the features; see `field.feature_curvature`. Required if `detail` is not 0.
+        Curvature of the features; see `field.feature_curvature`. Required if `detail` is not 0.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def surface_noise(
         block_hash = instance_hash[instance_id]
         solid_noise(block_rest, size, block_hash, seed, density, out=total[:, block])
         # The variance of a mean along a streamline is proportional to the size of cells. The factor
-        # keeps it at that of cells of the size `cell`.
+        # makes it the same as for cells of the size `cell`.
         total[:, block] /= np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     del rest  # as large as all other arrays together
     if high_pass:
@@ -143,13 +143,13 @@ def solid_noise(
     Parameters
     ----------
     rest : RestCoordinates
-        Of n pixels.
+        Rest coordinates of n pixels.
     cell_size : (n,) float32 ndarray
         Side of a cell on the surface, in Blender units of rest space.
     instance_hash : (n,) uint32 ndarray
         From `instance_hashes`.
     seed, density
-        As for `surface_noise`.
+        See `surface_noise`.
     out : (K, n) float32 ndarray
         Independent channels with the mean 0. The standard deviation of single cells is `NOISE_STD`.
     """
@@ -250,7 +250,7 @@ def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
     """Compute the weights of octaves, given their distance from the octave of a pixel's level.
 
     The squares of the weights of the `OCTAVES` octaves sum to 1, so the variance of the blend is
-    that of a single octave.
+    the same as for a single octave.
     """
     return np.cos(octave_offset * np.float32(np.pi / OCTAVES)) * np.float32(np.sqrt(2 / OCTAVES))
 

@@ -117,7 +117,7 @@ def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarr
     octave = np.floor(level)
     blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
     total = np.zeros(len(level), dtype=np.float32)
-    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
+    # The squares of both weights sum to 1, so the blend has the variance of one octave.
     for index, weight in enumerate(cos_sin(blend_angle)):
         x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
         for frequency_x, frequency_y, frequency_z, phase in wave_table():

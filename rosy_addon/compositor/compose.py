@@ -287,7 +287,6 @@ class _Layer(NamedTuple):
 
 def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
     """Compute what the strips of the fields of one degree share."""
-    report(0.0, "finding directions")
     with progress(0.0, 0.3):
         field = stages.pixel_field(degree, look)
     look = look.for_symmetry(field.symmetry)
@@ -400,7 +399,6 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> n
             field.pixel, field.width, line_width, look.seed, subpixels, field.line_count
         )
     noise = stages.surface_paper_grain(field, look)
-    report(1.0, "drawing the paper grain")
     std = np.float32(look_streak_statistics(look).paper_grain_std)
     channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
     heights = np.empty((field.line_count, len(noise)), dtype=np.float32)

@@ -27,7 +27,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.deterministic_trig import cos_sin, vector_angle
-from ..core.progress import report
 from ..field.directional_field import evaluate_harmonics
 from .flow import forward_share
 from .look_units import PixelLook
@@ -250,7 +249,6 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
     line_count, per_turn = field.line_count, field.symmetry.sheets_per_turn
     cell_of_pixel, (height, width) = pixel_window(field.pixel, field.width, 1)
     cell_count = height * width
-    report(0.0, "finding directions")
     # Streamlines that have ended stay in `SINK_CELL`.
     packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
     cell_noise = np.zeros((cell_count, channels), dtype=np.float32)

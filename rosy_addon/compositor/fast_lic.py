@@ -35,7 +35,6 @@ from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import has_flow, is_hatched
 from .look_units import PixelLook
 from .pixel_field import PixelField, entries_of_rows
-from .reported_blocks import reported_blocks
 from .streamline_batch import StreamlineBatch
 from .strips import Strip, streamline_margin
 
@@ -108,10 +107,8 @@ def fast_lic(
     ):
         members = np.empty((*sums.shape[:2], sums.shape[2] - 1), dtype=np.float32)
         for line_sums, member in zip(sums, members, strict=True):
-            report(0.9, STEP_LABEL)
             _write_averages(line_sums, look, member)
-        with progress(0.95):
-            images.append(lic_images(members, sums[:, :, -1].mean(axis=0), slopes))
+        images.append(lic_images(members, sums[:, :, -1].mean(axis=0), slopes))
     return images
 
 
@@ -150,13 +147,11 @@ def _line_averages(
     with progress(0.1, 0.9):
         _cover_all_lines(covering, tables, looks, cell_limits)
     averages = []
-    with progress(0.9):
-        for look, table in zip(looks, tables, strict=True):
-            if is_fine(look):
-                table.smooth(covering, cells)
-            slopes = table.slopes(covering, cells, line) if has_slopes(look) else None
-            report(0.0, STEP_LABEL)
-            averages.append((table.gather(cells, line), slopes))
+    for look, table in zip(looks, tables, strict=True):
+        if is_fine(look):
+            table.smooth(covering, cells)
+        slopes = table.slopes(covering, cells, line) if has_slopes(look) else None
+        averages.append((table.gather(cells, line), slopes))
     return averages
 
 
@@ -254,7 +249,7 @@ class _LineAverages:
         """
         smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
         for line, out in enumerate(smooth):
-            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
+            for block in pixel_blocks(len(cells)):
                 entry = line * covering.cell_count + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 total = np.float32(2) * own
@@ -262,14 +257,13 @@ class _LineAverages:
                     total += self._or_own(self._flat.take(neighbor, axis=0), own)
                 np.multiply(total, np.float32(0.25), out=out[block])
         for line, rows in enumerate(smooth):
-            report(1.0, STEP_LABEL)
             scatter_rows(self._values[line], cells, rows)
 
     def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
         """Return the (M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
-            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
+            for block in pixel_blocks(len(cells)):
                 entry = first_entry + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 left, right = (
@@ -330,7 +324,6 @@ def _cover_all_lines(
         priority = _seed_priority(covering, missing)
         seeds = missing[(priority >= last) & (priority < threshold)]
     for forward, left in FILL_OFFSETS:
-        report(0.9, STEP_LABEL)
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
         remaining = [table.copy_from(missing, source) for table in averages]
         missing = remaining[0]

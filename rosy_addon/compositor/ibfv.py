@@ -88,13 +88,12 @@ class StreakWaves:
         real, imaginary = np.float32(turn.real), np.float32(turn.imag)
         count = members.shape[1]
         for line, member in enumerate(members):
-            for block in reported_blocks(count, "blending lines", 0.0, 0.5):
+            for block in reported_blocks(count, "blending lines"):
                 np.add(self.constant[line, block], np.float32(NOISE_MEAN), out=member[block])
                 if self.wave is not None:
                     wave = self.wave[line, block]
                     member[block, 0] += wave.real * real - wave.imag * imaginary
-        with progress(0.5, 1.0):
-            return lic_images(members, self.effective_samples)
+        return lic_images(members, self.effective_samples)
 
 
 def wave_images(waves: Sequence[StreakWaves], looks: Sequence[PixelLook]) -> list[LicImages]:

@@ -219,7 +219,6 @@ def _noise_tiles(
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
     total = np.zeros((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
-        report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         for y in taps:
             for x in taps:
@@ -232,7 +231,6 @@ def _noise_tiles(
     if high_pass:
         outside = "edge" if margin == full_margin else "mean"
         cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
-        report(1.0, STEP_LABEL)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 

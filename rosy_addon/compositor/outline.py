@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.cache import Cache
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.connectivity import connected_components
 from ..field.frames import dot
 from ..projection.crease_pixels import crease_pixels
@@ -79,7 +79,6 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
         edges = _Edges(gbuffer, look, cache)
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
-    report(0.3, STEP_LABEL)
     is_near = _dilated(gbuffer, is_start, reach)
     # The samples at the border of this part do not know their neighbors.
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
@@ -221,7 +220,6 @@ class _Edges:
         depth_slack = np.float32(DEPTH_JUMP) * self._tolerance[edge]
         coverage = np.zeros(self._count, dtype=np.float32)
         for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
-            report(0.5, STEP_LABEL)
             neighbor = self._neighbor(edge, dx, dy)
             paintable = neighbor >= 0
             paintable &= gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
@@ -361,21 +359,18 @@ def _mark_strength(
     """
     if not len(pixel):
         return np.zeros(0, dtype=np.float32)
-    report(0.0, STEP_LABEL)
     row, column = np.divmod(pixel.astype(np.int64), width)
     stride = width // block_side + 2
     block, block_of_pixel = np.unique(
         row // block_side * stride + column // block_side, return_inverse=True
     )
-    report(0.2, STEP_LABEL)
     pairs = []
     for offset in (1, stride - 1, stride, stride + 1):
         target = np.searchsorted(block, block + offset)
         target[target == len(block)] = 0
         source = np.flatnonzero(block[target] == block + offset)
         pairs.append(np.stack([source, target[source]], axis=1))
-    with progress(0.3, 0.8):
-        mark = connected_components(len(block), np.concatenate(pairs))
+    mark = connected_components(len(block), np.concatenate(pairs))
     sides = [_extent_per_label(values, mark) for values in (block // stride, block % stride)]
     is_part_border = np.zeros(len(block), dtype=bool)
     is_part_border[block_of_pixel[border & PART_BORDER != 0]] = True

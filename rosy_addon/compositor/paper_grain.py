@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.progress import progress, report
+from ..core.progress import progress
 from .image_noise import (
     BLOCK_ROWS,
     TileRectangle,
@@ -136,7 +136,6 @@ def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.n
     row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
     white = np.empty((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
-        report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         bits = hash_bits((column, row[block]), seed ^ SEED_SALT, 0, 0.5)
         white[block] = bits.astype(np.float32) - np.float32(0.5)
@@ -150,11 +149,9 @@ def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
     finer = _blur(white, sigmas[0])
     for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
         broader = _blur(white, broader_sigma)
-        report(0.0, STEP_LABEL)
         # The standard deviation of blurred white noise is proportional to 1 / sigma.
         total += np.float32(weight * finer_sigma / sigmas[0]) * (finer - broader)
         finer = broader
-    report(0.0, STEP_LABEL)
     return total
 
 
@@ -164,7 +161,6 @@ def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
         with progress(0.0, label=STEP_LABEL):
             return gaussian_blur(image, sigma)
     for axis in (0, 1) * max(round(2 * sigma**2), 1):
-        report(0.0, STEP_LABEL)
         # The kernel (1, 2, 1) / 4 has the variance 1 / 2.
         forward, backward = (np.roll(image, shift, axis=axis) for shift in (1, -1))
         image = np.float32(0.5) * image + np.float32(0.25) * (forward + backward)

@@ -27,7 +27,6 @@ from .pixel_field import (
     neighbor_table,
     normalized,
 )
-from .reported_blocks import reported_blocks
 
 #: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -54,12 +53,11 @@ def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicIma
     LicImages
     """
     count, degree = len(field.pixel), field.degree
-    with progress(0.0):
-        neighbors = neighbor_table(field)
-        members, directions = _members_on_screen(field, look.guiding_angle, degree)
-        tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
-        for index, (member, direction) in enumerate(zip(members, directions, strict=True)):
-            tables[:, index] = direction_table(direction, member, degree, neighbors)
+    neighbors = neighbor_table(field)
+    members, directions = _members_on_screen(field, look.guiding_angle, degree)
+    tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
+    for index, (member, direction) in enumerate(zip(members, directions, strict=True)):
+        tables[:, index] = direction_table(direction, member, degree, neighbors)
     candidates = np.zeros((count + 1, degree), dtype=np.complex64)
     candidates[:-1] = members.T
     tracers = [
@@ -128,8 +126,7 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
     -------
     LicImages
     """
-    with progress(0.0):
-        neighbors = neighbor_table(field)
+    neighbors = neighbor_table(field)
     angle = look.guiding_angle
     is_single = field.degree == 1 or look.weights == "none"
     with progress(0.0, 1.0 if is_single else 0.5):
@@ -138,7 +135,7 @@ def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) 
         return first
     with progress(0.5, 1.0):
         second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
-    for block in reported_blocks(len(field.pixel), "blending lines", 1.0, 1.0):
+    for block in pixel_blocks(len(field.pixel)):
         weight = _first_set_weight(field.part(block), look)
         second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
         second.effective_samples[block] += weight * (
@@ -151,15 +148,14 @@ def _one_set(
     field: PixelField, look: PixelLook, noise: np.ndarray, neighbors: np.ndarray, angle: float
 ) -> LicImages:
     """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
-    with progress(0.0):
-        if look.view_plane:
-            members, directions = _members_on_screen(field, angle, field.line_count)
-        else:
-            members = directions = _screen_space_members(field, angle)
-        tracers = [
-            partial(_member_sampler, direction_table(direction, member, field.degree, neighbors))
-            for member, direction in zip(members, directions, strict=True)
-        ]
+    if look.view_plane:
+        members, directions = _members_on_screen(field, angle, field.line_count)
+    else:
+        members = directions = _screen_space_members(field, angle)
+    tracers = [
+        partial(_member_sampler, direction_table(direction, member, field.degree, neighbors))
+        for member, direction in zip(members, directions, strict=True)
+    ]
     return convolve_members(field, look, noise, neighbors, tracers)
 
 
@@ -187,7 +183,7 @@ def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
     other, and the weights do not match them.
     """
     screen_members = np.empty((field.line_count, len(field.pixel)), dtype=np.complex64)
-    for block in reported_blocks(len(field.pixel), "finding directions"):
+    for block in pixel_blocks(len(field.pixel)):
         part = field.part(block)
         members = np.stack(
             [part.to_screen(part.member_direction(member)) for member in all_members(part, 0.0)]
@@ -217,7 +213,7 @@ def _members_on_screen(
     members, directions : (count, P) complex64 ndarray
     """
     members, directions = np.empty((2, count, len(field.pixel)), dtype=np.complex64)
-    for block in reported_blocks(len(field.pixel), "finding directions"):
+    for block in pixel_blocks(len(field.pixel)):
         part = field.part(block)
         members[:, block] = all_members(part, angle)[:count]
         for member, direction in zip(members, directions, strict=True):
@@ -251,8 +247,7 @@ def convolve_members(
     LicImages
     """
     count, channels = noise.shape
-    with progress(0.0):
-        step_limit = magnitude_step_limits(field, look)
+    step_limit = magnitude_step_limits(field, look)
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
@@ -274,8 +269,7 @@ def convolve_members(
             fraction = (member + block.stop / count) / len(tracers)
             report(fraction, "tracing streamlines")
     effective_samples /= len(tracers)
-    with progress(1.0):
-        return lic_images(members, effective_samples)
+    return lic_images(members, effective_samples)
 
 
 def direction_table(
@@ -307,11 +301,11 @@ def direction_table(
     table = np.zeros((count + 1, 4), dtype=np.float32)
     table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
     unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
-    for block in reported_blocks(count, "finding directions", 0.0, 0.3):
+    for block in pixel_blocks(count):
         unit_direction[block] = normalized(direction[block])
         unit_member[block] = normalized(member[block])
     min_cosine = np.cos(np.pi / max(degree, 2))
-    for block in reported_blocks(count, "finding directions", 0.3, 1.0):
+    for block in pixel_blocks(count):
         conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()
         gradient_sines = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):

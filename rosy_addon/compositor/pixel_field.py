@@ -13,7 +13,7 @@ from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS
+from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from .reported_blocks import reported_blocks
 
@@ -211,7 +211,7 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     entry = np.full(field.height * field.width, count, dtype=np.int32)
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in reported_blocks(count, "finding neighbors"):
+    for block in pixel_blocks(count):
         pixel, mask = field.pixel[block], field.neighbor_mask[block]
         for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
             linked = np.flatnonzero(mask >> bit & 1)
@@ -250,7 +250,6 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
     if not z.all():
         with progress(0.9, 1.0):
             mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
-    report(1.0, "finding directions")
     return PixelField(
         degree=degree,
         width=camera.width,

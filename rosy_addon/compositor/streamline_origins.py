@@ -150,7 +150,6 @@ class Sheets:
         )
         step = np.zeros((self.count, self.cell_count), dtype=np.complex64)
         for rows, sheet in zip(step, self.covering_sheet, strict=True):
-            report(0.0, STEP_LABEL)
             rows.real, rows.imag = table[sheet, :, 0], table[sheet, :, 1]
             rows *= scale
         step = step.reshape(-1)

@@ -58,7 +58,7 @@ def value_ends(look: Look, ranges: Iterable[ValueRange]) -> tuple[float, float]:
     Parameters
     ----------
     look : Look
-        If both ends of its `color_range` are 0, they are those of the numbers.
+        If both ends of its `color_range` are 0, the range of the numbers is used.
     ranges : iterable of (float, float) or None
         From `value_range`, of the mesh instances that have a field and numbers.
     """

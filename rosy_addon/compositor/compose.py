@@ -20,7 +20,7 @@ from .even_lines import EvenLines
 from .family_hues import family_hues
 from .flow import NO_DRIFT, Drift
 from .hatching import (
-    LineModulation,
+    HatchedLines,
     has_breaks,
     has_outline,
     has_overshoot,
@@ -99,7 +99,7 @@ def compose(
     Returns
     -------
     Picture
-        Of these rows and, if they are not the last ones, of those in which the last strip fades into the
+        The rows of the strips and, if others follow, the rows in which the last strip fades into the
         one above.
 
     Raises
@@ -160,7 +160,7 @@ def _color_range(
     if canvas.map_position is not None:
         return value_ends(look, value_ranges(gbuffer.instances))
     if colors_magnitude(look):
-        return common_color_range({layer.look.color_range for layer in layers})
+        return common_color_range({layer.lines.look.color_range for layer in layers})
     return None
 
 
@@ -171,7 +171,7 @@ class _Canvas:
     ----------
     look : PixelLook
     degrees : list of int
-        Of the visible fields.
+        Degrees of the visible fields.
     tone_rgb : (P, 3) or (P, 1) float32 ndarray
     map_position : (P,) float32 ndarray or None
         Where the numbers of pixels are in the color map, if they are drawn.
@@ -205,7 +205,7 @@ class _Canvas:
         self.spread = np.zeros((count if draws_thresholds else 0, 1), dtype=np.float32)
 
     def picture(self, strip: Strip) -> tuple[np.ndarray, np.ndarray]:
-        """Return the picture of a strip, and that of the spread: the latter empty without thresholds."""
+        """Return the pictures of a strip: its colors, and its spread, which is empty without thresholds."""
         rgba = self._resolved(self.color, strip.drawn_rows)
         if not self.draws_thresholds:
             return rgba, rgba[:, :0]
@@ -219,7 +219,7 @@ class _Canvas:
         color : (P, 3) or (P, 1) float32 ndarray
             Linear, not premultiplied.
         rows : (int, int)
-            Of the supersampled frame: the first row of the image, and the row after its last one.
+            The first row of the image in the supersampled frame, and the row after its last one.
 
         Returns
         -------
@@ -273,23 +273,20 @@ class _Layer(NamedTuple):
     Attributes
     ----------
     field : PixelField
-    look : PixelLook
-        For the symmetry of the field and the range of its magnitudes.
-    modulation : LineModulation
-        Without what depends on the strip.
+    lines : HatchedLines
+        Without what depends on the strip. Their look is for the symmetry of the field and the range of its
+        magnitudes.
     tone : (P,) float32 ndarray or None
-        Of hatched looks.
+        The tone, if the look is hatched.
     """
 
     field: PixelField
-    look: PixelLook
-    modulation: LineModulation
+    lines: HatchedLines
     tone: np.ndarray | None = None
 
 
 def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: PixelLook) -> _Layer:
     """Compute what the strips of the fields of one degree share."""
-    report(0.0, "finding directions")
     with progress(0.0, 0.3):
         field = stages.pixel_field(degree, look)
     look = look.for_symmetry(field.symmetry)
@@ -300,7 +297,7 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
     if colors_magnitude(look):
         look = with_magnitude_range(look, field)
     if not is_hatched(look):
-        return _Layer(field, look, LineModulation())
+        return _Layer(field, HatchedLines(look))
     if has_paper_grain(look):
         with progress(0.6, 0.7):
             paper_grain = _paper_grain(stages, field, look)
@@ -309,53 +306,58 @@ def _prepare_layer(stages: ComposeStages, canvas: _Canvas, degree: int, look: Pi
             outline = stages.outline(field, look)
     with progress(0.9, 1.0):
         undirected = stages.undirected_texture(field, look)
-    modulation = LineModulation(
-        paper_grain=paper_grain, outline=outline, undirected=undirected, even_lines=even_lines
+    lines = HatchedLines(
+        look,
+        paper_grain=paper_grain,
+        outline=outline,
+        undirected=undirected,
+        even_lines=even_lines,
     )
     if even_lines is None or undirected is not None or has_breaks(look) or has_paper_grain(look):
-        look_streak_statistics(look)  # `line_coverage` finds them in their cache
+        look_streak_statistics(look)  # `HatchedLines.coverage` finds them in their cache
     tone = canvas.tone_rgb[field.gbuffer_index].mean(axis=1)
-    return _Layer(field, look, modulation, np.clip(tone, 0, 1, out=tone))
+    return _Layer(field, lines, np.clip(tone, 0, 1, out=tone))
 
 
 def _draw_layer(stages: ComposeStages, canvas: _Canvas, layer: _Layer, strip: Strip) -> None:
     """Draw the fields of one degree in a strip."""
-    field, look = layer.field, layer.look
+    field, look = layer.field, layer.lines.look
     rows = entries_of_rows(field.pixel, field.width, strip.averaged_rows)
-    modulation = layer.modulation.part(rows)
+    lines = layer.lines.part(rows)
     with progress(0.0, 0.7):
-        images, break_images = _line_images(stages, layer, strip, modulation.even_lines)
+        images, break_images = _line_images(stages, layer, strip, lines.even_lines)
+        lines = lines._replace(images=images)
     with progress(0.7, 0.9):
         if layer.tone is None:
             streaks = streak_tone(field, look, images)
         else:
             tone = layer.tone[rows]
             line_tones = _tone_along_lines(layer, strip) if has_overshoot(look) else None
-            modulation = modulation._replace(break_images=break_images, line_tones=line_tones)
+            lines = lines._replace(break_images=break_images, line_tones=line_tones)
     field = field.part(rows)
     if canvas.map_position is not None:
         field = replace(field, map_position=canvas.map_position[field.gbuffer_index])
     for block in reported_blocks(len(field.pixel), "drawing the ink", 0.9, 1.0):
-        part, part_images = field.part(block), images.part(block)
+        part, part_lines = field.part(block), lines.part(block)
         entries = part.gbuffer_index
         if layer.tone is None:
-            canvas.color[entries] = colorize(part, part_images, streaks[block], look)
+            canvas.color[entries] = colorize(part, part_lines.images, streaks[block], look)
             canvas.color[entries] *= canvas.tone_rgb[entries]
         elif canvas.draws_thresholds:
             samples = canvas.look.supersampling
-            pixels = picture_thresholds(part, part_images, look, modulation.part(block), samples)
+            pixels = picture_thresholds(part, part_lines, samples)
             canvas.color[entries], canvas.spread[entries] = pixels[:, :3], pixels[:, 3:]
         else:
             canvas.color[entries], canvas.alpha[entries] = render_hatching(
-                part, part_images, look, tone[block], modulation.part(block)
+                part, part_lines, tone[block]
             )
 
 
 def _line_images(
     stages: ComposeStages, layer: _Layer, strip: Strip, even_lines: EvenLines | None
 ) -> tuple[LicImages, LicImages | None]:
-    """Return the images of the lines at the pixels of a strip, and those of their breaks if they have any."""
-    look, is_broken = layer.look, has_breaks(layer.look)
+    """Return the images of the lines at the pixels of a strip, and of the short streaks that break them."""
+    look, is_broken = layer.lines.look, has_breaks(layer.lines.look)
     looks = [look] if even_lines is None else []
     if is_broken:
         looks.append(look.with_length(break_steps(look)))
@@ -369,13 +371,13 @@ def _line_images(
 
 
 def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
-    """(M, n) means of the tones along lines, over the overshoot distance in each direction."""
+    """Return the (M, n) means of the tones along lines, over the overshoot distance in each direction."""
     # `normalize_variance` scales the means of streamlines that end early. A channel of ones is
     # scaled by the same factor, which is divided out below. It is there twice, as images have one
     # or three channels.
     channels = np.ones((len(layer.tone), 3), dtype=np.float32)
     channels[:, 0] = layer.tone
-    look = layer.look.for_means(overshoot_steps(layer.look))
+    look = layer.lines.look.for_means(overshoot_steps(layer.lines.look))
     # The weights of the method "ibfv" fall exponentially: they would reach too far.
     method = "sheets" if look.method == "ibfv" else look.method
     (images,) = lic_lengths(layer.field, [look], channels, strip, method)
@@ -389,7 +391,7 @@ def _tone_along_lines(layer: _Layer, strip: Strip) -> np.ndarray:
 
 
 def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> np.ndarray:
-    """(M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
+    """Return the (M, P) heights of the paper for each line, with mean 0 and standard deviation 1."""
     if look.anchor == "picture":
         subpixels = look.supersampling
         line_width = look.line_width / subpixels
@@ -397,7 +399,6 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> n
             field.pixel, field.width, line_width, look.seed, subpixels, field.line_count
         )
     noise = stages.surface_paper_grain(field, look)
-    report(1.0, "drawing the paper grain")
     std = np.float32(look_streak_statistics(look).paper_grain_std)
     channel = np.arange(field.line_count) % PAPER_GRAIN_CHANNELS
     heights = np.empty((field.line_count, len(noise)), dtype=np.float32)
@@ -407,7 +408,7 @@ def _paper_grain(stages: ComposeStages, field: PixelField, look: PixelLook) -> n
 
 
 def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.ndarray:
-    """Correct the contrast of blended images: that of one image, times the gain of the look.
+    """Scale blended images to the contrast of one image, times the gain of the look.
 
     Returns
     -------
@@ -424,9 +425,9 @@ def streak_tone(field: PixelField, look: PixelLook, images: LicImages) -> np.nda
 
 
 def colorize(field: PixelField, images: LicImages, tone: np.ndarray, look: PixelLook) -> np.ndarray:
-    """(P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
+    """Return the (P, 3) or (P, 1) linear colors of pixels: gray, or colored by magnitude, family or numbers.
 
-    (P, K) `tone` is that of `streak_tone`. Pixels without a number are gray.
+    `tone`, (P, K), is from `streak_tone`. Pixels without a number are gray.
     """
     hue, position = None, None
     if colors_magnitude(look):

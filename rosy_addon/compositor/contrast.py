@@ -76,7 +76,7 @@ def supersampling_gain(look: PixelLook) -> float:
     Parameters
     ----------
     look : PixelLook
-        Of the supersampled frame.
+        The look in pixels of the supersampled frame.
     """
     subpixels = look.supersampling
     supersampled_args = streak_args(look)
@@ -93,7 +93,7 @@ def expected_std(look: PixelLook) -> float:
 
 
 def streak_args(look: PixelLook) -> tuple[float, float, float]:
-    """Length of the streamlines, size of cells and high-pass width of the noise, in pixels."""
+    """Return the length of the streamlines, the size of cells and the high-pass width of the noise, in pixels."""
     return 2 * look.length + 1, look.line_width, look.high_pass
 
 

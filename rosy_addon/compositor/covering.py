@@ -27,11 +27,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.deterministic_trig import cos_sin, vector_angle
-from ..core.progress import report
 from ..field.directional_field import evaluate_harmonics
 from .flow import forward_share
 from .look_units import PixelLook
-from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized
+from .pixel_field import NEIGHBOR_OFFSETS, PixelField, SeamSteps, normalized, pixel_window
 from .reported_blocks import reported_blocks
 
 #: The largest integer in `Covering.state_table`.
@@ -155,21 +154,21 @@ class Covering:
         return np.concatenate([forward, forward + self.line_count * self.cell_count]), len(forward)
 
     def fold_to_line(self, state: np.ndarray) -> np.ndarray:
-        """Replace the indices of states by those of their lines, in place."""
+        """Replace the indices of states by the indices of their lines, in place."""
         entry_count = self.line_count * self.cell_count
         return np.subtract(state, entry_count, out=state, where=state >= entry_count)
 
     def is_along_member(self, state: np.ndarray) -> np.ndarray:
-        """(n,) bool: whether states of a field of odd degree are its directions, not their opposites."""
+        """Return an (n,) bool mask of states of a field of odd degree: its directions, not their opposites."""
         sheet = state // np.int32(self.cell_count)
         if self.sheets_per_turn == 2 * self.line_count:
             return sheet % 2 == 0
         return sheet < self.line_count
 
     def forward_share(self, state: np.ndarray) -> np.ndarray:
-        """(n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
+        """Return the (n,) float32 shares of moving kernels that drift along states; see `flow.forward_share`.
 
-        Across seams, as of textures, there is no common angle, and lines without direction drift both ways.
+        If there are seams, the frames of the charts have no common angle, and lines without direction drift both ways.
         """
         if self.has_directions:
             return self.is_along_member(state).astype(np.float32)
@@ -219,7 +218,7 @@ class Covering:
 
 
 def member_lines(field: PixelField) -> np.ndarray:
-    """(M,) intp index of the line of each member image.
+    """Return the (M,) intp index of the line of each member image.
 
     For a RoSy of odd degree, sheet 2 i is member i, and sheet 2 i - N is the other direction of its
     line.
@@ -248,19 +247,16 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
     """
     degree, (count, channels) = field.degree, noise.shape
     line_count, per_turn = field.line_count, field.symmetry.sheets_per_turn
-    cell_of_pixel, width, cell_count = _pixel_window(field)
-    report(0.0, "finding directions")
+    cell_of_pixel, (height, width) = pixel_window(field.pixel, field.width, 1)
+    cell_count = height * width
     # Streamlines that have ended stay in `SINK_CELL`.
     packed_phase = _pack_neighbor_mask(np.full(cell_count, 2, dtype=np.float32), 1 << 4)
     cell_noise = np.zeros((cell_count, channels), dtype=np.float32)
     cell_noise[cell_of_pixel] = noise
     max_noise = max(float(np.abs(noise).max()), 1e-30)
     max_slope = 2 * max_noise / (SHORT_STEP if look.is_on_surface else 1.0)
-    quantize = [
-        np.float32(INT16_MAX),
-        np.float32(INT16_MAX / max_noise),
-        np.float32(INT16_MAX / max_slope),
-    ]
+    maxima = (1.0, max_noise, max_slope)
+    quantize = [np.float32(INT16_MAX / largest) for largest in maxima]
     state_table = np.zeros((2 * line_count, cell_count, 2 + 2 * channels), dtype=np.int16)
     for block in reported_blocks(count, "finding directions"):
         block_cells = cell_of_pixel[block]
@@ -278,13 +274,7 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
             step_x, step_y = _to_screen(field, block, *direction, look.is_on_surface)
             slope_x, slope_y = step_x, step_y
             if look.is_on_surface:
-                # Steps are at most one row or one column of pixels.
-                scale = 1 / np.maximum(np.maximum(np.abs(step_x), np.abs(step_y)), np.float32(1))
-                step_x, step_y = step_x * scale, step_y * scale
-                # A derivative to the left is multiplied by a distance to the left (see
-                # `streamline_batch`). Both are proportional to the length of the step.
-                square = np.maximum(step_x * step_x + step_y * step_y, np.float32(SHORT_STEP**2))
-                slope_x, slope_y = step_x / square, step_y / square
+                (step_x, step_y), (slope_x, slope_y) = _surface_steps(step_x, step_y)
             rows[:, 3::2] = np.rint(up * slope_x[:, None] - right * slope_y[:, None])
             step_x, step_y = step_x * quantize[0], step_y * quantize[0]
             rows[:, 0], rows[:, 1] = np.rint(step_x, out=step_x), np.rint(step_y, out=step_y)
@@ -303,23 +293,31 @@ def build_covering(field: PixelField, look: PixelLook, noise: np.ndarray) -> Cov
         cell_of_pixel=cell_of_pixel,
         packed_phase=packed_phase,
         state_table=state_table.reshape(-1, state_table.shape[2]),
-        state_scales=(
-            1 / INT16_MAX,
-            max_noise / INT16_MAX,
-            max_slope / INT16_MAX,
-        ),
+        state_scales=tuple(largest / INT16_MAX for largest in maxima),
         seams=seams,
         has_directions=not field.symmetry.has_opposites,
     )
 
 
+def _surface_steps(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Shorten steps to at most one row or column of pixels, and return factors of the noise gradient, too.
+
+    A derivative to the left is multiplied by a distance to the left (see `streamline_batch`). Both are
+    proportional to the length of the step, so the factors are divided by its square.
+    """
+    scale = 1 / np.maximum(np.maximum(np.abs(x), np.abs(y)), np.float32(1))
+    x, y = x * scale, y * scale
+    square = np.maximum(x * x + y * y, np.float32(SHORT_STEP**2))
+    return [(x, y), (x / square, y / square)]
+
+
 def unpack_neighbor_mask(packed_phase: np.ndarray) -> np.ndarray:
-    """(n,) uint32 neighbor masks of cells, from their entries of `Covering.packed_phase`."""
+    """Return the (n,) uint32 neighbor masks of cells, given their entries of `Covering.packed_phase`."""
     return packed_phase.view(np.uint32) & np.uint32(ALL_NEIGHBORS)
 
 
 def _pack_neighbor_mask(phase: np.ndarray, bits: np.ndarray | int) -> np.ndarray:
-    """Phases with neighbor masks in the last bits of their mantissas."""
+    """Return phases with neighbor masks in the last bits of their mantissas."""
     return (phase.view(np.uint32) & ~np.uint32(ALL_NEIGHBORS) | bits).view(np.float32)
 
 
@@ -329,24 +327,15 @@ def scatter_rows(table: np.ndarray, index: np.ndarray, rows: np.ndarray) -> None
 
 
 def rows_as_scalars(table: np.ndarray) -> np.ndarray:
-    """An (n,) view of an (n, k) array, with each row of 8 or 16 bytes as one complex scalar."""
+    """Return an (n,) view of an (n, k) array, with each row of 8 or 16 bytes as one complex scalar."""
     scalar_type = np.complex64 if table.shape[1] * table.itemsize == 8 else np.complex128
     return table.view(scalar_type)[:, 0]
-
-
-def _pixel_window(field: PixelField) -> tuple[np.ndarray, int, int]:
-    """The cell of each pixel, the width of the window, and its number of cells."""
-    row, column = np.divmod(field.pixel, np.int32(field.width))
-    bottom, left = row[0], column.min()
-    width = int(column.max() - left) + 3
-    cell = (row - (bottom - 1)) * np.int32(width) + (column - (left - 1))
-    return cell, width, (int(row[-1] - bottom) + 3) * width
 
 
 def _noise_gradient(
     noise: np.ndarray, cells: np.ndarray, width: int, mask: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, K) central differences of the (C, K) noise of cells, to the right and upward.
+    """Return the (n, K) central differences of the (C, K) noise at cells, to the right and upward.
 
     They are 0 where a neighbor is not linked.
     """
@@ -364,7 +353,7 @@ def _noise_gradient(
 def _nearest_member(
     z: np.ndarray, degree: int, guiding_angle: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Angle, cosine and sine of the nearest member, relative to the guiding angle; 0 for z = 0."""
+    """Return angle, cosine and sine of the nearest member, relative to the guiding angle; 0 for z = 0."""
     x, y = _rotate(z.real, z.imag, -degree * guiding_angle)
     angle = vector_angle(x, y)
     angle /= np.float32(degree)
@@ -378,7 +367,7 @@ def _nearest_member(
 
 
 def _length(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Lengths of vectors, given by components. Their squares may overflow or underflow."""
+    """Return the lengths of vectors, given by components. Their squares may overflow or underflow."""
     with np.errstate(over="ignore"):
         square = x * x + y * y
     length = np.sqrt(square)

@@ -29,9 +29,9 @@ class MovingKernel:
     Parameters
     ----------
     look : PixelLook
-        With flow.
+        A look that has flow.
     levels : int
-        Of the lengths of streamlines, if they depend on the magnitude.
+        Number of different lengths of streamlines, if the length depends on the magnitude.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class MovingKernel:
 
 
 def _shifted_weights(position: np.ndarray, shift: float, length: float, kind: Kernel) -> np.ndarray:
-    """Weights of a kernel whose center is `shift` steps backward, interpolated between whole steps."""
+    """Return the weights of a kernel whose center is `shift` steps backward, interpolated between whole steps."""
     whole = math.floor(shift)
     fraction = shift - whole
     return (1 - fraction) * sample_weights(position + whole, length, kind) + fraction * (
@@ -122,7 +122,7 @@ class DriftingAverages:
     kernel : MovingKernel
     second_sums : (3, 2 R + 3, n) complex64 ndarray
         Row i + R + 2 of a channel is the sum of prefix sums of its noise up to step i, from -R - 2 to R.
-        The imaginary part is that of the derivative to the left.
+        The imaginary part is the same sum for the derivative to the left.
     """
 
     def __init__(self, kernel: MovingKernel, second_sums: np.ndarray) -> None:
@@ -199,7 +199,7 @@ class DriftingAverages:
         length: np.ndarray | None,
         is_mirrored: bool,
     ) -> np.ndarray:
-        """(n,) complex64 sums around places between steps, of some streamlines."""
+        """Return (n,) complex64 sums around positions between steps, of some streamlines."""
         whole = np.floor(place)
         fraction = place - whole
         step = whole.astype(np.intp)
@@ -215,7 +215,7 @@ class DriftingAverages:
         return low + fraction * (high - low)
 
     def _full(self, is_mirrored: bool) -> np.ndarray:
-        """(3, 2 Q + 1, n) complex64 sums of kernels of full length around the steps from -Q to Q."""
+        """Return the (3, 2 Q + 1, n) complex64 sums of kernels of full length around the steps from -Q to Q."""
         if is_mirrored not in self._full_sums:
             kernel = self._kernel
             last = self._middle - 2 - kernel.length
@@ -237,7 +237,7 @@ class DriftingAverages:
         length: np.ndarray,
         is_mirrored: bool,
     ) -> np.ndarray:
-        """(n,) complex64 sums of kernels of their own length around steps of streamlines."""
+        """Return (n,) complex64 sums of kernels of their own length around steps of streamlines."""
         flat, stride = self._second_sums[channel].reshape(-1), self._second_sums.shape[2]
         total = np.zeros(len(step), dtype=np.complex64)
         for offset, weight in _kernel_terms(self._kernel.kind, length, is_mirrored):
@@ -247,7 +247,7 @@ class DriftingAverages:
 
 
 def _kernel_terms(kind: Kernel, length, is_mirrored: bool) -> list[tuple]:
-    """The terms of a weighted sum around the sample q: offsets o and weights of E(q + o).
+    """Return the terms of a weighted sum around the sample q: offsets o and weights of E(q + o).
 
     With n(i) = E(i) - 2 E(i - 1) + E(i - 2), they are w(d) - 2 w(d + 1) + w(d + 2) at o = d, for the weights w
     of `filter_kernel.sample_weights`.
@@ -257,7 +257,7 @@ def _kernel_terms(kind: Kernel, length, is_mirrored: bool) -> list[tuple]:
     length : int or ndarray of int
         Steps in each direction.
     is_mirrored : bool
-        Whether the weights are those of the opposite direction.
+        Whether the weights belong to the opposite direction.
     """
     width = length + 1
     terms = {

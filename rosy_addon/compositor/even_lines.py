@@ -40,7 +40,7 @@ FADE_PIXELS = (1.3, 2.6)
 #: their place to lines in other directions.
 CROWDED_SHARES = (0.25, 0.5)
 
-#: Distance on the surface between the lines that replace crowded ones, relative to that of these.
+#: Distance on the surface between the lines that replace crowded ones, in distances between the crowded ones.
 COARSE_RATIO = 3.0
 
 #: Range of the distance between lines relative to the one asked for, as a base-2 logarithm, over
@@ -85,9 +85,8 @@ class EvenLines:
 
     def part(self, extent: slice) -> EvenLines:
         """Return the lines at some of the pixels."""
-        growth = None if self.growth is None else self.growth[extent]
-        coarse = None if self.coarse_streaks is None else self.coarse_streaks[:, extent]
-        return EvenLines(self.streaks[:, extent], self.period[:, extent], growth, coarse)
+        arrays = self.streaks, self.period, self.growth, self.coarse_streaks
+        return EvenLines(*(None if values is None else values[..., extent] for values in arrays))
 
     def coverage(self, line: int, target_coverage: np.ndarray, look: PixelLook) -> np.ndarray:
         """Compute the coverage of each pixel by one line.
@@ -126,7 +125,7 @@ class EvenLines:
         look: PixelLook,
         pixels: np.ndarray | slice = slice(None),
     ) -> np.ndarray:
-        """(n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
+        """Return the (n,) coverage of some of the pixels by lines, minus their mean coverage `width`."""
         position = np.float32(0.5) - np.float32(0.5) * streak
         min_edge = np.float32(MAX_EDGE_WIDTH * (1 - look.crispness) ** 2)
         edge = np.clip(1 / np.maximum(period, np.float32(1e-6)), min_edge, 1)
@@ -164,27 +163,27 @@ def resolved_share(period: np.ndarray, supersampling: int = 1) -> np.ndarray:
     period : ndarray
         Distance between lines, in pixels of the frame.
     supersampling : int
-        Of the frame.
+        Pixels of the frame along a side of a pixel of the picture.
     """
     low, high = (np.float32(pixels * supersampling) for pixels in FADE_PIXELS)
     return smoothstep((period - low) / (high - low))
 
 
 def crowded_pixels(look: PixelLook) -> tuple[float, float]:
-    """`CROWDED_SHARES` as distances in pixels of the frame."""
+    """Return `CROWDED_SHARES` as distances in pixels of the frame."""
     low, high = CROWDED_SHARES
     return low * look.line_distance, high * look.line_distance
 
 
 def _box_filtered(position: np.ndarray, width: np.ndarray, edge: np.ndarray) -> np.ndarray:
-    """Coverage of an interval of the length `edge` by lines with the distance 1.
+    """Return the coverage of intervals of the length `edge` by lines at unit distance.
 
     Parameters
     ----------
     position : (P,) float32 ndarray
         Distance of the center of the interval from the nearest line, 0 to 0.5.
     width : (P,) float32 ndarray
-        Of the lines, 0 to 1.
+        Width of the lines, 0 to 1.
     edge : (P,) float32 ndarray
         Above 0, at most 1.
     """
@@ -211,7 +210,7 @@ def uneven_width(
         Mean width, as a fraction of the distance between lines.
     look : PixelLook
     break_streak, paper_grain : (P,) ndarray or None
-        With mean 0 and standard deviation 1; see `hatching.line_coverage`.
+        With mean 0 and standard deviation 1; see `hatching.HatchedLines`.
 
     Returns
     -------
@@ -232,13 +231,13 @@ def uneven_width(
 
 
 def look_width_table(look: PixelLook) -> np.ndarray:
-    """(COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
+    """Return the (COVERAGE_STEPS,) widths of lines before `uneven_width`, for mean widths from 0 to 1."""
     return _width_table(look.breaks, look.wobble, PAPER_GRAIN_STRENGTH * look.paper_grain)
 
 
 @lru_cache(maxsize=16)
 def _width_table(breaks: float, wobble: float, paper_grain_amplitude: float) -> np.ndarray:
-    """(COVERAGE_STEPS,) widths to which normal variations are added, for mean widths from 0 to 1.
+    """Return the (COVERAGE_STEPS,) widths to which normal variations are added, for mean widths from 0 to 1.
 
     The mean of clip(m + s X, 0, 1) for a normal X is g(m) - g(m - 1), with g(x) = x F(x / s) +
     s f(x / s), where F is the distribution function and f the density of X. It is solved for m.
@@ -276,10 +275,10 @@ def even_lines(
     gbuffer : GBuffer
         With its mesh instances.
     field : PixelField
-        Of one degree, from `gbuffer`.
+        A field of one degree, from `gbuffer`.
     look : PixelLook
     wobble_angle : (P,) float32 ndarray, optional
-        Of the pixels of the field, from `wobble.wobble_angle`.
+        From `wobble.wobble_angle`, at the pixels of the field.
     cache : Cache, optional
         Stores what does not depend on the camera.
 
@@ -340,12 +339,12 @@ class _InstanceLines:
         ----------
         pixels : (n,) intp ndarray
         ratio : float
-            Distance between lines on the surface, relative to that of the look.
+            Distance between lines on the surface, in line distances of the look.
 
         Returns
         -------
         streaks, period : (M, n) float32 ndarray
-            As in `EvenLines`. The period is that of the ratio 1.
+            See `EvenLines`. The period is for the ratio 1.
         growth : (n,) float32 ndarray
         """
         instance, look = self._instance, self._look
@@ -420,7 +419,7 @@ class _InstanceLines:
         return phases, period, octaves
 
     def _heading_in_view(self, entries: np.ndarray, heading: np.ndarray) -> np.ndarray:
-        """(n,) complex64 directions in the view plane, from (2, n) `SurfaceLines.heading`."""
+        """Return (n,) complex64 directions in the view plane, given the (2, n) `SurfaceLines.heading`."""
         gbuffer = self._gbuffer
         triangle = gbuffer.triangle[entries]
         tangent = [

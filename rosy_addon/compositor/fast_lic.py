@@ -35,7 +35,6 @@ from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look import has_flow, is_hatched
 from .look_units import PixelLook
 from .pixel_field import PixelField, entries_of_rows
-from .reported_blocks import reported_blocks
 from .streamline_batch import StreamlineBatch
 from .strips import Strip, streamline_margin
 
@@ -60,7 +59,7 @@ SEED_SPACING_FACTOR = 1.1
 #: remaining lines.
 RESEED_FACTOR = 1.75
 
-#: Maximum fraction of the lines that remain without a streamline after the last round, and that of
+#: Maximum fraction of the lines that remain without a streamline after the last round: in general, and for
 #: antialiased pictures. They take the average of a neighbor.
 MAX_UNCOVERED_FRACTION, FINE_UNCOVERED_FRACTION = 0.15, 0.05
 
@@ -70,8 +69,8 @@ MAX_ROUNDS = 8
 #: Neighbors that these averages are taken from, in order: pixels forward and pixels to the left.
 FILL_OFFSETS = ((1, 0), (-1, 0), (1, 0), (-1, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (0, 1), (0, -1))
 
-#: Factor of the contrast, and that of antialiased pictures. Directions are not interpolated here, so
-#: streaks are a little sharper than those of the method "brute"; this gives them the same standard
+#: Factor of the contrast, in general and for antialiased pictures. Directions are not interpolated here, so
+#: streaks are a little sharper than with the method "brute"; this gives them the same standard
 #: deviation.
 CONTRAST_MATCH, FINE_CONTRAST_MATCH = 0.99, 0.98
 
@@ -93,7 +92,7 @@ def fast_lic(
     Returns
     -------
     list of LicImages
-        Of each look, at the pixels in the `Strip.averaged_rows`.
+        One for each look, at the pixels in the `Strip.averaged_rows`.
     """
     drawn = extent = slice(0, len(field.pixel))
     if strip is not None:
@@ -108,10 +107,8 @@ def fast_lic(
     ):
         members = np.empty((*sums.shape[:2], sums.shape[2] - 1), dtype=np.float32)
         for line_sums, member in zip(sums, members, strict=True):
-            report(0.9, STEP_LABEL)
             _write_averages(line_sums, look, member)
-        with progress(0.95):
-            images.append(lic_images(members, sums[:, :, -1].mean(axis=0), slopes))
+        images.append(lic_images(members, sums[:, :, -1].mean(axis=0), slopes))
     return images
 
 
@@ -150,20 +147,18 @@ def _line_averages(
     with progress(0.1, 0.9):
         _cover_all_lines(covering, tables, looks, cell_limits)
     averages = []
-    with progress(0.9):
-        for look, table in zip(looks, tables, strict=True):
-            if is_fine(look):
-                table.smooth(covering, cells)
-            slopes = table.slopes(covering, cells, line) if has_slopes(look) else None
-            report(0.0, STEP_LABEL)
-            averages.append((table.gather(cells, line), slopes))
+    for look, table in zip(looks, tables, strict=True):
+        if is_fine(look):
+            table.smooth(covering, cells)
+        slopes = table.slopes(covering, cells, line) if has_slopes(look) else None
+        averages.append((table.gather(cells, line), slopes))
     return averages
 
 
 def _pixels_to_cells(
     step_limit: np.ndarray | None, extent: slice, covering: Covering
 ) -> np.ndarray | None:
-    """(C,) intp step limits of cells, from the (P,) limits of pixels."""
+    """Return the (C,) intp step limits of cells, given the (P,) limits of pixels."""
     if step_limit is None:
         return None
     cell_limit = np.zeros(covering.cell_count, dtype=np.intp)
@@ -185,7 +180,7 @@ def _write_averages(line_sums: np.ndarray, look: PixelLook, member: np.ndarray) 
 
 
 def _crop_rows(field: PixelField, extent: slice) -> PixelField:
-    """The pixels of some rows. Streamlines end at the first and the last row."""
+    """Return the pixels of some rows. Streamlines end at the first and the last row."""
     if extent.stop - extent.start == len(field.pixel):
         return field
     rows = field.part(extent)
@@ -240,11 +235,11 @@ class _LineAverages:
         return line[~is_known]
 
     def missing_lines(self) -> np.ndarray:
-        """Entries of the lines that need an average and have none yet."""
+        """Return the entries of the lines that need an average and have none yet."""
         return np.flatnonzero(self._values[:, :, -1] == 0)
 
     def filter_missing(self, line: np.ndarray) -> np.ndarray:
-        """The lines, among those given, that need an average and have none yet."""
+        """Return the lines, among those given, that need an average and have none yet."""
         return line[self._flat[:, -1].take(line) == 0]
 
     def smooth(self, covering: Covering, cells: np.ndarray) -> None:
@@ -254,7 +249,7 @@ class _LineAverages:
         """
         smooth = np.empty((len(self._values), len(cells), self._values.shape[2]), dtype=np.float32)
         for line, out in enumerate(smooth):
-            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
+            for block in pixel_blocks(len(cells)):
                 entry = line * covering.cell_count + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 total = np.float32(2) * own
@@ -262,14 +257,13 @@ class _LineAverages:
                     total += self._or_own(self._flat.take(neighbor, axis=0), own)
                 np.multiply(total, np.float32(0.25), out=out[block])
         for line, rows in enumerate(smooth):
-            report(1.0, STEP_LABEL)
             scatter_rows(self._values[line], cells, rows)
 
     def slopes(self, covering: Covering, cells: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """(M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
+        """Return the (M, n) float32 derivatives to the left of the lines of some cells; see `LicImages`."""
         slopes = np.empty((len(line), len(cells)), dtype=np.float32)
         for first_entry, out in zip(line * covering.cell_count, slopes, strict=True):
-            for block in reported_blocks(len(cells), STEP_LABEL, 1.0, 1.0):
+            for block in pixel_blocks(len(cells)):
                 entry = first_entry + cells[block].astype(np.intp)
                 own = self._flat.take(entry, axis=0)
                 left, right = (
@@ -282,13 +276,13 @@ class _LineAverages:
 
     @staticmethod
     def _or_own(values: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Replace (n, K + 1) values of lines without an average, in place, by those of others."""
+        """Replace (n, K + 1) values of lines without an average by the values `own`, in place."""
         unknown = np.flatnonzero(values[:, -1] <= 0)
         values[unknown] = own[unknown]
         return values
 
     def gather(self, cell: np.ndarray, line: np.ndarray) -> np.ndarray:
-        """(M, n, K + 1) float32 sums and effective samples of the lines of some cells."""
+        """Return the (M, n, K + 1) float32 sums and effective samples of the lines of some cells."""
         result = np.empty((len(line), len(cell), self._values.shape[2]), dtype=np.float32)
         for line_index, out in zip(line, result, strict=True):
             rows_as_scalars(out)[:] = rows_as_scalars(self._values[line_index]).take(cell)
@@ -330,7 +324,6 @@ def _cover_all_lines(
         priority = _seed_priority(covering, missing)
         seeds = missing[(priority >= last) & (priority < threshold)]
     for forward, left in FILL_OFFSETS:
-        report(0.9, STEP_LABEL)
         (source,) = covering.neighbor_lines(missing, [(forward, left)])
         remaining = [table.copy_from(missing, source) for table in averages]
         missing = remaining[0]
@@ -364,12 +357,12 @@ def _write_streamlines(
 
 
 def has_slopes(look: PixelLook) -> bool:
-    """Whether the images of a look have slopes; see `LicImages`."""
+    """Return whether the images of a look have slopes; see `LicImages`."""
     return is_fine(look) and is_hatched(look)
 
 
 def is_fine(look: PixelLook) -> bool:
-    """Whether streaks are drawn with more accuracy: in antialiased pictures, and if they drift.
+    """Return whether streaks are drawn more accurately: in antialiased pictures, and if they drift.
 
     Differences between neighboring streamlines do not drift. The eye sees them as a screen that stands still.
     """
@@ -377,7 +370,7 @@ def is_fine(look: PixelLook) -> bool:
 
 
 def _batch_size(half_length: int) -> int:
-    """The number of streamlines of a batch, by their steps in each direction."""
+    """Return the number of streamlines of a batch, given their steps in each direction."""
     return max(min(BATCH_SIZE, MAX_BATCH_STEPS // half_length), 1)
 
 
@@ -387,7 +380,7 @@ def _batches(seeds: np.ndarray, batch_size: int) -> list[np.ndarray]:
 
 
 def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np.ndarray:
-    """Lines on evenly spaced rows and columns of the window: those that cross the row or column.
+    """Return seeds on evenly spaced rows and columns of the window: the lines that cross the row or column.
 
     Streamlines from there run side by side. They miss few lines, pass few lines twice, and their
     memory accesses are close to each other.
@@ -418,17 +411,17 @@ def _grid_seeds(covering: Covering, averages: _LineAverages, spacing: int) -> np
 
 
 def _even_positions(size: int, spacing: int) -> np.ndarray:
-    """(n,) intp positions from 0 to `size`, evenly spaced, half a spacing from the ends."""
+    """Return (n,) intp positions from 0 to `size`, evenly spaced, half a spacing from the ends."""
     count = max(round(size / spacing), 1)
     return ((np.arange(count) + 0.5) * (size / count)).astype(np.intp)
 
 
 def _seed_priority(covering: Covering, line: np.ndarray) -> np.ndarray:
-    """(n,) float64 numbers from 0 to 1, of low discrepancy over rows and columns: the seeds are those below a share.
+    """Return (n,) float64 priorities from 0 to 1, evenly distributed over rows and columns.
 
-    They depend on nothing but the place of a line. If seeds were counted out of a list, a field that changes a
-    little would get other streamlines everywhere, and its pixels other averages: pictures of a series
-    would flicker.
+    The seeds of a round are the lines whose priorities are in a range. A priority depends on nothing but the
+    position of the line. With seeds at every n-th place of a list, a field that changes a little would get
+    other streamlines everywhere, and pictures of a series would flicker.
     """
     line_index, cell = np.divmod(line, covering.cell_count)
     row, column = np.divmod(cell, covering.width)

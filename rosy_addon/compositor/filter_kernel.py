@@ -90,6 +90,6 @@ def full_sample_count(length: int, kernel: Kernel) -> float:
 
 
 def _weight_sums(count: Any, slope: Any) -> tuple[Any, Any]:
-    """Sums of 1 - d slope, and of its square, for d from 1 to count."""
+    """Return the sums of 1 - d slope, and of its square, for d from 1 to count."""
     step_sum = slope * count * (count + 1)
     return count - step_sum / 2, count - step_sum * (1 - slope * (2 * count + 1) / 6)

@@ -123,7 +123,7 @@ def forward_share(cosine: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     cosine : ndarray
-        Of the angle between its forward direction and the guiding angle.
+        Cosine of the angle between its forward direction and the guiding angle.
     """
     x = np.clip(0.5 + cosine * (0.5 / ONE_WAY_COSINE), 0.0, 1.0)
     return x * x * (3 - 2 * x)

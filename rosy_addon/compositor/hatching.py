@@ -56,11 +56,15 @@ PIXEL_SOFTNESS = 1.0
 MIN_COVERAGE = 1e-3
 
 
-class LineModulation(NamedTuple):
-    """Per-pixel inputs that make lines uneven, and the outline.
+class HatchedLines(NamedTuple):
+    """The lines of a field that ink is drawn with, what makes them uneven, and the outline.
 
     Attributes
     ----------
+    look : PixelLook
+    images : LicImages or None
+        Member images in the order of `all_members(field, look.guiding_angle)`. None if they are not
+        known yet, or not needed as there are even lines.
     break_images : LicImages or None
         Images whose streaks are as long as the pieces of broken lines (`break_steps`).
     paper_grain : (M, P) float32 ndarray or None
@@ -78,6 +82,8 @@ class LineModulation(NamedTuple):
         Evenly spaced lines, if they are drawn instead of the streaks of LIC images.
     """
 
+    look: PixelLook
+    images: LicImages | None = None
     break_images: LicImages | None = None
     paper_grain: np.ndarray | None = None
     line_tones: np.ndarray | None = None
@@ -85,54 +91,91 @@ class LineModulation(NamedTuple):
     undirected: np.ndarray | None = None
     even_lines: EvenLines | None = None
 
-    def part(self, extent: slice) -> LineModulation:
-        """Return the modulation at some of the pixels."""
-        breaks, grain, tones, outline, undirected, even_lines = self
-        return LineModulation(
-            None if breaks is None else breaks.part(extent),
-            None if grain is None else grain[:, extent],
-            None if tones is None else tones[:, extent],
-            None if outline is None else outline[extent],
-            None if undirected is None else undirected[extent],
-            None if even_lines is None else even_lines.part(extent),
-        )
+    def part(self, extent: slice) -> HatchedLines:
+        """Return the lines at some of the pixels."""
+        return HatchedLines(self.look, *(_part(values, extent) for values in self[1:]))
 
-    def relief(self, line: int, look: PixelLook) -> np.ndarray | np.float32:
+    def relief(self, line: int) -> np.ndarray | np.float32:
         """Return what the paper adds to the streaks of a line: (P,) float32, or 0 without paper grain."""
         if self.paper_grain is None:
             return np.float32(0)
-        return np.float32(PAPER_GRAIN_STRENGTH * look.paper_grain) * self.paper_grain[line]
+        return np.float32(PAPER_GRAIN_STRENGTH * self.look.paper_grain) * self.paper_grain[line]
 
-    def break_streak(self, line: int, look: PixelLook) -> np.ndarray | None:
+    def break_streak(self, line: int) -> np.ndarray | None:
         """Return the (P,) short streaks that break a line, with mean 0 and standard deviation 1."""
         if self.break_images is None:
             return None
-        return standard_streak(self.break_images, line, look_streak_statistics(look).break_std)[0]
+        std = look_streak_statistics(self.look).break_std
+        return standard_streak(self.break_images, line, std)[0]
 
-    def spots(self, line: int, look: PixelLook) -> np.ndarray:
+    def spots(self, line: int) -> np.ndarray:
         """Return (P,) float32 streaks of the undirected texture, NaN where the field is defined."""
-        std = np.float32(look_streak_statistics(look).disc_std)
-        return self.undirected / std + self.relief(line, look)
+        std = np.float32(look_streak_statistics(self.look).disc_std)
+        return self.undirected / std + self.relief(line)
+
+    def target_tones(self, tone: np.ndarray) -> np.ndarray:
+        """Return the (M, P) target tones of the lines, or (1, P) if all lines have the same: `tone`."""
+        return tone[None] if self.line_tones is None else self.line_tones
+
+    def coverage(self, line: int, target_coverage: np.ndarray) -> np.ndarray:
+        """Compute the coverage of each pixel by one line.
+
+        Parameters
+        ----------
+        line : int
+            Index into `images.members`.
+        target_coverage : (P,) ndarray
+            Fraction of the paper that the line should cover on average, 0 to 1.
+
+        Returns
+        -------
+        (P,) float32 ndarray
+            0 to 1.
+        """
+        look = self.look
+        if self.even_lines is not None:
+            grain = None if self.paper_grain is None else self.paper_grain[line]
+            width = uneven_width(target_coverage, look, self.break_streak(line), grain)
+            coverage = self.even_lines.coverage(line, width, look)
+        else:
+            statistics = look_streak_statistics(look)
+            streak, slope = standard_streak(self.images, line, statistics.std)
+            if self.break_images is not None:
+                amount = break_amount(target_coverage, look.breaks, look.wobble)
+                broken = standard_streak(self.break_images, line, statistics.break_std)
+                streak += amount * (broken[0] - streak)
+                if slope is not None:
+                    slope += amount * (broken[1] - slope)
+            streak += self.relief(line)
+            coverage = _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
+        if self.undirected is not None:
+            spots = self.spots(line)
+            undefined = np.flatnonzero(~np.isnan(spots))
+            thresholds = look_streak_statistics(look).disc_threshold
+            coverage[undefined] = _above_threshold(
+                spots[undefined], target_coverage[undefined], thresholds, look
+            )
+        return coverage
+
+
+def _part(values: Any, extent: slice) -> Any:
+    """Return an array or other values at some of the pixels; None if there are none."""
+    if values is None:
+        return None
+    return values[..., extent] if isinstance(values, np.ndarray) else values.part(extent)
 
 
 def render_hatching(
-    field: PixelField,
-    images: LicImages,
-    look: PixelLook,
-    tone: np.ndarray,
-    modulation: LineModulation,
+    field: PixelField, lines: HatchedLines, tone: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw the lines of a field with ink on paper.
 
     Parameters
     ----------
     field : PixelField
-    images : LicImages
-        Member images in the order of `all_members(field, look.guiding_angle)`.
-    look : PixelLook
+    lines : HatchedLines
     tone : (P,) float32 ndarray
         Target tone, linear, 0 to 1.
-    modulation : LineModulation
 
     Returns
     -------
@@ -142,22 +185,19 @@ def render_hatching(
         1 if the paper is opaque, the coverage by ink if the paper is transparent.
     """
     tone = np.clip(tone, 0, 1)
-    ink_indices = line_ink_indices(field, look)
+    ink_indices = line_ink_indices(field, lines.look)
     if ink_indices is None:
-        ink, coverage = _render_one_ink(field, images, look, tone, modulation)
+        ink, coverage = _render_one_ink(field, lines, tone)
     else:
-        ink, coverage = _render_many_inks(field, images, look, tone, modulation, ink_indices)
-    return inks_of(look.look).on_paper(ink, coverage)
+        ink, coverage = _render_many_inks(field, lines, tone, ink_indices)
+    return inks_of(lines.look.look).on_paper(ink, coverage)
 
 
 def _render_one_ink(
-    field: PixelField,
-    images: LicImages,
-    look: PixelLook,
-    tone: np.ndarray,
-    modulation: LineModulation,
+    field: PixelField, lines: HatchedLines, tone: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the (P, 3) linear color of the ink, and (P,) coverage, with the same ink for all lines."""
+    look = lines.look
     inks = inks_of(look.look)
     by_magnitude, position = colors_magnitude(look), field.map_position
     if by_magnitude:
@@ -168,111 +208,50 @@ def _render_one_ink(
     if position is not None:
         mapped = to_linear(map_colors(np.nan_to_num(position), look.color_map))
         ink = np.where(np.isnan(position)[:, None], ink, mapped)
-    transmittance = inks.complement_if_light(_line_tones(tone, modulation))
+    transmittance = inks.complement_if_light(lines.target_tones(tone))
     if not by_magnitude and position is None:
         transmittance = 1 - inks.required_coverage(inks.target_transmittance(transmittance), ink)
     bare_paper = np.ones_like(tone)
-    shares = line_shares(field, look, transmittance, modulation.even_lines)
+    shares = line_shares(field, look, transmittance, lines.even_lines)
     for line, share in enumerate(shares):
         target_coverage = 1 - transmittance[line % len(transmittance)] ** share
-        bare_paper *= 1 - line_coverage(line, target_coverage, images, look, modulation)
-    if modulation.outline is not None:
-        bare_paper *= 1 - modulation.outline
+        bare_paper *= 1 - lines.coverage(line, target_coverage)
+    if lines.outline is not None:
+        bare_paper *= 1 - lines.outline
     return ink, 1 - bare_paper
 
 
 def _render_many_inks(
-    field: PixelField,
-    images: LicImages,
-    look: PixelLook,
-    tone: np.ndarray,
-    modulation: LineModulation,
-    ink_indices: list[np.ndarray],
+    field: PixelField, lines: HatchedLines, tone: np.ndarray, ink_indices: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the (P, 3) linear color of the ink, and (P,) coverage, with an ink per family of lines.
 
     Inks are transparent: the transmittances of crossing lines are multiplied.
     """
+    look = lines.look
     inks = inks_of(look.look, ink_count(look.look, field.line_count, field.family_count))
-    transmittance = inks.complement_if_light(_line_tones(tone, modulation))
+    transmittance = inks.complement_if_light(lines.target_tones(tone))
     target_transmittance = inks.target_transmittance(transmittance)
     bare_paper = np.ones_like(tone)
     transmitted = np.ones((len(tone), 3), dtype=np.float32)
-    shares = line_shares(field, look, transmittance, modulation.even_lines)
+    shares = line_shares(field, look, transmittance, lines.even_lines)
     for line, share in enumerate(shares):
         ink = inks.ink_at_tone(ink_indices[line], tone)
         target_coverage = inks.required_coverage(
             target_transmittance[line % len(target_transmittance)] ** share, ink
         )
-        coverage = line_coverage(line, target_coverage, images, look, modulation)
+        coverage = lines.coverage(line, target_coverage)
         transmitted *= 1 - coverage[:, None] * (1 - inks.transmittance(ink))
         bare_paper *= 1 - coverage
-    if modulation.outline is not None:
+    if lines.outline is not None:
         ink = inks.ink_at_tone(np.zeros_like(tone), tone)
-        transmitted *= 1 - modulation.outline[:, None] * (1 - inks.transmittance(ink))
-        bare_paper *= 1 - modulation.outline
+        transmitted *= 1 - lines.outline[:, None] * (1 - inks.transmittance(ink))
+        bare_paper *= 1 - lines.outline
     color = inks.complement_if_light(inks.complement_if_light(inks.paper) * transmitted)
     coverage = 1 - bare_paper
     # color = paper + coverage * (ink - paper), solved for the ink.
     ink = inks.paper + (color - inks.paper) / np.maximum(coverage, MIN_COVERAGE)[:, None]
     return np.clip(ink, 0, 1), coverage
-
-
-def _line_tones(tone: np.ndarray, modulation: LineModulation) -> np.ndarray:
-    """Return the (M, P) target tones of the lines, or (1, P) if all lines have the same."""
-    return tone[None] if modulation.line_tones is None else modulation.line_tones
-
-
-def line_coverage(
-    line: int,
-    target_coverage: np.ndarray,
-    images: LicImages,
-    look: PixelLook,
-    modulation: LineModulation,
-) -> np.ndarray:
-    """Compute the coverage of each pixel by one line.
-
-    Parameters
-    ----------
-    line : int
-        Index into `images.members`.
-    target_coverage : (P,) ndarray
-        Fraction of the paper that the line should cover on average, 0 to 1.
-    images, look, modulation
-        As for `render_hatching`.
-
-    Returns
-    -------
-    (P,) float32 ndarray
-        0 to 1.
-    """
-    if modulation.even_lines is not None:
-        width = uneven_width(
-            target_coverage,
-            look,
-            modulation.break_streak(line, look),
-            None if modulation.paper_grain is None else modulation.paper_grain[line],
-        )
-        coverage = modulation.even_lines.coverage(line, width, look)
-    else:
-        statistics = look_streak_statistics(look)
-        streak, slope = standard_streak(images, line, statistics.std)
-        if modulation.break_images is not None:
-            amount = break_amount(target_coverage, look.breaks, look.wobble)
-            broken = standard_streak(modulation.break_images, line, statistics.break_std)
-            streak += amount * (broken[0] - streak)
-            if slope is not None:
-                slope += amount * (broken[1] - slope)
-        streak += modulation.relief(line, look)
-        coverage = _above_threshold(streak, target_coverage, statistics.threshold, look, slope)
-    if modulation.undirected is not None:
-        spots = modulation.spots(line, look)
-        undefined = np.flatnonzero(~np.isnan(spots))
-        thresholds = look_streak_statistics(look).disc_threshold
-        coverage[undefined] = _above_threshold(
-            spots[undefined], target_coverage[undefined], thresholds, look
-        )
-    return coverage
 
 
 def standard_streak(
@@ -342,7 +321,7 @@ def is_shaded_by_pixel(look: Any) -> bool:
 def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | None:
     """Find the ink of each line at each pixel.
 
-    The ink is that of the line's family. If the field does not distinguish its lines, it is chosen
+    All lines of a family have the same ink. If the field does not distinguish its lines, it is chosen
     by the rank of the line, which is its distance to the guiding angle.
 
     Returns
@@ -360,7 +339,7 @@ def line_ink_indices(field: PixelField, look: PixelLook) -> list[np.ndarray] | N
 
 
 def line_ranks(field: PixelField, look: PixelLook) -> list[np.ndarray]:
-    """M times (P,) float32: angle between each line and the guiding angle, scaled to 0 to M.
+    """Return M (P,) float32 arrays: the angle between each line and the guiding angle, scaled to 0 to M.
 
     A line has a rank from k to k + 1 if k other lines are nearer to the guiding angle. Where two
     lines swap ranks, both have the same integer rank.
@@ -374,7 +353,7 @@ def line_ranks(field: PixelField, look: PixelLook) -> list[np.ndarray]:
 
 
 def soft_rank_of(rank: np.ndarray, rank_count: int) -> np.ndarray:
-    """Ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
+    """Return ranks rounded down, with a smooth transition around the integers, where lines swap ranks.
 
     The result is at most `rank_count - 1`.
     """

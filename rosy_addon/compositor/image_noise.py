@@ -1,16 +1,20 @@
-"""Image-space noise from an integer hash, and the variance of its mean along a streamline."""
+"""Image-space noise from an integer hash, and the variance of its mean along a streamline.
+
+Images that are anchored to the picture are computed for whole tiles. These do not change while the visible
+region changes a little, so they stay cached for later pictures.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import lru_cache
-from typing import Literal
+from collections.abc import Callable, Hashable, Sequence
+from functools import lru_cache, partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from ..core.cache import Cache
 from ..core.progress import progress, report
 from .filter_kernel import Kernel
-from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks
 
 #: Mean and standard deviation of binary noise.
@@ -42,11 +46,19 @@ BLOCK_ROWS = 32
 #: Sample points along each side of a pixel. Noise is averaged over their square grid.
 TAPS_PER_SIDE = 3
 
-
 #: Odd factors of the hash for the indices of a cell, the seed, the channel and the finalizer.
 HASH_FACTORS = (0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x165667B1, 0x9E3779B1)
 SEED_FACTOR, CHANNEL_FACTOR = 0x9E3779B9, 0x85EBCA6B
 FINALIZER_FACTORS = (0x7FEB352D, 0x846CA68B)
+
+#: Side of a tile in pixels.
+TILE_PIXELS = 256
+
+#: Maximum number of pixels of an image that is cached for the next picture.
+MAX_CACHED_PIXELS = 1 << 22
+
+#: The cached images. It holds eight of the largest.
+TILE_CACHE = Cache(max_bytes=8 * 4 * MAX_CACHED_PIXELS)
 
 
 def hash_bits(
@@ -81,6 +93,66 @@ def hash_bits(
     h ^= h >> np.uint32(15)
     h *= np.uint32(FINALIZER_FACTORS[1])
     return h >> np.uint32(8) < np.uint32(round(density * 2**24))
+
+
+class TileRectangle(NamedTuple):
+    """A rectangle of the picture that consists of whole tiles; rows from the bottom, in pixels."""
+
+    left: int
+    right: int
+    bottom: int
+    top: int
+
+    def index(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Return the flat indices of pixels in the rectangle, row by row."""
+        return (row - self.bottom) * np.int32(self.right - self.left) + (column - self.left)
+
+
+def tile_rectangle(
+    pixel: np.ndarray, width: int, subpixels: int = 1, extra_columns: int = 0
+) -> TileRectangle:
+    """Return the rectangle that covers some pixels.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixel indices into a supersampled frame, ascending.
+    width : int
+        Width of that frame in pixels.
+    subpixels : int
+        Subpixels along each side of a pixel. The rectangle is in pixels, not in subpixels.
+    extra_columns : int
+        Columns that are added at the right.
+    """
+    column = pixel % np.int32(width)
+    left, right = int(column.min()) // subpixels, int(column.max()) // subpixels + 1
+    bottom, top = (int(end) // width // subpixels for end in pixel[[0, -1]])
+    return TileRectangle(
+        *_round_outward(left, right + extra_columns), *_round_outward(bottom, top + 1)
+    )
+
+
+def _round_outward(start: int, stop: int) -> tuple[int, int]:
+    """Round a range of rows or columns outward to whole tiles."""
+    return start // TILE_PIXELS * TILE_PIXELS, -(-stop // TILE_PIXELS) * TILE_PIXELS
+
+
+def cached_tiles(
+    create: Callable[..., np.ndarray],
+    rectangle: TileRectangle,
+    *settings: Hashable,
+) -> np.ndarray:
+    """Return the result of ``create(rectangle, *settings)``, from the cache if it is there.
+
+    It is a flat image of the rectangle. Large images are not stored.
+    """
+    left, right, bottom, top = rectangle
+    if (right - left) * (top - bottom) > MAX_CACHED_PIXELS:
+        return create(rectangle, *settings)
+    key = create.__name__, rectangle, settings
+    image = TILE_CACHE.get_or_create(key, partial(create, rectangle, *settings))
+    TILE_CACHE.evict_over_limit()
+    return image
 
 
 def image_noise(
@@ -137,7 +209,7 @@ def _noise_tiles(
     density: float,
     high_pass: float,
 ) -> np.ndarray:
-    """Flat float32 noise of one channel in a rectangle of the picture, row by row, averaged over each pixel."""
+    """Return the flat float32 noise of one channel in a rectangle, row by row, averaged over each pixel."""
     full_margin = high_pass_margin(high_pass)
     margin = min(full_margin, MAX_MARGIN)
     left, right, bottom, top = rectangle
@@ -147,7 +219,6 @@ def _noise_tiles(
     taps = (np.arange(TAPS_PER_SIDE) + 0.5) / TAPS_PER_SIDE
     total = np.zeros((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
-        report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         for y in taps:
             for x in taps:
@@ -160,7 +231,6 @@ def _noise_tiles(
     if high_pass:
         outside = "edge" if margin == full_margin else "mean"
         cells += NOISE_MEAN - gaussian_blur(cells, BLUR_FACTOR * high_pass, outside)
-        report(1.0, STEP_LABEL)
         cells = cells[margin : len(cells) - margin, margin : cells.shape[1] - margin]
     return np.ascontiguousarray(cells).reshape(-1)
 
@@ -171,7 +241,7 @@ def high_pass_margin(high_pass: float) -> int:
 
 
 def box_radius(sigma: float) -> int:
-    """Radius in pixels of each of the three box filters of `gaussian_blur`."""
+    """Return the radius in pixels of each of the three box filters of `gaussian_blur`."""
     # A box filter of the width w has the variance (w^2 - 1) / 12.
     return max(int(np.rint((np.sqrt(4 * sigma**2 + 1) - 1) / 2)), 1)
 
@@ -206,7 +276,7 @@ def gaussian_blur(
 
 
 def _box_filter(image: np.ndarray, radius: int, axis: int, outside: str) -> np.ndarray:
-    """Mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
+    """Return the mean over 2 * radius + 1 pixels along an axis; `outside` as in `gaussian_blur`."""
     pads = [(0, 0), (0, 0)]
     pads[axis] = (radius + 1, radius)
     fill = {"mode": "edge"} if outside == "edge" else {"constant_values": NOISE_MEAN}
@@ -242,13 +312,13 @@ def streak_moments(
     length : float
         Length of the streamlines in pixels.
     cell, high_pass : float
-        Of the noise, in pixels.
+        Cell size and high-pass width of the noise, in pixels.
     images : int
         M, the number of streamlines through a pixel. Their angles are multiples of pi / M.
     average : int
         Side in pixels of the squares that are averaged when the picture is downsampled.
     kernel : {"box", "taper", "ramp"}
-        The weights of the samples (see `filter_kernel`). With a ramp, the lines are those of a field of odd
+        The weights of the samples (see `filter_kernel`). With a ramp, the lines belong to a field of odd
         degree: every other one points against its angle.
 
     Returns
@@ -297,7 +367,7 @@ def streak_moments(
 
 
 def _line_response(cycles: np.ndarray, kernel: Kernel) -> np.ndarray:
-    """Frequency response of the mean along a line, given the cycles of a wave along it."""
+    """Return the frequency response of the mean along a line, given the cycles of a wave along it."""
     if kernel == "taper":
         return np.sinc(cycles / 2) ** 2
     if kernel == "box":

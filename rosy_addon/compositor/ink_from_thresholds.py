@@ -28,7 +28,7 @@ DENSITY_FACTOR = 1.6
 ROUNDING_SPREAD = 0.001
 
 #: Square of half the width of an even distribution of thresholds t over the variance of 2 t - 1. For the
-#: half width w, the variance of t is w^2 / 3, and that of 2 t - 1 four times as much.
+#: half width w, the variance of t is w^2 / 3, and 2 t - 1 has four times as much.
 EDGE_VARIANCE = 0.75
 
 #: Half the width of the sharpest edges, in thresholds: half a step of 8 bits, 1 / 510.
@@ -149,7 +149,7 @@ def layer_coverage(
     share
         Exponent of it for these lines; see `layer_shares`.
     threshold
-        Of the layer.
+        Threshold of the layer.
     filtered : FilteredEdges
     edge_factor
         `DENSITY_FACTOR` times the softness of edges.

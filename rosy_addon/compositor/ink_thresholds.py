@@ -21,7 +21,7 @@ import numpy as np
 
 from .even_lines import COARSE_RATIO, EvenLines, resolved_share, uneven_width
 from .hatching import (
-    LineModulation,
+    HatchedLines,
     line_ranks,
     onset_weights,
     soft_rank_of,
@@ -72,7 +72,7 @@ LAYER_CHANGE = 0.75
 
 
 def sharp_look(look: Look) -> Look:
-    """Return a look whose streak statistics are those of lines with sharp edges."""
+    """Return a look whose streak statistics are for lines with sharp edges."""
     return replace(look, crispness=1.0)
 
 
@@ -82,39 +82,33 @@ def unlit_look(look: Look) -> Look:
     return replace(look, tone="light", light="headlight", shadows=False, overshoot=0.0, hue=hue)
 
 
-def line_thresholds(
-    line: int, images: LicImages | None, look: PixelLook, modulation: LineModulation
-) -> np.ndarray:
+def line_thresholds(line: int, lines: HatchedLines) -> np.ndarray:
     """Compute the coverage from which each pixel is covered by one line.
 
     Parameters
     ----------
     line : int
-        Index into `images.members`.
-    images : LicImages or None
-        None if the modulation has even lines.
-    look : PixelLook
-        Of a `sharp_look`.
-    modulation : LineModulation
-        Without `line_tones` and `outline`, which have no effect.
+        Index into `HatchedLines.images.members`.
+    lines : HatchedLines
+        With a `sharp_look`. Its `line_tones` and `outline` have no effect.
 
     Returns
     -------
     (P,) float32 ndarray
         0 to 1, evenly distributed.
     """
-    statistics = look_streak_statistics(look)
-    break_streak = modulation.break_streak(line, look)
-    if modulation.even_lines is not None:
-        result = _even_line_thresholds(line, break_streak, look, modulation)
+    statistics = look_streak_statistics(lines.look)
+    break_streak = lines.break_streak(line)
+    if lines.even_lines is not None:
+        result = _even_line_thresholds(line, break_streak, lines)
     else:
-        relief = modulation.relief(line, look)
-        streak = standard_streak(images, line, statistics.std)[0] + relief
+        relief = lines.relief(line)
+        streak = standard_streak(lines.images, line, statistics.std)[0] + relief
         if break_streak is not None:
             break_streak += relief
-        result = _streak_thresholds(streak, break_streak, look, statistics.threshold)
-    if modulation.undirected is not None:
-        spots = modulation.spots(line, look)
+        result = _streak_thresholds(streak, break_streak, lines.look, statistics.threshold)
+    if lines.undirected is not None:
+        spots = lines.spots(line)
         undefined = np.flatnonzero(~np.isnan(spots))
         result[undefined] = _coverage_from(spots[undefined], statistics.disc_threshold)
     return result
@@ -137,17 +131,16 @@ def _streak_thresholds(
 
 
 def _even_line_thresholds(
-    line: int, break_streak: np.ndarray | None, look: PixelLook, modulation: LineModulation
+    line: int, break_streak: np.ndarray | None, lines: HatchedLines
 ) -> np.ndarray:
     """Compute `line_thresholds` of even lines."""
     # 0 in the middle of a line, 1 between two lines.
-    position = 1 - modulation.even_lines.streaks[line]
-    paper_grain = modulation.paper_grain
-    if break_streak is None and paper_grain is None:
+    position = 1 - lines.even_lines.streaks[line]
+    if break_streak is None and lines.paper_grain is None:
         return position
-    grain = None if paper_grain is None else paper_grain[line]
+    grain = None if lines.paper_grain is None else lines.paper_grain[line]
     return _bisect(
-        lambda coverage: uneven_width(coverage, look, break_streak, grain) - position,
+        lambda coverage: uneven_width(coverage, lines.look, break_streak, grain) - position,
         len(position),
     )
 
@@ -239,7 +232,7 @@ def _merged_densities(density: np.ndarray, places: np.ndarray, table: np.ndarray
     ----------
     density : (M, P) float32 ndarray
     places : (L, M, P) float32 ndarray
-        As for `ordered_thresholds`, of the layers that are drawn.
+        See `ordered_thresholds`; for the layers that are drawn.
     table : (L, DENSITY_STEPS) float32 ndarray
         From `_layer_densities`.
 
@@ -288,7 +281,7 @@ def layer_shares(darkness: np.ndarray, layers: int, layering: float) -> list[np.
     layers : int
         Number of lines.
     layering : float
-        Of the look.
+        The setting of the look.
     """
     weights = onset_weights(darkness, [layer * layering for layer in range(layers)])
     total = np.add.reduce(weights)
@@ -310,7 +303,7 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
     (P, 4) float32 ndarray
         The thresholds in red, green and blue, rounded to multiples of 1 / 255; missing ones repeat the
         first. Alpha is the mean of (2 t - 1)^2 of the three thresholds t. Where pixels are averaged, it
-        exceeds that of the averages by the spread of the thresholds, so that what is finer than a
+        exceeds the same expression of the averages by the spread of the thresholds, so that what is finer than a
         pixel can be drawn as its mean.
     """
     resolved = np.broadcast_to(resolved, ordered.shape)
@@ -327,41 +320,33 @@ def threshold_pixels(ordered: np.ndarray, resolved: np.ndarray | float = 1.0) ->
 
 
 def picture_thresholds(
-    field: PixelField,
-    images: LicImages | None,
-    look: PixelLook,
-    modulation: LineModulation,
-    samples_per_side: int = 1,
+    field: PixelField, lines: HatchedLines, samples_per_side: int = 1
 ) -> np.ndarray:
     """Compute the thresholds of the pixels of a picture.
 
-    The lines are in the order in which they are drawn in a picture: that of their ranks. The outline has ink
+    The lines are in the order in which they are drawn in a picture, by rank. The outline has ink
     in any tone but the lightest. Antialiased pixels have the mean and the spread of a few thresholds across
     the lines.
 
     Parameters
     ----------
     field : PixelField
-    images : LicImages
-        Member images in the order of `all_members(field, look.guiding_angle)`.
-    look : PixelLook
-        Of a `sharp_look`.
-    modulation : LineModulation
-        Without `line_tones`.
+    lines : HatchedLines
+        With a `sharp_look`. Its `line_tones` have no effect.
     samples_per_side : int
         Samples of the frame along each side of a pixel.
 
     Returns
     -------
     (P, 4) float32 ndarray
-        As of `threshold_pixels`.
+        Channels as from `threshold_pixels`.
     """
-    lines, even_lines = range(field.line_count), modulation.even_lines
+    look, images, even_lines = lines.look, lines.images, lines.even_lines
     rank = np.stack([soft_rank_of(rank, field.line_count) for rank in line_ranks(field, look)])
     crowding = None
     if even_lines is not None:
         # Crowded lines come last, as in `line_shares`.
-        crowding = np.stack([even_lines.crowding(line, look) for line in lines])
+        crowding = np.stack([even_lines.crowding(line, look) for line in range(len(rank))])
         rank += field.line_count * crowding
         rank -= rank.min(axis=0)
     layers = range(min(field.line_count, MAX_LAYERS))
@@ -372,19 +357,20 @@ def picture_thresholds(
     for (node, weight), level in zip(PIXEL_NODES, PIXEL_LEVELS, strict=True):
         if not is_sampled and node:
             continue
-        part = modulation
+        part = lines
         resolved: np.ndarray | float = 1.0
         if even_lines is not None:
             sample, period = _even_sample(even_lines, crowding > level, node)
-            part = modulation._replace(even_lines=sample)
+            part = part._replace(even_lines=sample)
             resolved = np.einsum("klp,lp->kp", places, resolved_share(period, samples_per_side))
-        if part.break_images is not None:
-            part = part._replace(break_images=_streak_sample(part.break_images, node))
-        part_images = _streak_sample(images, node)
-        thresholds = np.stack([line_thresholds(line, part_images, look, part) for line in lines])
+        part = part._replace(
+            images=_streak_sample(images, node),
+            break_images=_streak_sample(part.break_images, node),
+        )
+        thresholds = np.stack([line_thresholds(line, part) for line in range(len(rank))])
         ordered = ordered_thresholds(thresholds, places, field.representation == 0, look)
-        if modulation.outline is not None:
-            ordered *= 1 - modulation.outline
+        if lines.outline is not None:
+            ordered *= 1 - lines.outline
         pixels += np.float32(weight if is_sampled else 1) * threshold_pixels(ordered, resolved)
     # The spread is that about the values that are stored.
     mean = pixels[:, :3]
@@ -394,9 +380,9 @@ def picture_thresholds(
     return pixels
 
 
-def _streak_sample(images: LicImages, node: float) -> LicImages:
+def _streak_sample(images: LicImages | None, node: float) -> LicImages | None:
     """Return images beside the centers of pixels, at a node of `PIXEL_NODES`."""
-    if images.slopes is None or not node:
+    if images is None or images.slopes is None or not node:
         return images
     shift = np.float32(STREAK_REACH * node) * images.slopes
     return replace(images, members=images.members + shift[..., None])
@@ -407,7 +393,7 @@ def _even_sample(
 ) -> tuple[EvenLines, np.ndarray]:
     """Return even lines beside the centers of pixels, at a node of `PIXEL_NODES`, and their period.
 
-    `is_coarse`, (M, P) bool, says where they are replaced by those of larger distance.
+    `is_coarse`, (M, P) bool, says where lines at a larger distance replace them.
     """
     streaks, period = lines.streaks, lines.period
     if lines.coarse_streaks is not None:

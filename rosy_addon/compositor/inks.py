@@ -191,7 +191,7 @@ def is_light(look: Look) -> bool:
 
 
 def _ink_series(code: str, count: int) -> np.ndarray:
-    """(count, 3) float32 linear colors: an ink, and variants with other hues.
+    """Return (count, 3) float32 linear colors: an ink, and variants with other hues.
 
     The variants have the lightness and chroma of the ink, within the limits of this module.
     """

@@ -16,8 +16,7 @@ from .image_noise import NOISE_MEAN, image_noise
 from .lic_images import LicImages
 from .look import has_flow
 from .look_units import PixelLook
-from .member_decomposition import member_decomposition
-from .per_pixel_lic import brute_force
+from .per_pixel_lic import brute_force, member_decomposition
 from .pixel_field import PixelField
 from .strips import Strip
 
@@ -40,12 +39,12 @@ def lic_lengths(
     strip : Strip, optional
         With the method "sheets", the images are those at its `averaged_rows`.
     method : str
-        By default that of the looks.
+        By default the method of the looks.
 
     Returns
     -------
     list of LicImages
-        Of each look.
+        One for each look.
     """
     raise_mmap_threshold()
     method = method or looks[0].method
@@ -62,7 +61,7 @@ def lic_lengths(
 
 
 def look_noise(field: PixelField, look: PixelLook) -> np.ndarray:
-    """(P, K) float32 image-space noise of a look at the pixels of a field."""
+    """Return the (P, K) float32 image-space noise of a look at the pixels of a field."""
     return image_noise(field.pixel, field.width, **noise_args(look))
 
 

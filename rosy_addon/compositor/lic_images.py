@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..field.validate import MIN_COMPONENT
+from ..projection.pixel_blocks import pixel_blocks
 from .look import magnitude_range
 from .look_units import PixelLook
 from .pixel_field import PixelField
-from .reported_blocks import reported_blocks
 
 #: Smallest difference between the ends of a range of magnitudes, relative to them. Single precision
 #: resolves 1e-7.
@@ -55,7 +55,7 @@ def lic_images(
 ) -> LicImages:
     """Blend member images. Parameters as in `LicImages`."""
     blend = np.empty(members.shape[1:], dtype=np.float32)
-    for block in reported_blocks(len(blend), "blending lines"):
+    for block in pixel_blocks(len(blend)):
         blend[block] = members[:, block].mean(axis=0)
     return LicImages(members, blend, effective_samples, slopes)
 
@@ -66,7 +66,7 @@ def magnitude_step_limits(field: PixelField, look: PixelLook) -> np.ndarray | No
         return None
     ends = magnitude_ends(look, field)
     limits = np.empty(len(field.pixel), dtype=np.int32)
-    for block in reported_blocks(len(limits), "tracing streamlines"):
+    for block in pixel_blocks(len(limits)):
         limits[block] = np.rint(look.length * relative_magnitude(field.part(block), ends))
     return limits
 

@@ -105,8 +105,8 @@ class Look:
     `unit_size` Blender units.
 
     To add a setting that both renderers draw with, edit three files: add a field here, use it in
-    this package, and declare and use the uniform of that name in the shader. A length is also a field
-    of `look_units.PixelLook`. All else is derived from the field; see `rosy_addon.core.settings`.
+    this package, and declare and use the uniform of that name in the shader. All else is derived from
+    the field; see `rosy_addon.core.settings`.
 
     Raises
     ------
@@ -466,7 +466,7 @@ class Look:
         is_pixel_length=True,
         **_ink(),
     )
-    singularity_dots: str = singularity_dots_choice(**_shading("singularities"))
+    singularity_dots: str = singularity_dots_choice(panel="singularities", stage=Stage.SHADING)
     singularity_size: float = singularity_size_number(panel="singularities", stage=Stage.SHADING)
     supersampling: int = number(
         1,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.settings import Stage, pixel_lengths, settings_of
+from ..core.settings import Number, Stage, pixel_lengths, settings_of
 from ..field.symmetry import FieldSymmetry
 from ..projection.camera import Camera
 from ..projection.gbuffer import MeshInstance
@@ -34,16 +34,17 @@ MIN_DISTANCE_FACTOR = 0.25
 class PixelLook:
     """A look as one frame is drawn with it: lengths in pixels of the frame, and streaks at a time.
 
-    The settings of the look that are no lengths are attributes as well: ``pixel_look.crispness``.
+    The settings of the look are attributes as well: ``pixel_look.crispness``. Lengths among them, such as
+    ``pixel_look.line_width``, are in pixels of the frame, and may be out of range.
 
     Attributes
     ----------
     look : Look
         As the user set it.
+    scale : float
+        Pixels of the picture that the unit of the lengths of the look stands for.
     length : int
         Steps of streamlines in each direction.
-    arrows, flow, line_width, line_distance, high_pass, overshoot, outline : float
-        The settings of these names, in pixels of the frame. They may be out of range.
     supersampling : int
         Pixels of the frame along a side of a pixel of the picture.
     pixel_size : float
@@ -64,14 +65,8 @@ class PixelLook:
     """
 
     look: Look
+    scale: float
     length: int
-    arrows: float
-    flow: float
-    line_width: float
-    line_distance: float
-    high_pass: float
-    overshoot: float
-    outline: float
     supersampling: int = 1
     pixel_size: float = 0.0
     color_range: tuple[float, float]
@@ -82,9 +77,12 @@ class PixelLook:
     is_on_surface: bool = False
 
     def __getattr__(self, name: str) -> Any:
-        """Return a setting that is no length."""
-        if name not in settings_of(Look):
+        """Return a setting of the look, lengths in pixels of the frame."""
+        setting = settings_of(Look).get(name)
+        if setting is None:
             raise AttributeError(name)
+        if isinstance(setting, Number) and setting.is_pixel_length:
+            return _scaled_length(self.look, setting, self.scale) * self.supersampling
         return getattr(self.look, name)
 
     def settings(self) -> dict[str, Any]:
@@ -126,14 +124,14 @@ class PixelLook:
 
     def for_means(self, length: int) -> PixelLook:
         """Return the look that takes plain means over a length, in steps: without fading and drift."""
-        return replace(self, length=length, kernel="box", flow=0.0, is_antialiased=False)
+        still = replace(self.look, flow=0.0)
+        return replace(self, look=still, length=length, kernel="box", is_antialiased=False)
 
     def in_samples(self, side: int) -> PixelLook:
         """Return the look for a frame with `side` x `side` samples in place of each pixel."""
-        lengths = {setting.name: getattr(self, setting.name) for setting in pixel_lengths(Look)}
         return replace(
             self,
-            **{name: length * side for name, length in lengths.items()},
+            length=self.length * side,
             supersampling=self.supersampling * side,
             pixel_size=self.pixel_size / side,
             flow_distance=self.flow_distance * side,
@@ -156,7 +154,7 @@ def pixel_look(
     ----------
     look : Look
     camera : Camera, optional
-        Of the frame. Needed if there are meshes.
+        The camera of the frame. Needed if there are meshes.
     instances : sequence of MeshInstance
         All meshes in the scene. Only those with a field affect the scale.
     supersampling : int
@@ -199,48 +197,45 @@ def surface_pixel_look(look: Look, step: float, pixel: float, drift: Drift = NO_
 
 def _scaled_pixel_look(look: Look, scale: float, unit_size: float, drift: Drift) -> PixelLook:
     """Return a look with lengths in pixels, `scale` times its own, and pixels in place of `unit_size`."""
-    lengths, scale = _scaled_lengths(look, scale)
+    scale = _possible_scale(look, scale)
     if not has_flow(look):
         drift = NO_DRIFT
+    length = _scaled_length(look, settings_of(Look)["length"], scale)
     return PixelLook(
         look=look,
-        **lengths,
+        scale=scale,
+        length=length,
         pixel_size=unit_size / scale,
         color_range=look.color_range,
         kernel=KERNEL_OF_FADE[look.fade],
         flow_phase=drift.phase,
-        flow_distance=cycle_distance(lengths["length"], look.method) * drift.cycle,
+        flow_distance=cycle_distance(length, look.method) * drift.cycle,
     )
 
 
 def scaled_look(look: Look, scale: float) -> Look:
     """Return a look for a picture that is larger by a scale, as far as the ranges of lengths allow."""
-    lengths, scale = _scaled_lengths(look, scale)
+    scale = _possible_scale(look, scale)
+    lengths = {item.name: _scaled_length(look, item, scale) for item in pixel_lengths(Look)}
     return replace(look, **lengths, unit_size=look.unit_size / scale)
 
 
-def _scaled_lengths(look: Look, scale: float) -> tuple[dict[str, Any], float]:
-    """Multiply the lengths of a look, as far as their ranges allow.
+def _possible_scale(look: Look, scale: float) -> float:
+    """Return a scale for the lengths of a look, as far as their ranges allow.
 
     Noise cells stay at least as large as a pixel, as smaller ones are not visible.
-
-    Returns
-    -------
-    lengths : dict
-        By the names of the settings.
-    scale : float
-        By which they are multiplied.
     """
     max_scale = min(
         setting.high / max(getattr(look, setting.name), 1e-9) for setting in pixel_lengths(Look)
     )
     min_scale = 1.0 / look.line_width
-    scale = float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
-    lengths = {}
-    for setting in pixel_lengths(Look):
-        length = getattr(look, setting.name) * scale
-        lengths[setting.name] = max(round(length), 1) if setting.is_integer else length
-    return lengths, scale
+    return float(np.clip(scale, min(min_scale, 1.0), max(max_scale, 1.0)))
+
+
+def _scaled_length(look: Look, setting: Number, scale: float) -> Any:
+    """Return a length of a look times a scale; at least 1 if it is a whole number."""
+    length = getattr(look, setting.name) * scale
+    return max(round(length), 1) if setting.is_integer else length
 
 
 def preview_look(look: Look, downscale: int) -> Look:
@@ -264,7 +259,7 @@ def preview_look(look: Look, downscale: int) -> Look:
 def pixel_world_size(points: np.ndarray, camera: Camera) -> float:
     """Return the width of a pixel, in Blender units, at the center of (n, 3) points in world space.
 
-    The center is that of their bounding box.
+    The center of the bounding box counts.
     """
     if not camera.is_perspective:
         return 1 / camera.pixels_per_unit
@@ -281,9 +276,9 @@ def instance_line_spacing(look: PixelLook, camera: Camera, instance: MeshInstanc
     ----------
     look : PixelLook
     camera : Camera
-        Of the frame.
+        The camera of the frame.
     instance : MeshInstance
-        If the lengths of the look are in pixels, the distance is that of pixels at its center.
+        If the lengths of the look are in pixels, they are pixels at the center of the instance.
     """
     if look.pixel_size:
         return look.line_distance * look.pixel_size

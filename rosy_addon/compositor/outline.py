@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.cache import Cache
-from ..core.progress import progress, report
+from ..core.progress import progress
 from ..field.connectivity import connected_components
 from ..field.frames import dot
 from ..projection.crease_pixels import crease_pixels
@@ -21,6 +21,7 @@ from ..projection.pixel_neighbors import depth_slopes, neighbor_masks
 from ..projection.project import project_samples
 from .look import crease_angle_of
 from .look_units import PixelLook
+from .pixel_field import pixel_window
 from .reported_blocks import reported_blocks
 
 #: Minimum depth difference at an occlusion, in multiples of the depth tolerance per pixel (see
@@ -47,7 +48,7 @@ OUTLINE_SETTINGS = ("outline", "crease_angle", "supersampling", "display")
 #: Label of all steps.
 STEP_LABEL = "drawing outlines"
 
-#: (dx, dy, bit) of the four nearest neighbors. The bit is that of `neighbor_masks`.
+#: (dx, dy, bit) of the four nearest neighbors. The bit refers to `neighbor_masks`.
 NEIGHBORS_4 = ((1, 0, 5), (-1, 0, 3), (0, 1, 7), (0, -1, 1))
 
 
@@ -78,7 +79,6 @@ def outline_coverage(gbuffer: GBuffer, look: PixelLook, cache: Cache | None = No
         edges = _Edges(gbuffer, look, cache)
     is_start = (edges.line_width > 0) | (gbuffer.coverage.own < 1)
     reach = int(np.ceil(look.outline)) + 1
-    report(0.3, STEP_LABEL)
     is_near = _dilated(gbuffer, is_start, reach)
     # The samples at the border of this part do not know their neighbors.
     entries = np.flatnonzero(_dilated(gbuffer, is_near, 1))
@@ -149,15 +149,15 @@ def _sample_outline(
 
 
 def _dilated(gbuffer: GBuffer, is_marked: np.ndarray, radius: int) -> np.ndarray:
-    """(P,) bool: whether a marked pixel is in the square of this radius, in pixels, around a pixel."""
-    width, height = gbuffer.camera.width, gbuffer.camera.height
-    padded = np.zeros((height + 2 * radius, width + 2 * radius), dtype=bool)
-    row, column = np.divmod(gbuffer.pixel, np.int32(width))
-    padded[row[is_marked] + radius, column[is_marked] + radius] = True
+    """Return a (P,) bool mask of the pixels within `radius` columns and rows of a marked pixel."""
+    cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, radius)
+    padded = np.zeros(shape, dtype=bool)
+    padded.reshape(-1)[cell[is_marked]] = True
     for axis in (0, 1):
         windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1, axis=axis)
         padded = windows.any(axis=-1)
-    return padded[row, column]
+    row, column = np.divmod(cell, np.int32(shape[1]))
+    return padded[row - radius, column - radius]
 
 
 class _Edges:
@@ -220,7 +220,6 @@ class _Edges:
         depth_slack = np.float32(DEPTH_JUMP) * self._tolerance[edge]
         coverage = np.zeros(self._count, dtype=np.float32)
         for distance, dx, dy in _disc_offsets(int(np.ceil(look.outline))):
-            report(0.5, STEP_LABEL)
             neighbor = self._neighbor(edge, dx, dy)
             paintable = neighbor >= 0
             paintable &= gbuffer.instance_id.take(neighbor) == gbuffer.instance_id[edge]
@@ -232,7 +231,7 @@ class _Edges:
         return coverage
 
     def _neighbor(self, entry: np.ndarray, dx: int, dy: int) -> np.ndarray:
-        """Return the entries of the pixels beside those of some entries; -1 where there is none."""
+        """Return the entries of the neighbors at (dx, dy) of some entries; -1 where there is none."""
         return self._entry_of_cell.take(self._cell[entry] + (dy * self._stride + dx))
 
     def _is_linked(self, entry: np.ndarray | slice, bit: int) -> np.ndarray:
@@ -349,7 +348,7 @@ def _mark_strength(
     border : (n,) uint8 ndarray
         Bits `PART_BORDER` and `EMPTY_BORDER`.
     width : int
-        Of the frame.
+        Width of the frame.
     block_side : int
         Pixels of the frame in a pixel of the finished picture, along a side.
 
@@ -360,21 +359,18 @@ def _mark_strength(
     """
     if not len(pixel):
         return np.zeros(0, dtype=np.float32)
-    report(0.0, STEP_LABEL)
     row, column = np.divmod(pixel.astype(np.int64), width)
     stride = width // block_side + 2
     block, block_of_pixel = np.unique(
         row // block_side * stride + column // block_side, return_inverse=True
     )
-    report(0.2, STEP_LABEL)
     pairs = []
     for offset in (1, stride - 1, stride, stride + 1):
         target = np.searchsorted(block, block + offset)
         target[target == len(block)] = 0
         source = np.flatnonzero(block[target] == block + offset)
         pairs.append(np.stack([source, target[source]], axis=1))
-    with progress(0.3, 0.8):
-        mark = connected_components(len(block), np.concatenate(pairs))
+    mark = connected_components(len(block), np.concatenate(pairs))
     sides = [_extent_per_label(values, mark) for values in (block // stride, block % stride)]
     is_part_border = np.zeros(len(block), dtype=bool)
     is_part_border[block_of_pixel[border & PART_BORDER != 0]] = True
@@ -396,7 +392,7 @@ def _extent_per_label(values: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _disc_offsets(radius: int) -> list[tuple[float, int, int]]:
-    """(distance, dx, dy) of the pixels within `radius` pixels of a pixel, itself included."""
+    """Return (distance, dx, dy) of the pixels within `radius` pixels of a pixel, itself included."""
     steps = range(-radius, radius + 1)
     offsets = [(float(np.hypot(dx, dy)), dx, dy) for dy in steps for dx in steps]
     return [offset for offset in offsets if offset[0] <= radius]

@@ -13,10 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from ..core.progress import progress, report
-from .image_noise import BLOCK_ROWS, box_radius, gaussian_blur, hash_bits
+from ..core.progress import progress
+from .image_noise import (
+    BLOCK_ROWS,
+    TileRectangle,
+    box_radius,
+    cached_tiles,
+    gaussian_blur,
+    hash_bits,
+    tile_rectangle,
+)
 from .look_units import PixelLook
-from .picture_tiles import TileRectangle, cached_tiles, tile_rectangle
 from .reported_blocks import reported_blocks
 
 #: Standard deviation of the finest of the blurs whose differences are the frequency bands, in
@@ -110,18 +117,18 @@ def surface_paper_grain_args(look: PixelLook) -> dict[str, Any]:
 
 
 def line_offset(line_width: float) -> int:
-    """Pixels between the grain of successive lines, enough for it to be uncorrelated."""
+    """Return the pixels between the grain of successive lines, enough for it to be uncorrelated."""
     return int(np.ceil(3 * _band_sigmas(line_width)[-1]))
 
 
 def _band_sigmas(line_width: float) -> list[float]:
-    """Standard deviations in pixels of the blurs whose differences are the frequency bands."""
+    """Return the standard deviations in pixels of the blurs whose differences are the frequency bands."""
     finest_sigma = max(FINEST_SIGMA_WIDTHS * line_width, MIN_SIGMA_PIXELS)
     return [finest_sigma * 2**octave for octave in range(len(BAND_WEIGHTS) + 1)]
 
 
 def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.ndarray:
-    """Flat float32 heights in a rectangle of the picture, row by row."""
+    """Return the flat float32 heights in a rectangle of the picture, row by row."""
     sigmas = _band_sigmas(line_width)
     margin = 4 * box_radius(sigmas[-1])
     left, right, bottom, top = rectangle
@@ -129,7 +136,6 @@ def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.n
     row = np.arange(bottom - margin, top + margin, dtype=np.int32)[:, None]
     white = np.empty((len(row), len(column)), dtype=np.float32)
     for start in range(0, len(row), BLOCK_ROWS):
-        report(0.0, STEP_LABEL)
         block = slice(start, start + BLOCK_ROWS)
         bits = hash_bits((column, row[block]), seed ^ SEED_SALT, 0, 0.5)
         white[block] = bits.astype(np.float32) - np.float32(0.5)
@@ -138,16 +144,14 @@ def _grain_tiles(rectangle: TileRectangle, line_width: float, seed: int) -> np.n
 
 
 def _band_noise(white: np.ndarray, sigmas: Sequence[float]) -> np.ndarray:
-    """Weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
+    """Return the weighted sum of frequency bands of (H, W) white noise: differences of successive blurs."""
     total = np.zeros_like(white)
     finer = _blur(white, sigmas[0])
     for finer_sigma, broader_sigma, weight in zip(sigmas, sigmas[1:], BAND_WEIGHTS, strict=False):
         broader = _blur(white, broader_sigma)
-        report(0.0, STEP_LABEL)
         # The standard deviation of blurred white noise is proportional to 1 / sigma.
         total += np.float32(weight * finer_sigma / sigmas[0]) * (finer - broader)
         finer = broader
-    report(0.0, STEP_LABEL)
     return total
 
 
@@ -157,7 +161,6 @@ def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
         with progress(0.0, label=STEP_LABEL):
             return gaussian_blur(image, sigma)
     for axis in (0, 1) * max(round(2 * sigma**2), 1):
-        report(0.0, STEP_LABEL)
         # The kernel (1, 2, 1) / 4 has the variance 1 / 2.
         forward, backward = (np.roll(image, shift, axis=axis) for shift in (1, -1))
         image = np.float32(0.5) * image + np.float32(0.25) * (forward + backward)
@@ -166,7 +169,7 @@ def _blur(image: np.ndarray, sigma: float) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _band_noise_std(*sigmas: float) -> float:
-    """Standard deviation of `_band_noise` of binary noise, from its impulse response."""
+    """Return the standard deviation of `_band_noise` of binary noise, from its impulse response."""
     radius = 4 * box_radius(sigmas[-1])
     impulse = np.zeros((2 * radius + 1,) * 2, dtype=np.float32)
     impulse[radius, radius] = 1

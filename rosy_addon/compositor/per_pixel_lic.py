@@ -1,12 +1,14 @@
-"""LIC with one streamline per pixel, traced for a block of pixels at once.
+"""LIC with one streamline per pixel, traced for a block of pixels at once: the paper's method and its reference.
 
-Brute-force LIC is the reference that the paper compares its method with: at each step, a streamline
-follows the best match among the N members.
+The method of the paper decomposes the field into vector fields and blends two sets of their images. The
+reference that it is compared with is brute force: at each step, a streamline follows the best match among
+the N members.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,8 +19,14 @@ from .contrast import normalize_variance
 from .filter_kernel import WEIGHT_SLOPES, kernel_weights
 from .lic_images import LicImages, lic_images, magnitude_step_limits
 from .look_units import PixelLook
-from .pixel_field import NEIGHBOR_OFFSETS, PixelField, all_members, neighbor_table, normalized
-from .reported_blocks import reported_blocks
+from .pixel_field import (
+    NEIGHBOR_OFFSETS,
+    PixelField,
+    all_members,
+    blend_weights,
+    neighbor_table,
+    normalized,
+)
 
 #: Function (entries, offsets) -> directions; see `direction_at` of `integrate_noise`.
 DirectionSampler = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -45,12 +53,11 @@ def brute_force(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicIma
     LicImages
     """
     count, degree = len(field.pixel), field.degree
-    with progress(0.0):
-        neighbors = neighbor_table(field)
-        members, directions = members_on_screen(field, look, look.guiding_angle, degree)
-        tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
-        for index, (member, direction) in enumerate(zip(members, directions, strict=True)):
-            tables[:, index] = direction_table(direction, member, degree, neighbors)
+    neighbors = neighbor_table(field)
+    members, directions = _members_on_screen(field, look.guiding_angle, degree)
+    tables = np.zeros((count + 1, degree, 4), dtype=np.float32)
+    for index, (member, direction) in enumerate(zip(members, directions, strict=True)):
+        tables[:, index] = direction_table(direction, member, degree, neighbors)
     candidates = np.zeros((count + 1, degree), dtype=np.complex64)
     candidates[:-1] = members.T
     tracers = [
@@ -100,16 +107,102 @@ def _best_match_sampler(
     return direction_at
 
 
-def members_on_screen(
-    field: PixelField, look: PixelLook, angle: float, count: int
+def member_decomposition(field: PixelField, look: PixelLook, noise: np.ndarray) -> LicImages:
+    """Compute two sets of member images, and blend them.
+
+    The first set follows V_i, the member nearest to the guiding angle phi + 2 pi i / N. Where two
+    members are equally near, V_i jumps. These breaking points are the same for all i. The second
+    set follows V'_i, the member nearest to phi + (2 i + 1) pi / N, which has other breaking points.
+    The blend shows each set away from its breaking points. A field of degree 1 has no second set.
+
+    Parameters
+    ----------
+    field : PixelField
+    look : PixelLook
+        In pixels of the frame.
+    noise : (P, K) float32 ndarray
+
+    Returns
+    -------
+    LicImages
+    """
+    neighbors = neighbor_table(field)
+    angle = look.guiding_angle
+    is_single = field.degree == 1 or look.weights == "none"
+    with progress(0.0, 1.0 if is_single else 0.5):
+        first = _one_set(field, look, noise, neighbors, angle)
+    if is_single:
+        return first
+    with progress(0.5, 1.0):
+        second = _one_set(field, look, noise, neighbors, angle + np.pi / field.degree)
+    for block in pixel_blocks(len(field.pixel)):
+        weight = _first_set_weight(field.part(block), look)
+        second.blend[block] += weight[:, None] * (first.blend[block] - second.blend[block])
+        second.effective_samples[block] += weight * (
+            first.effective_samples[block] - second.effective_samples[block]
+        )
+    return replace(first, blend=second.blend, effective_samples=second.effective_samples)
+
+
+def _one_set(
+    field: PixelField, look: PixelLook, noise: np.ndarray, neighbors: np.ndarray, angle: float
+) -> LicImages:
+    """Compute one set of member images, nearest to `angle` and its rotations by 2 pi / N."""
+    if look.view_plane:
+        members, directions = _members_on_screen(field, angle, field.line_count)
+    else:
+        members = directions = _screen_space_members(field, angle)
+    tracers = [
+        partial(_member_sampler, direction_table(direction, member, field.degree, neighbors))
+        for member, direction in zip(members, directions, strict=True)
+    ]
+    return convolve_members(field, look, noise, neighbors, tracers)
+
+
+def _member_sampler(table: np.ndarray, _block: slice) -> DirectionSampler:
+    """Make a sampler of one vector field on screen, given its `direction_table`."""
+    return lambda entry, offset: interpolate_direction(table.take(entry, axis=0), offset)
+
+
+def _first_set_weight(field: PixelField, look: PixelLook) -> np.ndarray:
+    """Return the (P,) float32 weight of the first set in the blend."""
+    if look.view_plane:
+        weight = blend_weights(field, look.guiding_angle)
+    else:
+        member = _screen_space_members(field, look.guiding_angle)[0]
+        angle_offset = np.angle(member * np.exp(-1j * look.guiding_angle))
+        weight = (0.5 + 0.5 * np.cos(field.degree * angle_offset)).astype(np.float32)
+    return (weight > 0.5).astype(np.float32) if look.weights == "binary" else weight
+
+
+def _screen_space_members(field: PixelField, angle: float) -> np.ndarray:
+    """Return (M, P) complex64 directions, chosen among the members after projection to the screen.
+
+    This reproduces the error in Figure 8 of the paper. On a tilted surface the angles between
+    projected members are not 2 pi / N. The two sets of breaking points then come close to each
+    other, and the weights do not match them.
+    """
+    screen_members = np.empty((field.line_count, len(field.pixel)), dtype=np.complex64)
+    for block in pixel_blocks(len(field.pixel)):
+        part = field.part(block)
+        members = np.stack(
+            [part.to_screen(part.member_direction(member)) for member in all_members(part, 0.0)]
+        )
+        for line, out in enumerate(screen_members):
+            rotation = np.exp(-1j * (angle + 2 * np.pi * line / field.degree))
+            best_index = np.argmax((members * rotation).real, axis=0)
+            out[block] = np.take_along_axis(members, best_index[None], axis=0)[0]
+    return screen_members
+
+
+def _members_on_screen(
+    field: PixelField, angle: float, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the first members of a field, and their directions on screen.
 
     Parameters
     ----------
     field : PixelField
-    look : PixelLook
-        Its `foreshorten` is used.
     angle : float
         The first member is nearest to it, in radians.
     count : int
@@ -120,7 +213,7 @@ def members_on_screen(
     members, directions : (count, P) complex64 ndarray
     """
     members, directions = np.empty((2, count, len(field.pixel)), dtype=np.complex64)
-    for block in reported_blocks(len(field.pixel), "finding directions"):
+    for block in pixel_blocks(len(field.pixel)):
         part = field.part(block)
         members[:, block] = all_members(part, angle)[:count]
         for member, direction in zip(members, directions, strict=True):
@@ -142,7 +235,7 @@ def convolve_members(
     ----------
     field : PixelField
     look : PixelLook
-        In pixels of the frame. Its `length`, `step`, kernel and `magnitude` are used.
+        In pixels of the frame. Its `length`, kernel and `magnitude_length` are used.
     noise : (P, K) float32 ndarray
     neighbors : (9, P + 1) int32 ndarray
         From `pixel_field.neighbor_table`.
@@ -154,8 +247,7 @@ def convolve_members(
     LicImages
     """
     count, channels = noise.shape
-    with progress(0.0):
-        step_limit = magnitude_step_limits(field, look)
+    step_limit = magnitude_step_limits(field, look)
     padded_noise = np.concatenate([noise, np.zeros((1, channels), dtype=np.float32)])
     members = np.empty((len(tracers), count, channels), dtype=np.float32)
     effective_samples = np.zeros(count, dtype=np.float32)
@@ -177,8 +269,7 @@ def convolve_members(
             fraction = (member + block.stop / count) / len(tracers)
             report(fraction, "tracing streamlines")
     effective_samples /= len(tracers)
-    with progress(1.0):
-        return lic_images(members, effective_samples)
+    return lic_images(members, effective_samples)
 
 
 def direction_table(
@@ -210,11 +301,11 @@ def direction_table(
     table = np.zeros((count + 1, 4), dtype=np.float32)
     table[:-1, 0], table[:-1, 1] = direction.real, direction.imag
     unit_direction, unit_member = np.zeros((2, count + 1), dtype=np.complex64)
-    for block in reported_blocks(count, "finding directions", 0.0, 0.3):
+    for block in pixel_blocks(count):
         unit_direction[block] = normalized(direction[block])
         unit_member[block] = normalized(member[block])
     min_cosine = np.cos(np.pi / max(degree, 2))
-    for block in reported_blocks(count, "finding directions", 0.3, 1.0):
+    for block in pixel_blocks(count):
         conjugate, member_conjugate = unit_direction[block].conj(), unit_member[block].conj()
         gradient_sines = []
         for offset in ((-1, 0), (1, 0), (0, -1), (0, 1)):
@@ -263,8 +354,8 @@ def integrate_noise(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Sum the noise along one half of each streamline that starts in a block.
 
-    A position is an entry of the pixel field and an offset from the center of that pixel. Steps are
-    those of the two-step Adams-Bashforth method, v = 3/2 d - 1/2 d_previous. It evaluates the
+    A position is an entry of the pixel field and an offset from the center of that pixel. Steps are taken
+    by the two-step Adams-Bashforth method, v = 3/2 d - 1/2 d_previous. It evaluates the
     direction once per step, like Euler's method, without its drift out of curves.
 
     Parameters
@@ -281,7 +372,7 @@ def integrate_noise(
     noise : (P + 1, K) float32 ndarray
         0 in row P.
     look : PixelLook
-        In pixels of the frame. Its `length`, `step` and kernel are used.
+        In pixels of the frame. Its `length` and kernel are used.
     side : {1, -1}
         The half of the streamline: forward or backward.
     step_limit : (B,) ndarray or None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..field.directional_field import evaluate_harmonics
 from ..field.symmetry import FieldSymmetry
 from ..projection.field_channel import FieldChannel
 from ..projection.gbuffer import GBuffer
-from ..projection.pixel_blocks import BLOCK_PIXELS
+from ..projection.pixel_blocks import BLOCK_PIXELS, pixel_blocks
 from ..projection.pixel_neighbors import neighbor_masks, screen_jacobians
 from .reported_blocks import reported_blocks
 
@@ -65,7 +64,7 @@ class PixelField:
     ----------
     degree : int
     width, height : int
-        Of the frame, in pixels.
+        Size of the frame in pixels.
     pixel : (P,) int32 ndarray
         Flat indices into the frame, ascending, from the lower left.
     representation : (P,) complex64 ndarray
@@ -101,7 +100,7 @@ class PixelField:
     seam_steps: SeamSteps | None = None
     map_position: np.ndarray | None = None
 
-    @cached_property
+    @property
     def harmonics(self) -> list[tuple[int, np.ndarray]]:
         """Pairs of j and (P,) complex64 C_j (see `field.directional_field`). Empty for a RoSy."""
         return [
@@ -110,7 +109,7 @@ class PixelField:
             if kind == "deviation"
         ]
 
-    @cached_property
+    @property
     def symmetry(self) -> FieldSymmetry:
         """The symmetry of the directions: which of them share a line."""
         return FieldSymmetry(self.degree, tuple(j for j, _ in self.harmonics))
@@ -128,7 +127,7 @@ class PixelField:
     def part(self, extent: slice | np.ndarray) -> PixelField:
         """Return the field at some of the pixels, without its `seam_steps`.
 
-        Its `neighbor_mask` is that of all pixels.
+        Its `neighbor_mask` may refer to pixels that are left out.
         """
         index = self.gbuffer_index
         if not isinstance(index, slice):
@@ -212,7 +211,7 @@ def neighbor_table(field: PixelField) -> np.ndarray:
     entry = np.full(field.height * field.width, count, dtype=np.int32)
     entry[field.pixel] = np.arange(count, dtype=np.int32)
     table = np.full((9, count + 1), count, dtype=np.int32)
-    for block in reported_blocks(count, "finding neighbors"):
+    for block in pixel_blocks(count):
         pixel, mask = field.pixel[block], field.neighbor_mask[block]
         for bit, (dx, dy) in enumerate(NEIGHBOR_OFFSETS):
             linked = np.flatnonzero(mask >> bit & 1)
@@ -251,7 +250,6 @@ def surface_pixel_field(gbuffer: GBuffer, degree: int, crease_angle: float | Non
     if not z.all():
         with progress(0.9, 1.0):
             mask = mask_undefined(mask, pixel, camera.width, camera.height, z != 0)
-    report(1.0, "finding directions")
     return PixelField(
         degree=degree,
         width=camera.width,
@@ -289,6 +287,32 @@ def entries_of_rows(pixel: np.ndarray, width: int, rows: tuple[int, int]) -> sli
     return slice(*np.searchsorted(pixel, first_pixels.astype(pixel.dtype)).tolist())
 
 
+def pixel_window(pixel: np.ndarray, width: int, margin: int) -> tuple[np.ndarray, tuple[int, int]]:
+    """Return where pixels are in the smallest window around all of them, with an empty margin.
+
+    Parameters
+    ----------
+    pixel : (P,) int32 ndarray
+        Flat pixels of a frame, ascending. At least one.
+    width : int
+        Width of the frame.
+    margin : int
+        In pixels, on each side.
+
+    Returns
+    -------
+    cell : (P,) int32 ndarray
+        Flat indices into the window.
+    shape : (int, int)
+        Rows and columns of the window.
+    """
+    row, column = np.divmod(pixel, np.int32(width))
+    bottom, left = row[0] - margin, column.min() - margin
+    columns = int(column.max() - left) + 1 + margin
+    cell = (row - bottom) * np.int32(columns) + (column - left)
+    return cell, (int(row[-1] - bottom) + 1 + margin, columns)
+
+
 def mask_undefined(
     mask: np.ndarray, pixel: np.ndarray, width: int, height: int, defined: np.ndarray
 ) -> np.ndarray:
@@ -299,7 +323,7 @@ def mask_undefined(
     mask : (P,) uint16 ndarray
     pixel : (P,) int ndarray
     width, height : int
-        Of the frame. Pixels beyond it are undefined.
+        Size of the frame. Pixels beyond it are undefined.
     defined : (P,) bool ndarray
     """
     is_defined = np.zeros((height + 2, width + 2), dtype=bool)
@@ -320,7 +344,7 @@ def mask_undefined(
 
 
 def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
-    """(P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
+    """Return the (P,) float32 weight of the first set of member images, cos^2(N (t - phi) / 2).
 
     phi is the guiding angle, and t is the angle of a member. The weight is 0 at the breaking points
     of the first set and 1 at the breaking points of the second.
@@ -330,7 +354,7 @@ def blend_weights(field: PixelField, guiding_angle: float) -> np.ndarray:
 
 
 def nearest_member(field: PixelField, guiding_angle: float) -> np.ndarray:
-    """(P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
+    """Return the (P,) complex64 member nearest to a guiding angle, in the view plane (equations 3 and 4).
 
     If two members are equally near, the one on the counter-clockwise side is returned, as in the
     paper.
@@ -353,6 +377,6 @@ def product(a: np.ndarray, b: np.ndarray | np.complex128) -> np.ndarray:
 
 
 def all_members(field: PixelField, guiding_angle: float) -> list[np.ndarray]:
-    """N times (P,) complex64: the member nearest to a guiding angle, then its N - 1 rotations."""
+    """Return N (P,) complex64 arrays: the member nearest to a guiding angle, then its N - 1 rotations."""
     nearest = nearest_member(field, guiding_angle)
     return [rotated(nearest, 2 * np.pi * k / field.degree) for k in range(field.degree)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -64,16 +64,8 @@ class Light:
 KEY_LIGHT = Light("sun", np.array([-0.50, 0.60, 0.62]) / 0.9975, np.ones(3), 1.0)
 
 
-class HasLight(Protocol):
-    """A look or a style of strokes."""
-
-    @property
-    def light(self) -> str:
-        """The light: "headlight", "lamp" or "scene"."""
-
-
-def lights_of(look: HasLight, lights: Sequence[Light]) -> Sequence[Light]:
-    """Return the lights that a look or a style of strokes uses, given those of the scene.
+def lights_of(look: Any, lights: Sequence[Light]) -> Sequence[Light]:
+    """Return the lights that a look or a style of strokes uses, given the lights of the scene.
 
     There are none for the headlight.
     """
@@ -96,7 +88,7 @@ def diffuse(
     lights : sequence of Light
         Lights of the scene in the space of the camera. Used if the light of the look is "scene".
     visibility : sequence of (P,) ndarray, optional
-        By default that of `light_visibility`.
+        By default from `light_visibility`.
 
     Returns
     -------
@@ -128,14 +120,14 @@ def light_visibility(
     Parameters
     ----------
     gbuffer, look, lights
-        As for `diffuse`.
+        See `diffuse`.
     cache : Cache, optional
         Stores the results, which do not depend on the other settings of the look.
 
     Returns
     -------
     list of (P,) float32 ndarray
-        Of each of the `lights_of` the look. Empty if nothing casts shadows.
+        One for each of the `lights_of` the look. Empty if nothing casts shadows.
     """
     if look.shading == 0 or not look.shadows:
         return []

@@ -52,7 +52,7 @@ class ComposeStages:
         self._mesh_cache = mesh_cache
 
     def pixel_field(self, degree: int, look: PixelLook) -> PixelField:
-        """Pixel field of one degree, rotated by the wobble of the look."""
+        """Return the pixel field of one degree, rotated by the wobble of the look."""
         crease_angle = crease_angle_of(look)
         field = self._cache.get_or_create(
             ("pixel field", self._gbuffer, degree, crease_angle),
@@ -64,7 +64,7 @@ class ComposeStages:
         return rotate_pixel_field(field, np.float32(look.wobble) * angle)
 
     def noise(self, field: PixelField, look: PixelLook) -> np.ndarray:
-        """(P, K) float32 noise of a look at the pixels of a field."""
+        """Return the (P, K) float32 noise of a look at the pixels of a field."""
         if look.anchor == "surface":
             args = noise_args(look) | cell_size_args(look)
             if look.detail:
@@ -87,11 +87,12 @@ class ComposeStages:
     def _new_lic(
         self, field: PixelField, looks: Sequence[PixelLook], strip: Strip | None
     ) -> list[LicImages]:
-        """Compute LIC images, those of the method "ibfv" with flow from waves that are in the cache."""
+        """Compute LIC images. Waves of the method "ibfv" with flow are kept in the cache."""
         if looks[0].method != "ibfv" or not has_flow(looks[0]):
             return self._convolved(partial(lic_lengths, strip=strip), field, looks)
         # The waves are the same at all times and speeds; see `ibfv`.
-        still = [replace(look, flow=1.0, flow_phase=0.0).lic_key() for look in looks]
+        settings = replace(looks[0].look, flow=1.0)
+        still = [replace(look, look=settings, flow_phase=0.0).lic_key() for look in looks]
         key = "streak waves", self._gbuffer, field.degree, *still
         compute = partial(self._convolved, streak_waves, field, looks)
         return wave_images(self._cache.get_or_create(key, compute), looks)
@@ -123,7 +124,7 @@ class ComposeStages:
         return self._cache.get_or_create(key, compute)
 
     def outline(self, field: PixelField, look: PixelLook) -> np.ndarray:
-        """(P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
+        """Return the (P,) float32 coverage by outlines at the pixels of a field; see `outline_coverage`."""
         coverage = self._cache.get_or_create(
             ("outline", self._gbuffer, *(getattr(look, name) for name in OUTLINE_SETTINGS)),
             partial(outline_coverage, self._gbuffer, look, self._mesh_cache),
@@ -131,7 +132,7 @@ class ComposeStages:
         return coverage[field.gbuffer_index]
 
     def surface_paper_grain(self, field: PixelField, look: PixelLook) -> np.ndarray:
-        """(P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
+        """Return the (P, K) float32 heights of the paper grain, for a look that is anchored to the surface.
 
         They are not normalized: the mean is `NOISE_MEAN`.
         """
@@ -139,7 +140,7 @@ class ComposeStages:
         return self._surface_noise(field, args)
 
     def _surface_noise(self, field: PixelField, args: dict[str, Any]) -> np.ndarray:
-        """(P, K) float32 noise at the pixels of a field; see `surface_noise`."""
+        """Return the (P, K) float32 noise at the pixels of a field; see `surface_noise`."""
 
         def compute() -> np.ndarray:
             curvature = None
@@ -152,6 +153,6 @@ class ComposeStages:
         return noise[field.gbuffer_index]
 
     def _wobble_angle(self, look: PixelLook) -> np.ndarray:
-        """(Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
+        """Return the (Q,) float32 angles at all Q pixels of the G-buffer; see `wobble_angle`."""
         key = "wobble", self._gbuffer, look.anchor, look.line_width, *cell_size_args(look).values()
         return self._cache.get_or_create(key, partial(wobble_angle, self._gbuffer, look))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.cache import Cache
-from ..core.progress import progress, report
+from ..core.progress import report
 from .filter_kernel import Kernel
 from .image_noise import image_noise
 from .look_units import PixelLook
@@ -42,9 +42,6 @@ MAX_SAMPLE_WIDTH = 12.0
 
 #: Bins of the histogram of a sample.
 HISTOGRAM_BINS = 1600
-
-#: Label of all steps.
-STEP_LABEL = "measuring streaks"
 
 #: The statistics of the latest looks. Those of one take about 4 KB.
 STATISTICS_CACHE = Cache(max_bytes=1 << 16)
@@ -104,7 +101,7 @@ def look_streak_statistics(look: PixelLook) -> StreakStatistics:
 
 def _measured(look: PixelLook) -> StreakStatistics:
     """Measure the statistics of streaks in a sample of noise."""
-    report(0.0, STEP_LABEL)
+    report(0.0, "measuring streaks")
     scale = min(MAX_SAMPLE_WIDTH / look.line_width, 1.0)
     line_width, kernel = scale * look.line_width, look.kernel
     side = max(int(SAMPLE_WIDTHS * line_width), MIN_SAMPLE_PIXELS)
@@ -114,14 +111,10 @@ def _measured(look: PixelLook) -> StreakStatistics:
     width = side + length_pixels
     anchored = look.anchor == "surface"
     noise = _noise_sample((side, width), line_width, look.density, scale * look.high_pass, anchored)
-    report(0.2, STEP_LABEL)
     streaks, streak_std = _standardized(_line_means(noise, length_pixels, side, kernel))
-    report(0.3, STEP_LABEL)
     break_means = _line_means(noise, min(break_pixels, length_pixels), side, kernel)
     break_streaks, break_std = _standardized(break_means)
-    report(0.4, STEP_LABEL)
     spots, disc_std = _standardized(disc_means(noise[:, :side], line_width))
-    report(0.5, STEP_LABEL)
     paper_relief, paper_grain_std = 0.0, 1.0
     amplitude = PAPER_GRAIN_STRENGTH * look.paper_grain
     if amplitude and anchored:
@@ -134,7 +127,6 @@ def _measured(look: PixelLook) -> StreakStatistics:
         pixel = np.arange(streaks.size, dtype=np.int32)
         heights = picture_paper_grain(pixel, len(streaks[0]), line_width, 1)
         paper_relief = amplitude * heights[0].reshape(streaks.shape)
-    report(0.6, STEP_LABEL)
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     break_amounts = break_amount(coverages, look.breaks, look.wobble)
     break_levels = np.linspace(
@@ -144,10 +136,8 @@ def _measured(look: PixelLook) -> StreakStatistics:
         streaks + amount * (break_streaks - streaks) + paper_relief for amount in break_levels
     ]
     half_width = softness(look.crispness)
-    with progress(0.7, 0.95):
-        threshold_tables = _threshold_tables(samples, half_width)
-    with progress(0.95, 1.0):
-        (disc_threshold,) = _threshold_tables([spots + paper_relief], half_width)
+    threshold_tables = _threshold_tables(samples, half_width)
+    (disc_threshold,) = _threshold_tables([spots + paper_relief], half_width)
     stds = streak_std, break_std, disc_threshold, disc_std, paper_grain_std
     if len(break_levels) == 1:
         return StreakStatistics(threshold_tables[0], *stds)
@@ -184,18 +174,18 @@ def break_amount(target_coverage: np.ndarray, breaks: float, wobble: float) -> n
 
 
 def break_steps(look: PixelLook) -> int:
-    """Steps in each direction of the short streaks that break lines into pieces."""
+    """Return the steps in each direction of the short streaks that break lines into pieces."""
     steps = min(BREAK_LENGTH_WIDTHS * look.line_width, MAX_BREAK_FRACTION * look.length)
     return max(round(steps), 1)
 
 
 def softness(crispness: float) -> float:
-    """Half the width of the step from paper to ink, in standard deviations of the streaks."""
+    """Return half the width of the step from paper to ink, in standard deviations of the streaks."""
     return MAX_SOFTNESS * (MIN_SOFTNESS / MAX_SOFTNESS) ** crispness
 
 
 def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarray:
-    """(S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
+    """Return the (S, COVERAGE_STEPS) thresholds of S samples of streaks, for coverages from 0 to 1.
 
     `half_width` is half the width of the step from paper to ink, in the unit of the samples.
     """
@@ -207,8 +197,7 @@ def _threshold_tables(samples: list[np.ndarray], half_width: float) -> np.ndarra
     )
     coverages = np.linspace(0, 1, COVERAGE_STEPS)
     tables = []
-    for index, sample in enumerate(samples):
-        report(index / len(samples), STEP_LABEL)
+    for sample in samples:
         histogram = np.histogram(sample, edges)[0] / sample.size
         tables.append(np.interp(coverages, ink_fraction @ histogram, thresholds))
     return np.array(tables)
@@ -234,7 +223,7 @@ def _noise_sample(
 
 
 def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np.ndarray:
-    """(n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
+    """Return (n, side) means over `length` pixels of the rows of (n, width) noise, from its center."""
     if kernel == "ramp":
         # The weights of a window from column a on are 1 - 2 (j - middle) / length, for the column j.
         column = np.arange(noise.shape[1])
@@ -250,7 +239,7 @@ def _line_means(noise: np.ndarray, length: int, side: int, kernel: Kernel) -> np
 
 
 def _window_means(rows: np.ndarray, window: int) -> np.ndarray:
-    """(n, width - window + 1) float64 means over windows of the rows of (n, width) values."""
+    """Return (n, width - window + 1) float64 means over windows of the rows of (n, width) values."""
     sums = np.cumsum(np.pad(rows, ((0, 0), (1, 0))), axis=1, dtype=np.float64)
     return (sums[:, window:] - sums[:, :-window]) / window
 
@@ -262,6 +251,6 @@ def _standardized(means: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def smoothstep(x: np.ndarray) -> np.ndarray:
-    """Smooth step: 0 below 0, 1 above 1, and 3 x^2 - 2 x^3 between."""
+    """Return the smooth step: 0 below 0, 1 above 1, and 3 x^2 - 2 x^3 between."""
     x = np.clip(x, 0, 1)
     return x * x * (3 - 2 * x)

@@ -49,7 +49,7 @@ class StreamlineBatch:
     max_streamlines : int
         Size of the batch.
     interpolates : bool
-        Whether noise is interpolated across streamlines at every step. Otherwise it is that of the
+        Whether noise is interpolated across streamlines at every step. Otherwise it is the noise of the
         nearest pixel.
     """
 
@@ -169,7 +169,7 @@ class StreamlineBatch:
     def _drifting_averages(
         self, count: int, step_counts: np.ndarray, last_step: int
     ) -> Iterator[tuple[np.ndarray, list[np.ndarray], np.ndarray]]:
-        """Yield what `trace` does, for kernels that move. The average is that of a single channel."""
+        """Yield what `trace` does, for kernels that move. The averages have a single channel."""
         lanes, covering = 2 * count, self._covering
         second_sums = self._whole_second_sums(count)
         averages = [DriftingAverages(kernel, second_sums) for kernel in self._moving_kernels]
@@ -291,7 +291,7 @@ class StreamlineBatch:
                 )
 
     def _tapered_sums(self, step: int, half_width: int | np.ndarray, lanes: int) -> np.ndarray:
-        """(2 n, K) complex64 tapered sums of the noise, `half_width` r steps in each direction.
+        """Return (2 n, K) complex64 tapered sums of the noise, `half_width` r steps in each direction.
 
         With the sums of prefix sums E, this is (E(i + r) - 2 E(i - 1) + E(i - r - 2)) / (r + 1). A
         triangular kernel is the mean of r + 1 box kernels of r + 1 steps, one step apart.
@@ -305,7 +305,7 @@ class StreamlineBatch:
     def _ramp_sums(
         self, step: int, half_width: int | np.ndarray, lanes: int, is_along: np.ndarray
     ) -> np.ndarray:
-        """(2 n, K) complex64 sums of the noise that fall along the field, in the same way.
+        """Return (2 n, K) complex64 sums of the noise with weights that fall along the field.
 
         Along a streamline, weights that fall from 2 r + 1 to 1 are
         E(i + r) - E(i - r - 1) - (2 r + 1) P(i - r - 1), with the prefix sums P(i) = E(i) - E(i - 1). Where
@@ -323,7 +323,7 @@ class StreamlineBatch:
         return falling
 
     def _second_prefix_sums(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
-        """(2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""
+        """Return the (2 n, K) complex64 sums of prefix sums E up to a step. E(-1) is 0."""
         seed = self._sums[0, :lanes]
         if np.ndim(step) == 0:
             if step >= 0:
@@ -339,7 +339,7 @@ class StreamlineBatch:
         return np.where(same_side[:, None], gathered, mirrored)
 
     def _prefix_sums_before(self, step: int | np.ndarray, lanes: int) -> np.ndarray:
-        """(2 n, K) complex64 prefix sums up to a step, excluding it.
+        """Return the (2 n, K) complex64 prefix sums up to a step, excluding it.
 
         Negative steps are on the opposite half of the streamline. Its sums run away from the seed,
         and its derivatives to the left have the opposite sign.
@@ -355,7 +355,7 @@ class StreamlineBatch:
     def _rows(
         self, row: int | np.ndarray, lanes: int, is_opposite: bool | np.ndarray = False
     ) -> np.ndarray:
-        """(2 n, K) complex64 `_sums` of a row, or of a row of each lane, or of the opposite lane."""
+        """Return (2 n, K) complex64 `_sums` of a row, or of a row of each lane, or of the opposite lane."""
         half = lanes // 2
         if np.ndim(row) == 0:
             rows = self._sums[row, :lanes]

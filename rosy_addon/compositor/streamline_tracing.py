@@ -18,7 +18,7 @@ MIN_RETURN_STEPS = 4
 #: The number behind the R2 sequence (Roberts), in two dimensions what the golden ratio is in one.
 PLASTIC_NUMBER = 1.3247179572447460
 
-#: Columns by which the offsets of the seeds of a sheet are shifted against those of the sheet before.
+#: Columns by which the offsets of seeds are shifted from one sheet to the next.
 SHEET_SHIFT = 17
 
 #: Largest offset from the center of a cell after a step across a seam, in pixels along each axis.
@@ -130,7 +130,7 @@ class TracedLanes:
     def _move(self, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
         """Move positions by a step; return the (m,) complex64 pixels to the cells in which they are then.
 
-        The method is that of Adams and Bashforth with two steps, 3/2 d - 1/2 d_previous.
+        The method is two-step Adams-Bashforth, 3/2 d - 1/2 d_previous.
         """
         previous = self._previous_direction
         displacement = direction.copy() if previous is None else previous
@@ -211,7 +211,7 @@ class TracedLanes:
 
 
 class _LoopFinder:
-    """Finds streamlines that return to a state, in a number of steps like that of the loop.
+    """Finds streamlines that return to a state, in about as many steps as the loop has.
 
     Each state is compared with one state of the past, which is replaced at steps that are powers of
     two (Brent, An improved Monte Carlo factorization algorithm, 1980).
@@ -221,7 +221,7 @@ class _LoopFinder:
         self._past_step, self._past_state = MIN_LOOP_STEPS, np.empty(0, dtype=np.intp)
 
     def find(self, step: int, state: np.ndarray, next_cell: np.ndarray) -> np.ndarray:
-        """Indices of the streamlines that have returned to a state, and not ended otherwise."""
+        """Return the indices of the streamlines that have returned to a state, and not ended otherwise."""
         if step in (MIN_LOOP_STEPS, 2 * self._past_step):
             self._past_step, self._past_state = step, state
         elif step >= self._past_step + MIN_RETURN_STEPS:
@@ -235,21 +235,21 @@ class _LoopFinder:
 
 
 def lateral_offset(position: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """(n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
+    """Return (n,) float32 offsets to the left of the centers of cells, times the length of `direction`."""
     lateral = position.imag * direction.real
     lateral -= position.real * direction.imag
     return lateral
 
 
 def axial_steps(position: np.ndarray, direction: np.ndarray, step_scale: np.float32) -> np.ndarray:
-    """(n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
+    """Return (n,) float32 steps from streamlines to the centers of cells, along the streamlines."""
     square = direction.real * direction.real + direction.imag * direction.imag
     along = position.real * direction.real + position.imag * direction.imag
     return along / np.minimum(-step_scale * square, np.float32(-1))
 
 
 def _r2_offsets(covering: Covering, seeds: np.ndarray) -> np.ndarray:
-    """(n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
+    """Return (n,) complex64 offsets from the centers of pixels, spread evenly (R2 sequence, Roberts).
 
     If all streamlines started at the centers, they would step to the next row of pixels at the same
     time, which is visible. Along rows and columns, the offsets are a sequence of low discrepancy. They

@@ -50,9 +50,9 @@ def divide_into_strips(
     look : Look
         Its lengths are in pixels of the picture or in Blender units.
     camera : Camera
-        Of the picture.
+        The camera of the picture.
     instances : sequence of MeshInstance
-        Of the picture.
+        All meshes of the picture.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def group_strips(
     strips : sequence of Strip
         From `divide_into_strips`, for these arguments.
     look, camera, instances
-        Of the picture.
+        See `divide_into_strips`.
     workers : int
         Number of processes. The groups have at most `MAX_GROUP_PIXELS` pixels, if strips are not larger.
 
@@ -115,7 +115,7 @@ def context_rows(look: Look, camera: Camera, instances: Sequence[MeshInstance]) 
     look = pixel_look(look, camera, instances)
     noise = 0
     if look.anchor == "surface":
-        # The noise of the picture is known everywhere, and that of surfaces at visible pixels.
+        # Noise that is anchored to the picture is known everywhere, other noise at visible pixels.
         noise = high_pass_margin(look.high_pass) + int(np.ceil(look.line_width))
     disc = int(np.abs(disc_offsets(look.line_width)).max())
     rows = max(_longest_margin(look), disc) + noise

@@ -20,7 +20,7 @@ from .look_units import PixelLook
 #: Rows of the strip above in which a strip takes averages of streamlines, too.
 OVERLAP_ROWS = 12
 
-#: Rows beyond those of a strip whose pixels may show a sample of them.
+#: Rows beside a strip whose pixels may show a sample of it.
 BORDER_ROWS = 1
 
 #: Rows in which a strip fades into the one above: a pixel in them may show the border.
@@ -35,7 +35,7 @@ class Strip(NamedTuple):
     start, stop : int
         The first row, and the row after the last one.
     height : int
-        Of the frame.
+        Height of the frame.
     """
 
     start: int
@@ -64,7 +64,7 @@ def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.n
     Parameters
     ----------
     pictures : sequence of (h, W, 4) float32 ndarray
-        Of the `drawn_rows` of the strips. RGBA, not premultiplied.
+        The `drawn_rows` of the strips. RGBA, not premultiplied.
     strips : sequence of Strip
         One above the other.
 
@@ -89,7 +89,7 @@ def join_strips(pictures: Sequence[np.ndarray], strips: Sequence[Strip]) -> np.n
 
 
 def _faded(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """Fade from the colors of one strip to those of the one above, row by row. The first row is the lower one's."""
+    """Fade from one strip to the strip above, row by row. The first row is from the lower strip."""
     weight = np.linspace(1, 0, len(lower), endpoint=False, dtype=np.float32)[:, None, None]
     alpha = upper[..., 3:] + weight * (lower[..., 3:] - upper[..., 3:])
     premultiplied = upper[..., :3] * upper[..., 3:]

@@ -28,6 +28,7 @@ from .image_noise import (
     gaussian_blur,
     hash_bits,
 )
+from .pixel_field import pixel_window
 from .reported_blocks import reported_blocks
 
 #: Offsets (dx, dy) in pixels of the samples of a pixel from its center, on a rotated grid.
@@ -95,7 +96,7 @@ def surface_noise(
     detail : float
         Cells on small features are smaller by up to this fraction; see `feature_scale`.
     curvature : (P,) float32 ndarray, optional
-        Of the features; see `field.feature_curvature`. Required if `detail` is not 0.
+        Curvature of the features; see `field.feature_curvature`. Required if `detail` is not 0.
 
     Returns
     -------
@@ -117,7 +118,7 @@ def surface_noise(
         block_hash = instance_hash[instance_id]
         solid_noise(block_rest, size, block_hash, seed, density, out=total[:, block])
         # The variance of a mean along a streamline is proportional to the size of cells. The factor
-        # keeps it at that of cells of the size `cell`.
+        # makes it the same as for cells of the size `cell`.
         total[:, block] /= np.sqrt(np.clip(scale, *CONTRAST_SCALE_RANGE))
     del rest  # as large as all other arrays together
     if high_pass:
@@ -142,13 +143,13 @@ def solid_noise(
     Parameters
     ----------
     rest : RestCoordinates
-        Of n pixels.
+        Rest coordinates of n pixels.
     cell_size : (n,) float32 ndarray
         Side of a cell on the surface, in Blender units of rest space.
     instance_hash : (n,) uint32 ndarray
         From `instance_hashes`.
     seed, density
-        As for `surface_noise`.
+        See `surface_noise`.
     out : (K, n) float32 ndarray
         Independent channels with the mean 0. The standard deviation of single cells is `NOISE_STD`.
     """
@@ -249,13 +250,13 @@ def octave_weights(octave_offset: np.ndarray) -> np.ndarray:
     """Compute the weights of octaves, given their distance from the octave of a pixel's level.
 
     The squares of the weights of the `OCTAVES` octaves sum to 1, so the variance of the blend is
-    that of a single octave.
+    the same as for a single octave.
     """
     return np.cos(octave_offset * np.float32(np.pi / OCTAVES)) * np.float32(np.sqrt(2 / OCTAVES))
 
 
 def instance_hashes(names: Sequence[str]) -> np.ndarray:
-    """(B,) uint32 hashes of mesh instances, stable from picture to picture.
+    """Return the (B,) uint32 hashes of mesh instances, stable from picture to picture.
 
     A hash depends on the name of an instance and, if several instances have that name, on its
     position among them. The name of a mesh file is its path; the folder is ignored.
@@ -269,7 +270,7 @@ def instance_hashes(names: Sequence[str]) -> np.ndarray:
 
 
 def lattice_axes() -> np.ndarray:
-    """(3, 3) float32: the axes of the lattice in the rest space of a mesh instance, as rows."""
+    """Return the (3, 3) float32 axes of the lattice in the rest space of a mesh instance, as rows."""
     rotation = np.eye(3)
     for axis, angle in enumerate(LATTICE_ANGLES):
         first, second = (axis + 1) % 3, (axis + 2) % 3
@@ -281,38 +282,29 @@ def lattice_axes() -> np.ndarray:
 
 
 def _to_lattice_space(position: np.ndarray) -> np.ndarray:
-    """(3, P) positions in the space of the lattice, given (3, P) positions in rest space."""
+    """Return (3, P) positions in the space of the lattice, given (3, P) positions in rest space."""
     x, y, z = position
     return np.stack([row[0] * x + row[1] * y + row[2] * z for row in lattice_axes()])
 
 
 def _high_pass(gbuffer: GBuffer, channels: np.ndarray, sigma: float) -> None:
     """Subtract a Gaussian blur that ignores pixels outside the G-buffer from (K, P) `channels`."""
-    count, width = len(gbuffer.pixel), np.int32(gbuffer.camera.width)
-    column = gbuffer.pixel % width
+    count = len(gbuffer.pixel)
     # The empty margin is as wide as the support of the blur.
-    margin = 3 * box_radius(sigma)
-    bottom, left = int(gbuffer.pixel[0] // width) - margin, int(column.min()) - margin
-    height = int(gbuffer.pixel[-1] // width) - bottom + 1 + margin
-    image_width = int(column.max()) - left + 1 + margin
-    # Index of each pixel in the image that is blurred.
-    index = np.empty(count, dtype=np.int32)
-    for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
-        row = gbuffer.pixel[block] // width - np.int32(bottom)
-        index[block] = row * np.int32(image_width) + (column[block] - np.int32(left))
+    cell, shape = pixel_window(gbuffer.pixel, gbuffer.camera.width, 3 * box_radius(sigma))
 
     def blurred_image(values: np.ndarray | None) -> np.ndarray:
-        """Flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
-        image = np.zeros((height, image_width), dtype=np.float32)
+        """Return a flat image of the blurred values of the pixels, by default 1. It is 0 outside of them."""
+        image = np.zeros(shape, dtype=np.float32)
         for block in reported_blocks(count, STEP_LABEL, 0.0, 0.0):
-            image.reshape(-1)[index[block]] = 1 if values is None else values[block]
+            image.reshape(-1)[cell[block]] = 1 if values is None else values[block]
         return gaussian_blur(image, sigma).reshape(-1)
 
     images = len(channels) + 1
     with progress(0.0, 1 / images):
-        weight = np.maximum(blurred_image(None).take(index), 1e-3)
+        weight = np.maximum(blurred_image(None).take(cell), 1e-3)
     for number, channel in enumerate(channels, start=1):
         with progress(number / images, (number + 1) / images):
             blurred = blurred_image(channel)
             for block in reported_blocks(count, STEP_LABEL, 1.0, 1.0):
-                channel[block] -= blurred.take(index[block]) / weight[block]
+                channel[block] -= blurred.take(cell[block]) / weight[block]

@@ -63,7 +63,7 @@ class ReferenceRender:
         return MipMap(self.luminance)
 
     def mip_level(self, camera: Camera) -> float:
-        """Level of the mip map at which pixels are as large as those of a camera; not rounded."""
+        """Return the level of the mip map at which pixels are as large as the pixels of a camera; not rounded."""
         height, width = self.luminance.shape
         pixels_per_unit = self.camera.resized(width, height).pixels_per_unit
         return max(float(np.log2(pixels_per_unit / camera.pixels_per_unit)), 0.0)
@@ -166,14 +166,14 @@ def apply_tone_curve(tone: np.ndarray, look: Look) -> np.ndarray:
     Parameters
     ----------
     tone : ndarray
-        Of any shape.
+        Tones, of any shape.
     look : Look
         The black of its `tone_levels` becomes 0 and the white 1. The gamma is applied after that.
 
     Returns
     -------
     float32 ndarray
-        Of the same shape. At least 0; values beyond the white point are above 1.
+        Tones of the same shape. At least 0; values beyond the white point are above 1.
     """
     scale, black = tone_curve(look)
     stretched = np.maximum((tone - np.float32(black)) * np.float32(scale), 0)

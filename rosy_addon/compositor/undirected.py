@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..projection.pixel_blocks import BLOCK_PIXELS
 from .image_noise import NOISE_MEAN
-from .pixel_field import PixelField, entries_of_rows
+from .pixel_field import PixelField, pixel_window
 from .reported_blocks import reported_blocks
 
 #: Radius of the disc in line widths: spots are then about as wide as lines.
@@ -59,40 +58,19 @@ def undirected_texture(
     if not len(undefined):
         return None
     offsets = disc_offsets(line_width)
-    margin = int(np.abs(offsets).max())
-    stride = field.width + 2 * margin
+    cell, shape = pixel_window(field.pixel, field.width, int(np.abs(offsets).max()))
+    # Sums of noise and of samples, as complex numbers.
+    samples = np.zeros(shape, dtype=np.complex64).reshape(-1)
+    samples[cell] = noise.mean(axis=1) - np.float32(NOISE_MEAN) + np.complex64(1j)
     texture = np.full(len(noise), np.nan, dtype=np.float32)
-    # Rows are padded with the pixels that a disc can reach.
-    band_rows = max(BLOCK_PIXELS // field.width, 2 * margin, 1)
-    for first_row in range(0, field.height, band_rows):
-        stop_row = first_row + band_rows
-        band = undefined[
-            entries_of_rows(field.pixel[undefined], field.width, (first_row, stop_row))
-        ]
-        if not len(band):
-            continue
-        around_rows = first_row - margin, stop_row + margin
-        around = entries_of_rows(field.pixel, field.width, around_rows)
-        # Sums of noise and of samples, as complex numbers.
-        samples = np.zeros((band_rows + 2 * margin) * stride, dtype=np.complex64)
-        first_cell = (first_row - margin) * stride - margin
-        mean = noise[around].mean(axis=1) - np.float32(NOISE_MEAN)
-        samples[_padded(field, field.pixel[around], stride) - first_cell] = mean + 1j
-        share = first_row / field.height
-        for block in reported_blocks(len(band), STEP_LABEL, share, share):
-            cell = _padded(field, field.pixel[band[block]], stride) - first_cell
-            total = np.zeros(len(cell), dtype=np.complex64)
-            for dx, dy in offsets.tolist():
-                total += samples.take(cell + (dy * stride + dx))
-            # The disc around a lone pixel may have no samples.
-            texture[band[block]] = total.real / np.maximum(total.imag, 1)
+    for block in reported_blocks(len(undefined), STEP_LABEL):
+        center = cell[undefined[block]]
+        total = np.zeros(len(center), dtype=np.complex64)
+        for dx, dy in offsets.tolist():
+            total += samples.take(center + (dy * shape[1] + dx))
+        # The disc around a lone pixel may have no samples.
+        texture[undefined[block]] = total.real / np.maximum(total.imag, 1)
     return texture
-
-
-def _padded(field: PixelField, pixel: np.ndarray, stride: int) -> np.ndarray:
-    """Flat indices of pixels into a frame with longer rows."""
-    row, column = np.divmod(pixel, np.int32(field.width))
-    return row.astype(np.intp) * stride + column
 
 
 def disc_means(noise: np.ndarray, line_width: float) -> np.ndarray:

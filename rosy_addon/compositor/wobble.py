@@ -39,12 +39,12 @@ UNIT_VARIANCE_SCALE = (WAVE_COUNT * 16 / 30) ** -0.5
 
 
 def has_wobble(look: Any) -> bool:
-    """Whether lines wobble as if drawn by hand."""
+    """Return whether lines wobble as if drawn by hand."""
     return is_hatched(look) and look.wobble > 0
 
 
 def wave_table() -> np.ndarray:
-    """(WAVE_COUNT, 4) float32: frequency vector and phase of each wave.
+    """Return the (WAVE_COUNT, 4) float32 frequency vector and phase of each wave.
 
     Frequencies are in cycles per unit of length along x, y and z, phases in cycles. The directions
     form a spiral that covers a hemisphere evenly. The wavelengths are spread over one octave.
@@ -117,7 +117,7 @@ def solid_wobble_angle(position: np.ndarray, line_width: np.ndarray) -> np.ndarr
     octave = np.floor(level)
     blend_angle = ((level - octave) * np.float32(np.pi / 2)).astype(np.float32)
     total = np.zeros(len(level), dtype=np.float32)
-    # The squares of both weights sum to 1, so the variance of the blend is that of one octave.
+    # The squares of both weights sum to 1, so the blend has the variance of one octave.
     for index, weight in enumerate(cos_sin(blend_angle)):
         x, y, z = position * np.exp2(-(octave + index)).astype(np.float32)
         for frequency_x, frequency_y, frequency_z, phase in wave_table():

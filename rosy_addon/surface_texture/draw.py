@@ -70,8 +70,9 @@ MIN_STEP = 0.25
 
 #: The settings of a look that a texture is drawn with. All others have no effect on it.
 TEXTURE_SETTINGS = (
-    *("ink", "display", "unit_size", "length", "fade", "flow", "line_width", "line_distance"),
-    *("density", "high_pass", "hue", "seed", "gain", "crease_angle"),
+    *("ink", "display", "unit_size", "length", "fade", "flow"),
+    *("line_width", "line_distance", "density"),
+    *("high_pass", "hue", "seed", "gain", "crease_angle"),
     *("magnitude_length", "color_range", "color_map"),
     *("breaks", "wobble", "paper_grain", "guiding_angle"),
 )
@@ -211,25 +212,16 @@ def draw_texture(
     _check_texture_memory(frame, charts, mesh, look)
     with progress(0.1, 0.15):
         texels = rasterize_charts(charts, frame, name)
-    step = step_length(mesh, charts, texels)
-    on = TexelSurface(instance, mesh, charts, texels, step)
+    on = TexelSurface(instance, mesh, charts, texels, step_length(mesh, charts, texels))
     with progress(0.15, 0.3):
         field = texel_field(on, crease_angle)
     is_direction = content != "look"
     is_ink = is_hatched(look) and not is_direction
-    step_look = surface_pixel_look(
-        sharp_look(look) if is_ink else look,
-        step,
-        float(np.sqrt(mesh.area.sum())) / SURFACE_PIXELS,
-        drift,
-    ).for_symmetry(field.symmetry)
     with progress(0.3, 0.9):
         if is_direction:
             pixels = direction_map(on, content, look.guiding_angle)
-        elif is_ink:
-            pixels = thresholds(on, field, step_look, look.guiding_angle, cache)
         else:
-            pixels = _colors(on, field, step_look)
+            pixels = _look_pixels(on, field, look, drift, cache)
     is_lit = is_ink and lights is not None
     if is_lit:
         with progress(0.9, 0.95):
@@ -290,6 +282,22 @@ def step_length(mesh: TangentMesh, charts: UvCharts, texels: Texels) -> float:
     finest = float(np.quantile(texels_per_unit, 1 - FINE_FRACTION))
     mean_size = float(np.sqrt(mesh.area.sum() / len(texels)))
     return max(1 / finest if finest else 0.0, MIN_STEP * mean_size)
+
+
+def _look_pixels(
+    on: TexelSurface, field: PixelField, look: Look, drift: Drift, cache: Cache | None
+) -> np.ndarray:
+    """Return the (P, 4) thresholds of a look with ink at texels, or the colors of another look."""
+    is_ink = is_hatched(look)
+    step_look = surface_pixel_look(
+        sharp_look(look) if is_ink else look,
+        on.step,
+        float(np.sqrt(on.mesh.area.sum())) / SURFACE_PIXELS,
+        drift,
+    ).for_symmetry(field.symmetry)
+    if is_ink:
+        return thresholds(on, field, step_look, look.guiding_angle, cache)
+    return _colors(on, field, step_look)
 
 
 def _colors(on: TexelSurface, field: PixelField, look: PixelLook) -> np.ndarray:

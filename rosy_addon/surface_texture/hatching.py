@@ -11,7 +11,7 @@ from ..compositor.even_lines import (
     EvenLines,
     resolved_share,
 )
-from ..compositor.hatching import LineModulation, has_breaks, has_paper_grain
+from ..compositor.hatching import HatchedLines, has_breaks, has_paper_grain
 from ..compositor.image_noise import NOISE_MEAN
 from ..compositor.ink_from_thresholds import ink_of_thresholds
 from ..compositor.ink_thresholds import (
@@ -22,7 +22,6 @@ from ..compositor.ink_thresholds import (
 )
 from ..compositor.inks import inks_of
 from ..compositor.lic import lic_lengths, noise_args, unconvolved_noise
-from ..compositor.lic_images import LicImages
 from ..compositor.look import Look, is_even
 from ..compositor.look_units import PixelLook
 from ..compositor.paper_grain import PAPER_GRAIN_CHANNELS, surface_paper_grain_args
@@ -90,16 +89,13 @@ def thresholds(
         with progress(0.13, 0.15):
             field = rotate_pixel_field(field, np.float32(look.wobble) * wobble_angle)
     with progress(0.15, 0.85):
-        images, modulation = _lines(on, field, look, wobble_angle, cache)
+        lines = _lines(on, field, look, wobble_angle, cache)
     members = all_members(field, look.guiding_angle)[: field.line_count]
     pixels = np.empty((len(field.pixel), 4), dtype=np.float32)
     for block in pixel_blocks(len(pixels)):
         report(0.85 + 0.15 * block.start / len(pixels), LABEL)
-        part_images = None if images is None else images.part(block)
-        part = modulation.part(block)
-        thresholds = np.stack(
-            [line_thresholds(line, part_images, look, part) for line in range(field.line_count)]
-        )
+        part = lines.part(block)
+        thresholds = np.stack([line_thresholds(line, part) for line in range(field.line_count)])
         triangle, weights = on.texels.triangle[block], on.texels.barycentric[block]
         frame = frames_at(on.charts, triangle, weights)
         in_frame = np.stack([member[block] * frame for member in members])
@@ -160,7 +156,7 @@ def _lines(
     look: PixelLook,
     wobble_angle: np.ndarray | None,
     cache: Cache | None,
-) -> tuple[LicImages | None, LineModulation]:
+) -> HatchedLines:
     """Draw the streaks or the even lines of a field, and what makes them uneven."""
     is_spaced, is_broken = is_even(look), has_breaks(look)
     undefined = not field.representation.all()
@@ -189,7 +185,9 @@ def _lines(
     if has_paper_grain(look):
         with progress(0.9, 1.0):
             paper_grain = _paper_grain(on, field, look)
-    return None if is_spaced else lic[0], LineModulation(
+    return HatchedLines(
+        look,
+        images=None if is_spaced else lic[0],
         break_images=lic[-1] if is_broken else None,
         paper_grain=paper_grain,
         undirected=undirected,

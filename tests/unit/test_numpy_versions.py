@@ -42,7 +42,12 @@ def draw() -> dict[str, np.ndarray]:
         "drift": (torus(), "curvature", 4, Look(method="ibfv", flow=1.0)),
         "engraving": (torus(), "curvature", 4, load_preset("engraving").look),
         "charcoal": (torus(40, 20), "curvature", 4, load_preset("charcoal").look),
-        "magnitude": (icosphere(3), "axis", 3, Look(hue="magnitude", magnitude_length=True, supersampling=2)),
+        "magnitude": (
+            icosphere(3),
+            "axis",
+            3,
+            Look(hue="magnitude", magnitude_length=True, supersampling=2),
+        ),
     }
     for name, (surface, kind, degree, shape_look) in shapes.items():
         size = 160 * shape_look.supersampling

@@ -19,7 +19,7 @@ from rosy_addon.compositor.even_lines import (
     look_width_table,
     uneven_width,
 )
-from rosy_addon.compositor.hatching import LineModulation
+from rosy_addon.compositor.hatching import HatchedLines
 from rosy_addon.compositor.look import Look
 from rosy_addon.compositor.look_units import instance_line_spacing, pixel_look
 from rosy_addon.compositor.pixel_field import all_members, surface_pixel_field
@@ -284,6 +284,6 @@ def test_lines_grow_between_lines_that_are_too_far_apart():
 
 def test_parts_have_the_lines_of_their_pixels():
     lines = EvenLines(np.arange(6.0).reshape(2, 3), np.ones((2, 3)), np.arange(3.0))
-    modulation = LineModulation(even_lines=lines).part(slice(1, 3))
-    assert modulation.even_lines.streaks.tolist() == [[1, 2], [4, 5]]
-    assert modulation.even_lines.growth.tolist() == [1, 2]
+    part = HatchedLines(pixel_look(LOOK), even_lines=lines).part(slice(1, 3))
+    assert part.even_lines.streaks.tolist() == [[1, 2], [4, 5]]
+    assert part.even_lines.growth.tolist() == [1, 2]

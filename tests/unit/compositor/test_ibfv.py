@@ -1,4 +1,4 @@
-"""Image based flow visualization: directions, contrast, drift, loops, seams."""
+"""Image based flow visualization: directions, contrast, drift, loops."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from rosy_addon.compositor.compose import compose
 from rosy_addon.compositor.filter_kernel import full_sample_count
 from rosy_addon.compositor.flow import NO_DRIFT, Drift, cycle_distance, drift_at
 from rosy_addon.compositor.ibfv import decay_of_samples
-from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.lic_images import LicImages
 from rosy_addon.compositor.look import Look
-from rosy_addon.compositor.pixel_field import PixelField, SeamSteps
+from rosy_addon.compositor.pixel_field import PixelField
 from rosy_addon.core.cache import Cache
 from rosy_addon.projection.project import project
 
@@ -99,79 +98,6 @@ def test_branch_cuts_of_the_angle_leave_no_seam(degree):
     field = planar_pixel_field(angle, degree)
     one, other = (draw(field, replace(LOOK, guiding_angle=angle)).blend for angle in (0.0, 0.5))
     assert np.std(one - other) < 0.02 * one.std()
-
-
-def cut_in_two(angle: float, degree: int, size: int) -> tuple[PixelField, PixelField, np.ndarray]:
-    """Return a uniform field in a square, and that in two charts, of which the right one is upside down.
-
-    The numbers of the pixels of the square in the charts are returned as well.
-    """
-    whole = uniform(angle, degree, size)
-    half, gap = size // 2, 5
-    width = size + gap
-    row, column = np.divmod(np.arange(size * size), size)
-    is_right = column >= half
-    place = np.where(
-        is_right, (size - 1 - row) * width + (size - 1 - column) + half + gap, row * width + column
-    )
-    order = np.argsort(place)
-    number = np.argsort(order)
-    mask = np.full(size * size, 0, dtype=np.uint16)
-    steps = []
-    for bit, (dx, dy) in enumerate((dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)):
-        exists = (row + dy >= 0) & (row + dy < size) & (column + dx >= 0) & (column + dx < size)
-        target = np.where(exists, (row + dy) * size + column + dx, 0)
-        same = exists & (is_right[target] == is_right)
-        # In the chart that is upside down, the same neighbor is in the opposite direction.
-        chart_bit = np.where(is_right, 8 - bit, bit)
-        mask |= (same << chart_bit).astype(np.uint16)
-        across = np.flatnonzero(exists & ~same)
-        steps.append(np.stack([number[across], chart_bit[across], number[target[across]]]))
-    source, bits, target = np.concatenate(steps, axis=1)
-    by_source = np.lexsort([bits, source])
-    count = len(source)
-    seam_steps = SeamSteps(
-        source[by_source].astype(np.int32),
-        bits[by_source].astype(np.uint8),
-        target[by_source].astype(np.int32),
-        np.zeros(count, dtype=np.complex64),
-        np.full(count, -1, dtype=np.complex64),
-        np.zeros(count, dtype=np.complex64),
-        np.full(count, np.pi, dtype=np.float32),
-    )
-    turned = whole.representation * np.where(is_right, np.exp(1j * degree * np.pi), 1)
-    charts = replace(
-        whole,
-        width=width,
-        pixel=place[order].astype(np.int32),
-        representation=turned[order].astype(np.complex64),
-        neighbor_mask=mask[order],
-        seam_steps=seam_steps,
-    )
-    return whole, charts, number
-
-
-@pytest.mark.parametrize("degree", [1, 3, 4])
-def test_streaks_cross_the_seams_of_charts(degree):
-    size = 128
-    whole, charts, number = cut_in_two(0.3, degree, size)
-    noise = look_noise(whole, LOOK)
-    chart_noise = np.empty_like(noise)
-    chart_noise[number] = noise
-    expected, actual, cut = (
-        draw(field, LOOK, values).blend[:, 0]
-        for field, values in (
-            (whole, noise),
-            (charts, chart_noise),
-            (replace(charts, seam_steps=None), chart_noise),
-        )
-    )
-    beside_seam = np.s_[20:-20, size // 2 + 1 : size // 2 + 12]
-    expected = expected.reshape(size, size)[beside_seam]
-    actual, cut = (values[number].reshape(size, size)[beside_seam] for values in (actual, cut))
-    error, cut_error = (np.std(values - expected) / expected.std() for values in (actual, cut))
-    assert error < 0.2
-    assert cut_error > 2 * error
 
 
 # --- drift ----------------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ from conftest import mainly
 from harness.planar import planar_pixel_field
 from shapes import torus
 
-from rosy_addon.compositor.hatching import LineModulation, line_coverage
+from rosy_addon.compositor.hatching import HatchedLines
 from rosy_addon.compositor.ink_from_thresholds import ink_of_thresholds
 from rosy_addon.compositor.ink_thresholds import (
     cyclic_places,
@@ -39,7 +39,7 @@ INK = Look(ink="hatch", length=30, line_width=2.0, density=0.3, high_pass=8.0)
 
 
 def drawn_lines(look: PixelLook, degree: int = 4, undefined: slice = slice(0)):
-    """A planar field, the images of its lines, and what makes them uneven."""
+    """A planar field, and its lines."""
     row, column = np.indices((SIZE, SIZE)) / SIZE
     angles = 0.5 * np.sin(4 * row) + 0.5 * column
     angles[undefined] = np.nan
@@ -52,24 +52,21 @@ def drawn_lines(look: PixelLook, degree: int = 4, undefined: slice = slice(0)):
         grain = picture_paper_grain(field.pixel, SIZE, look.line_width, 1, 1, field.line_count)
     undirected = undirected_texture(field, noise, look.line_width)
     has_breaks = look.breaks > 0 or look.wobble > 0
-    return (
-        field,
-        images,
-        LineModulation(breaks if has_breaks else None, grain, undirected=undirected),
-    )
+    breaks = breaks if has_breaks else None
+    return field, HatchedLines(look, images, breaks, grain, undirected=undirected)
 
 
 @pytest.mark.parametrize("breaks, wobble, grain", [(0, 0, 0), (0.7, 0, 0.4), (0, 0.4, 0)])
 def test_thresholds_draw_the_lines_of_a_picture(breaks, wobble, grain):
-    """They are evenly distributed, and comparing them with a coverage draws `line_coverage`."""
+    """They are evenly distributed, and comparing them with a coverage draws the coverage by the line."""
     look = pixel_look(sharp_look(replace(INK, breaks=breaks, wobble=wobble, paper_grain=grain)))
-    _, images, modulation = drawn_lines(look, undefined=slice(0, 80))
-    thresholds = line_thresholds(1, images, look, modulation)
+    _, lines = drawn_lines(look, undefined=slice(0, 80))
+    thresholds = line_thresholds(1, lines)
     expected = np.linspace(0.1, 0.9, 9)
     np.testing.assert_allclose(np.quantile(thresholds, expected), expected, atol=0.025)
     for coverage in (0.15, 0.5, 0.8):
         target = np.full(len(thresholds), coverage)
-        covered = line_coverage(1, target, images, look, modulation)
+        covered = lines.coverage(1, target)
         is_clear = np.abs(covered - 0.5) > 0.05
         differs = (thresholds < coverage) != (covered > 0.5)
         assert differs[is_clear].mean() < 1e-4

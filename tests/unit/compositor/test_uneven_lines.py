@@ -11,7 +11,7 @@ from hatched import INK, make_camera, make_instance, tube
 from scipy.ndimage import gaussian_filter
 
 from rosy_addon.compositor.fast_lic import fast_lic
-from rosy_addon.compositor.hatching import LineModulation, render_hatching
+from rosy_addon.compositor.hatching import HatchedLines, render_hatching
 from rosy_addon.compositor.image_noise import image_noise
 from rosy_addon.compositor.lic import look_noise
 from rosy_addon.compositor.look import Look
@@ -40,9 +40,7 @@ def plane_coverage(look, tone, degree=2, angle=0.3, side=320):
         )
     (images,) = fast_lic(field, [look], noise)
     tones = np.full(len(field.pixel), tone, dtype=np.float32)
-    _, alpha = render_hatching(
-        field, images, look, tones, LineModulation(break_images, paper_grain)
-    )
+    _, alpha = render_hatching(field, HatchedLines(look, images, break_images, paper_grain), tones)
     # Streamlines end at the frame.
     return alpha.reshape(side, side)[40:-40, 40:-40]
 

@@ -11,7 +11,7 @@ import pytest
 from conftest import ROOT
 
 from bench import cases
-from rosy_addon.compositor import image_noise, picture_tiles, streak_statistics
+from rosy_addon.compositor import image_noise, streak_statistics
 from rosy_addon.compositor.look import Look
 from rosy_addon.core import memory
 from rosy_addon.core.cache import Cache
@@ -106,7 +106,7 @@ def test_a_limit_of_the_address_space_refuses_a_picture(tmp_path):
 
 def traced_peak(work) -> int:
     """Return the largest number of bytes that are allocated at once, as in a new process."""
-    for cache in (picture_tiles.TILE_CACHE, streak_statistics.STATISTICS_CACHE):
+    for cache in (image_noise.TILE_CACHE, streak_statistics.STATISTICS_CACHE):
         cache.clear()
     image_noise.streak_moments.cache_clear()
     tracemalloc.start()

@@ -1,0 +1,263 @@
+"""Where streamlines of the covering come from: the origin of every state, a number of steps upstream.
+
+The origins of one step are found by the midpoint method. Those of twice as many steps are composed of
+them, by interpolation between the origins of neighboring states, as in hierarchical line integration
+(Hlawatsch, Sadlo and Weiskopf, IEEE TVCG 2011).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.progress import report
+from ..projection.pixel_blocks import pixel_blocks
+from .covering import SINK_CELL, Covering, unpack_neighbor_mask
+from .pixel_field import NEIGHBOR_OFFSETS
+
+#: Largest distance in pixels, along each axis, of the points that neighbors come from. Streamlines that are
+#: further apart have parted.
+MAX_PARTING = np.float32(2.5)
+
+#: Label of all steps.
+STEP_LABEL = "tracing streamlines"
+
+
+class Origins(NamedTuple):
+    """The points that (n,) states are reached from: cells, sheets, and offsets from the centers of cells.
+
+    Cells and sheets are integers, offsets complex64, in pixels. The cell is `SINK_CELL` where the streamline has ended.
+    """
+
+    cell: np.ndarray
+    sheet: np.ndarray
+    offset: np.ndarray
+
+    @classmethod
+    def ended(cls, count: int) -> Origins:
+        """Return origins of states whose streamlines have ended."""
+        return cls(
+            np.full(count, SINK_CELL, dtype=np.int32),
+            np.zeros(count, dtype=np.int8),
+            np.zeros(count, dtype=np.complex64),
+        )
+
+    def at(self, state: np.ndarray) -> Origins:
+        """Return the origins of some states."""
+        return Origins(*(values.take(state) for values in self))
+
+    def put(self, state: np.ndarray, origins: Origins) -> None:
+        """Replace the origins of some states."""
+        for values, new in zip(self, origins, strict=True):
+            values[state] = new
+
+
+class _Surroundings(NamedTuple):
+    """The four pixels around (n,) points, for bilinear interpolation.
+
+    They are the pixel that contains the point, the nearest one in the same row, the nearest one in the same
+    column, and the one diagonally opposite.
+
+    Attributes
+    ----------
+    states : list of (n,) intp ndarray
+        The states of these pixels, on matching sheets. Where streamlines cannot step to a pixel, the state at
+        the point takes its place.
+    unlinked : list of (m,) intp ndarray
+        For each of the other three pixels: the points whose streamlines cannot step there.
+    column, row : (n,) intp ndarray
+        The steps to the next column and row, 1 or -1.
+    weights : list of (n,) float32 ndarray
+        The weights of bilinear interpolation.
+    """
+
+    states: list[np.ndarray]
+    unlinked: list[np.ndarray]
+    column: np.ndarray
+    row: np.ndarray
+    weights: list[np.ndarray]
+
+    def interpolate(self, values: np.ndarray) -> np.ndarray:
+        """Return (n,) values at the points, given the values of all states."""
+        total = values.take(self.states[0])
+        total *= self.weights[0]
+        for state, weight in zip(self.states[1:], self.weights[1:], strict=True):
+            total += values.take(state) * weight
+        return total
+
+
+class Sheets:
+    """The sheets that streamlines come from, and the steps between their states.
+
+    If a field has no opposites, only the directions or their opposites are needed. They are numbered from
+    0, and state (c, k) has the index k C + c.
+
+    Parameters
+    ----------
+    covering : Covering
+        Without seams: no streamline crosses one.
+    is_upstream : bool
+        Whether streamlines come from where lines point away from.
+
+    Attributes
+    ----------
+    cells : (P,) int32 ndarray
+        The cell of each pixel.
+    cell_count, count : int
+        C, and the number of sheets.
+    covering_sheet : list of int
+        The sheet of the covering, by number.
+    """
+
+    def __init__(self, covering: Covering, is_upstream: bool) -> None:
+        self._covering = covering
+        self.cells, self._width = covering.cell_of_pixel, covering.width
+        self.cell_count = covering.cell_count
+        lines, turn = covering.line_count, covering.sheets_per_turn
+        self.count = lines if covering.has_directions else 2 * lines
+        # Every other sheet of a RoSy of odd degree is a direction.
+        spacing = turn // self.count
+        sheet = np.arange(self.count) * spacing
+        if is_upstream and covering.has_directions:
+            sheet = (sheet + lines) % (2 * lines)
+        self.covering_sheet = sheet.tolist()
+        self._shift = self._sheet_shifts(spacing)
+        # The first state of each sheet, which are counted on after the last.
+        self._first_states = np.tile(np.arange(self.count) * self.cell_count, 2)
+
+    def blocks(self, sheets: int = 0) -> Iterator[tuple[int, slice, np.ndarray]]:
+        """Yield blocks of pixels on each sheet, or on the first ones, and report the progress.
+
+        Yields
+        ------
+        sheet : int
+        block : slice
+        state : (n,) intp ndarray
+        """
+        sheets, count = sheets or self.count, len(self.cells)
+        for sheet in range(sheets):
+            for block in pixel_blocks(count):
+                report((sheet + block.start / count) / sheets, STEP_LABEL)
+                yield sheet, block, sheet * self.cell_count + self.cells[block].astype(np.intp)
+
+    def one_step(self) -> Origins:
+        """Find where each state is reached from in a step, by the midpoint method."""
+        scale = np.float32(self._covering.state_scales[0])
+        table = self._covering.state_table.reshape(
+            -1, self.cell_count, self._covering.state_table.shape[1]
+        )
+        step = np.zeros((self.count, self.cell_count), dtype=np.complex64)
+        for rows, sheet in zip(step, self.covering_sheet, strict=True):
+            rows.real, rows.imag = table[sheet, :, 0], table[sheet, :, 1]
+            rows *= scale
+        step = step.reshape(-1)
+        result = Origins.ended(len(step))
+        for sheet, block, state in self.blocks():
+            cell = self.cells[block]
+            sheets = np.full(len(cell), sheet, dtype=np.int8)
+            own = step.take(state)
+            around = self.surroundings(Origins(cell, sheets, np.float32(0.5) * own))
+            result.put(state, self._moved(Origins(cell, sheets, around.interpolate(step))))
+        return result
+
+    def interpolated(self, origins: Origins, around: _Surroundings) -> Origins:
+        """Interpolate the origins of states to points."""
+        target = origins.at(around.states[0])
+        change = np.zeros_like(target.offset)
+        width, inverse_width = np.float32(self._width), np.float32(1 / self._width)
+        directions = (around.column, 0), (0, around.row), (around.column, around.row)
+        for corner, unlinked, weight, (column, row) in zip(
+            around.states[1:], around.unlinked, around.weights[1:], directions, strict=True
+        ):
+            cells = origins.cell.take(corner)
+            distance = origins.offset.take(corner)
+            distance -= target.offset
+            between = (cells - target.cell).astype(np.float32)
+            rows = np.rint(between * inverse_width)
+            between -= rows * width
+            distance.real += between
+            distance.imag += rows
+            # If a neighbor comes from elsewhere, its origin is taken to be as far away as its pixel.
+            apart = np.abs(distance.view(np.float32))
+            parted = np.maximum(apart[::2], apart[1::2]) > MAX_PARTING
+            parted |= cells == SINK_CELL
+            parted[unlinked] = True
+            parted = np.flatnonzero(parted)
+            for part, step in ((distance.real, column), (distance.imag, row)):
+                part[parted] = step if np.ndim(step) == 0 else step[parted]
+            distance *= weight
+            change += distance
+        change += target.offset
+        return self._moved(Origins(target.cell, target.sheet, change))
+
+    def surroundings(self, origins: Origins) -> _Surroundings:
+        """Return the four pixels around points."""
+        cell, sheet = origins.cell.astype(np.intp), origins.sheet.astype(np.intp)
+        x, y = origins.offset.real.copy(), origins.offset.imag.copy()
+        column, row = np.where(x < 0, -1, 1), np.where(y < 0, -1, 1)
+        own = self._first_states.take(sheet)
+        own += cell
+        states, unlinked = [own], []
+        for columns, rows in ((column, 0), (0, row), (column, row)):
+            neighbor = columns + 3 * rows + 4
+            neighbor *= self.cell_count
+            neighbor += cell
+            shift = self._shift.take(neighbor)
+            points = np.flatnonzero(shift < 0)
+            state = self._first_states.take(sheet + shift, mode="clip")
+            state += cell
+            state += columns + rows * self._width
+            state[points] = own[points]
+            states.append(state)
+            unlinked.append(points)
+        np.abs(x, out=x)
+        np.abs(y, out=y)
+        both = x * y
+        weights = [1 - x - y + both, x - both, y - both, both]
+        return _Surroundings(states, unlinked, column, row, weights)
+
+    def linked_neighbors(self, cell: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Yield the cells among (n,) cells that streamlines can step from, and those where they arrive.
+
+        There is a pair of arrays for each of the four nearest neighbors.
+        """
+        for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
+            if abs(column) + abs(row) == 1:
+                linked = cell[self._shift.take(bit * self.cell_count + cell) >= 0]
+                yield linked, linked + (row * self._width + column)
+
+    def _sheet_shifts(self, spacing: int) -> np.ndarray:
+        """Tabulate what steps to neighbors add to the number of the sheet, from 0.
+
+        Returns
+        -------
+        (9 C,) int8 ndarray
+            -1 where streamlines cannot step.
+        """
+        phase = self._covering.packed_phase
+        table = np.full((9, self.cell_count), -1, dtype=np.int8)
+        for _, block, state in self.blocks(1):
+            cell, own = self.cells[block], phase.take(state)
+            mask = unpack_neighbor_mask(own)
+            for bit, (column, row) in enumerate(NEIGHBOR_OFFSETS):
+                turned = own - phase.take(state + (row * self._width + column))
+                shift = np.rint(turned / spacing).astype(np.int32) % self.count
+                table[bit, cell] = np.where(mask >> np.uint32(bit) & 1, shift, -1)
+        return table.reshape(-1)
+
+    def _moved(self, origins: Origins) -> Origins:
+        """Assign points to the pixels that they are in. Streamlines end where they cannot step there."""
+        cell, sheet, offset = origins
+        column = np.clip(np.rint(offset.real), -1, 1)
+        row = np.clip(np.rint(offset.imag), -1, 1)
+        bit = (column + 3 * row + 4).astype(np.intp)
+        shift = self._shift.take(bit * self.cell_count + cell)
+        target = cell + (row * self._width + column).astype(np.int32)
+        matched = sheet.astype(np.int16) + shift
+        matched -= np.int16(self.count) * (matched >= self.count)
+        rest = offset - (column + np.complex64(1j) * row)
+        blocked = np.flatnonzero(shift < 0)
+        target[blocked], matched[blocked], rest[blocked] = SINK_CELL, 0, 0
+        return Origins(target, matched.astype(np.int8), rest)

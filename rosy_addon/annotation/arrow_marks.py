@@ -56,8 +56,8 @@ MIN_FACING, MIN_FACING_OF_SEVERAL = 0.15, 0.35
 #: Least distance between places on the surface, in spacings. On screen, most are nearer to each other.
 NEAREST_PLACES = 0.75
 
-#: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least distance
-#: between neighbors, in widths.
+#: Distance from a place to the middles of its arrowheads, in lengths, if there are several, and the least
+#: distance between neighbors, in widths.
 REACH, MIN_GAP = 1.15, 1.2
 
 #: A place counts as hidden if another one, next to it in the picture, is nearer by more spacings than this.
@@ -408,9 +408,9 @@ def spaced_points(position: np.ndarray, spacing: float) -> np.ndarray:
 
     Notes
     -----
-    The diagonal of a cell of the grid is the spacing, so a cell has at most one chosen point. In each round, all
-    points that come first in the 5^d cells around them are chosen, and the points near them are removed. The
-    result is the same as if one point after the other were chosen.
+    The diagonal of a cell of the grid is the spacing, so a cell has at most one chosen point. In each round,
+    all points that come first in the 5^d cells around them are chosen, and the points near them are removed.
+    The result is the same as if one point after the other were chosen.
     """
     count, dimension = position.shape
     if not count:

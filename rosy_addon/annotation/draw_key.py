@@ -13,8 +13,8 @@ from .draw_marks import draw_dot, draw_over, window
 from .key_contents import ColorScale
 from .key_layout import Box, KeyLayout
 
-#: Exponent of the transparency of dark text at the edges of letters. Colors are mixed in linear light, in which
-#: thin dark letters would look too light.
+#: Exponent of the transparency of dark text at the edges of letters. Colors are mixed in linear light, in
+#: which thin dark letters would look too light.
 DARK_TEXT_EXPONENT = 2.0
 
 #: Scan lines of a row of pixels in a text. Along a scan line the coverage is exact.

@@ -1,8 +1,8 @@
 """Progress of long functions, reported to a listener.
 
 A function reports its progress with `report`, from 0 to 1. Where it calls others that report, `progress`
-scales their reports to a part of its own. Nobody need listen: then both cost next to nothing. The listener is a
-context variable, so no function passes it on.
+scales their reports to a part of its own. Nobody need listen: then both cost next to nothing. The listener is
+a context variable, so no function passes it on.
 """
 
 from __future__ import annotations

@@ -27,9 +27,9 @@ from .visibility import BLOCK_POINTS, DepthBuffer, in_frame, planes_around, proj
 #: smaller one counts. Strokes then reach the frame as if the mesh continued.
 MARGIN_PIXELS, MARGIN_RATIO = 64.0, 0.125
 
-#: If the depths in a triangle differ by more than the factor `MAX_DEPTH_RATIO`, triangles are cut at planes of
-#: constant depth, each `DEPTH_STEP` times as far away as the one before. Spacings are interpolated linearly
-#: in triangles, and proportional to the depth.
+#: If the depths in a triangle differ by more than the factor `MAX_DEPTH_RATIO`, triangles are cut at planes
+#: of constant depth, each `DEPTH_STEP` times as far away as the one before. Spacings are interpolated
+#: linearly in triangles, and proportional to the depth.
 DEPTH_STEP, MAX_DEPTH_RATIO = 2.0, 4.0
 
 #: Distance from visible triangles up to which strokes are traced, in spacings.

@@ -45,8 +45,8 @@ MAX_JUNCTION_TURN = np.radians(50)
 #: edges of triangles that lie outside of the smooth surface hide it.
 OUTWARD_STEPS_PX = (1.0, 2.0)
 
-#: A silhouette is not hidden by triangles that share a vertex with its triangle and are in front of it by less
-#: than this fraction of the longest edge of its triangle.
+#: A silhouette is not hidden by triangles that share a vertex with its triangle and are in front of it by
+#: less than this fraction of the longest edge of its triangle.
 MAX_RING_DEPTH = 1.0
 
 #: Shorter gaps in outlines are closed, and shorter outlines are left out, in pixels.

@@ -51,10 +51,10 @@ def foreshortening_factor(cosine: np.ndarray | float) -> np.ndarray:
 #: foreshortened direction at `MIN_FACING_COSINE`.
 MIN_PICTURE_RATIO = foreshortening_factor(MIN_FACING_COSINE) * MIN_FACING_COSINE
 
-#: The spacing does not grow further where the cosine between the normal and the direction to the camera is below
-#: a limit. The limit is between `MIN_COSINES`. Between these, it is chosen such that the band with smaller
-#: cosines is `SILHOUETTE_SPACINGS` wide in the picture. Otherwise, lines that approach a silhouette at an angle
-#: would end before they reach it.
+#: The spacing does not grow further where the cosine between the normal and the direction to the camera is
+#: below a limit. The limit is between `MIN_COSINES`. Between these, it is chosen such that the band with
+#: smaller cosines is `SILHOUETTE_SPACINGS` wide in the picture. Otherwise, lines that approach a silhouette
+#: at an angle would end before they reach it.
 MIN_COSINES, SILHOUETTE_SPACINGS = (0.03, 0.2), 2.0
 
 

@@ -45,7 +45,8 @@ FILTER_PX = 3.0
 #: Largest standard deviation in spacings: strokes that are near each other bend more.
 FILTER_SPACINGS = 0.3
 
-#: Turns in the picture that are sharper than this are corners and stay, in outlines and in strokes, in radians.
+#: Turns in the picture that are sharper than this are corners and stay, in outlines and in strokes, in
+#: radians.
 MAX_OUTLINE_TURN, MAX_STROKE_TURN = np.radians(45), np.radians(100)
 
 #: Rounds of the filter (1, 2, 1) / 4, whose variance is half a squared distance between points.

@@ -48,8 +48,8 @@ from .texels import TexelSurface
 #: Width of the strip in which two lines swap, in widths of a line.
 SWAP_WIDTHS = 8.0
 
-#: Largest number of triangles on which lines are spaced, for each texel. It is reached only if texels on parts
-#: of the surface are much smaller than on average, for example if charts overlap.
+#: Largest number of triangles on which lines are spaced, for each texel. It is reached only if texels on
+#: parts of the surface are much smaller than on average, for example if charts overlap.
 TRIANGLES_PER_TEXEL = 16
 
 #: Least number of spots along the side of a texture where a field has no direction.

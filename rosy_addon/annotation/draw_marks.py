@@ -1,4 +1,4 @@
-"""Draw arrowheads, and the dots and labels of singularities, over a picture; colors are mixed in linear light."""
+"""Draw arrowheads, and the dots and labels of singularities, over a picture in linear light."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ def head_outline(size: float) -> np.ndarray:
 def _edge_distance(
     along: np.ndarray, across: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances from points to an edge, and whether the points are to the left of the edge or on it.
+    """Return the distances from points to an edge, and whether points are to its left or on it.
 
     `along` and `across` are the two coordinates of the points, `start` and `end` the ends of the edge.
     """

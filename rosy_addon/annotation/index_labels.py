@@ -53,7 +53,9 @@ class Label:
 
 
 def placed_labels(marks: SingularityMarks) -> list[Label]:
-    """Place a label beside each visible dot if there is room for it. The dots nearest to the camera come first.
+    """Place a label beside each visible dot if there is room for it.
+
+    The dots nearest to the camera are handled first.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class ColorScale:
     high: float | None
 
     def colors(self, count: int) -> np.ndarray:
-        """Return (count, 3) float32: the colors of the color bar (sRGB display values), from the bottom up."""
+        """Return (count, 3) float32: colors of the color bar as sRGB display values, from the bottom up."""
         positions = (np.arange(count) + 0.5) / count
         is_inverted = self.low is not None and self.high is not None and self.low > self.high
         return map_colors(positions[::-1] if is_inverted else positions, self.color_map)
@@ -81,7 +81,7 @@ class PictureKey:
 
     @classmethod
     def from_json(cls, text: str) -> PictureKey:
-        """Return the key of a text from `to_json`. It is empty if the text is from an incompatible version."""
+        """Return the key of a text from `to_json`; an empty key if another version wrote the text."""
         try:
             values = json.loads(text)
             scale = values["color_scale"]

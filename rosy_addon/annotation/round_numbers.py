@@ -18,7 +18,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def round_below(largest: float) -> float:
-    """Return the largest round number (1, 2 or 5 times a power of ten) that is not above a positive number."""
+    """Return the largest round number (1, 2 or 5 times a power of ten) not above a positive number."""
     return max(value for value in _round_near(largest) if value <= largest * (1 + 1e-9))
 
 

@@ -8,7 +8,10 @@ from ..core.settings import choice, number
 
 
 def shows_singularities(settings: Any) -> bool:
-    """Return whether singularities are drawn, given a look, a stroke style, or their properties in Blender."""
+    """Return whether singularities are drawn.
+
+    `settings` is a look, a stroke style, or a group of properties in Blender with the same names.
+    """
     return settings.singularity_dots != "none"
 
 

@@ -1,4 +1,4 @@
-"""Arrowheads in a picture of a field whose opposite directions are distinguished.
+"""Arrowheads in a picture of a field in which directions have no opposite direction, such as a vector field.
 
 Arrowheads are drawn at points of the surface, called places, that do not depend on the view. So a moving
 camera sees arrowheads at the same places. The places are ordered in levels: the distance between places
@@ -109,7 +109,10 @@ class ArrowMarks:
 
 
 def has_arrows(instance: MeshInstance) -> bool:
-    """Return whether an instance has a field whose opposite directions are distinguished."""
+    """Return whether an instance has a field that arrowheads can show.
+
+    In such a field, directions have no opposite direction at the same point, as in a vector field.
+    """
     return instance.field is not None and not field_symmetry(instance.field).has_opposites
 
 
@@ -217,7 +220,7 @@ def _places_in_order(
 def _needed_distances(
     instance: MeshInstance, camera: Camera, points: SurfacePoints, spacing: float
 ) -> np.ndarray:
-    """Return (P,) float64: the smallest distance between places near each point, in Blender units.
+    """Return (P,) float64: the smallest distance between arrowheads near each point, in Blender units.
 
     It is infinite behind the eye.
     """

@@ -27,7 +27,7 @@ CORNER_RADIUS = 0.35
 
 @dataclass(frozen=True)
 class KeyColors:
-    """The colors of a key.
+    """The colors of a key: of its text and of the rectangles behind it.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ def draw_key(
     text_triangles: Callable[[str], np.ndarray],
     colors: KeyColors = LIGHT_PLATES,
 ) -> None:
-    """Draw a key over a picture, in place.
+    """Draw a key (color bar, legend, scale bar and caption) over a picture, in place.
 
     Parameters
     ----------

@@ -59,7 +59,7 @@ class IndexCount:
 
 @dataclass(frozen=True)
 class PictureKey:
-    """The contents of the key of a picture.
+    """The contents of the key of a picture: its color scale, and the indices of its singularities.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ def always(_settings: Any) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """The description of one setting.
+    """The description of one setting: its default, its texts in the interface, and when it has an effect.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ def title(key: str) -> str:
 
 
 def check_settings(settings: Any) -> None:
-    """Check all values of an object of a settings class.
+    """Check that all values of an object of a settings class are allowed.
 
     Raises
     ------

@@ -116,7 +116,7 @@ def _palette() -> np.ndarray:
 
 
 def _dither(frame: np.ndarray) -> np.ndarray:
-    """Return (H, W) uint8 palette indices of an (H, W, 3) uint8 frame, with ordered dithering."""
+    """Return (H, W) uint8: the palette indices of an (H, W, 3) uint8 frame after ordered dithering."""
     height, width = frame.shape[:2]
     threshold = np.tile(BAYER_MATRIX, (-(-height // 4), -(-width // 4)))[:height, :width]
     index = np.zeros((height, width), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""Arrowheads along strokes, for fields whose opposite directions are distinguished."""
+"""Arrowheads along strokes, for fields in which directions have no opposite direction."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def arrowheads(strokes: Strokes, distance: float, has_direction: np.ndarray) -> 
         Distance between the arrowheads of a stroke, in spacings. Every stroke that is long enough gets at
         least one.
     has_direction : (S,) bool ndarray
-        Whether a stroke follows a field with directions, so that it gets arrowheads.
+        Whether a stroke gets arrowheads, because the directions of its field have no opposite direction.
 
     Returns
     -------

@@ -176,8 +176,8 @@ def _intersect_segments(
 ) -> tuple[np.ndarray, ...]:
     """Return the pairs of segments that cross, and where.
 
-    Segment `first` ends at the point of this index, and begins at the point before it; so does `second`.
-    `stroke` is the stroke of each point. Pairs of segments of the same stroke are left out.
+    A segment is given by the index of the point at which it ends. It begins at the point before it. `stroke`
+    is the stroke of each point. Pairs of segments of the same stroke are left out.
 
     Returns
     -------

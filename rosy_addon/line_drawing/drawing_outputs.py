@@ -183,7 +183,7 @@ def offset_toward_camera(strokes: Strokes, camera: Camera, width: float) -> np.n
     Returns
     -------
     (n, 3) float64 ndarray
-        World space.
+        Offset points in world space.
     """
     to_camera = camera.view_directions(strokes.points)
     facing = np.abs(dot(strokes.normal, to_camera))
@@ -207,7 +207,7 @@ def attach(strokes: Strokes, height: np.ndarray, instance: MeshInstance) -> Surf
     corners = surface.triangle_vertex[strokes.triangle]
     a, b, c = instance.world_points()[corners].transpose(1, 0, 2)
     u, v, offset = b - a, c - a, strokes.points - a
-    # Least squares: the nearest point of the plane.
+    # Find the nearest point of the plane by least squares.
     uu, uv, vv, pu, pv = dot(u, u), dot(u, v), dot(v, v), dot(offset, u), dot(offset, v)
     determinant = uu * vv - uv * uv
     is_flat = determinant <= 0

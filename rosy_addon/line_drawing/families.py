@@ -1,10 +1,10 @@
 """Assign strokes to families, one for each of the M line directions of the field.
 
-A line direction is a pair of opposite members, or a single member if opposite members are distinguished. Each
-family becomes a layer, which can have its own pen and color. The line directions of neighboring triangles are
-matched across the edges. A path around a singularity or a handle may connect different line directions of a
-triangle. If there is no such path, the families are consistent over the whole surface. Otherwise the family
-depends on the angle between the stroke and a guide direction.
+A line direction is a pair of opposite directions, or a single direction if the field has no opposite ones.
+Each family becomes a layer, which can have its own pen and color. The line directions of neighboring
+triangles are matched across the edges. A path around a singularity or a handle may connect different line
+directions of a triangle. If there is no such path, the families are consistent over the whole surface.
+Otherwise the family depends on the angle between the stroke and a guide direction.
 """
 
 from __future__ import annotations
@@ -164,9 +164,8 @@ def _members_near_guide(
 ) -> np.ndarray:
     """Return (T,) complex128: the unit member of each triangle that is nearest to a guide direction.
 
-    The guide direction is projected to the plane of the triangle.
-
-    The guide is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle.
+    The guide direction is `right`, or the first of `GUIDE_AXES` that is not almost normal to the triangle. It
+    is projected to the plane of the triangle.
     """
     axes = GUIDE_AXES if right is None else np.concatenate([[np.asarray(right, float)], GUIDE_AXES])
     guide = np.zeros_like(mesh.normal)

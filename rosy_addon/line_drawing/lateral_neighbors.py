@@ -39,7 +39,9 @@ PAIR_BLOCK = 1 << 20
 
 @dataclass(frozen=True)
 class SeparationRules:
-    """Limits on the separation and the length of strokes, in spacings.
+    """Limits on the separation and the length of strokes.
+
+    The unit is the spacing: the required distance between strokes of the same family.
 
     Attributes
     ----------
@@ -61,7 +63,7 @@ class SeparationRules:
 
 
 class LateralNeighbors(NamedTuple):
-    """The strokes beside n samples. Side 0 is left, side 1 is right.
+    """The strokes beside n samples of strokes. Side 0 is left, side 1 is right.
 
     Attributes
     ----------
@@ -83,7 +85,7 @@ class LateralNeighbors(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """m pairs of samples that are near each other, of the same family, and on the same side of folds.
+    """m pairs of samples of the same family that are near each other on the surface, not only in space.
 
     Attributes
     ----------

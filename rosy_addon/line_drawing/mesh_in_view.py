@@ -52,9 +52,9 @@ class Parts:
     weights: np.ndarray
 
     def corner_values(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate (T, 3, ...) values at the corners of the whole triangles to those of the parts.
+        """Return (T', 3, ...) values at the corners of the parts.
 
-        The result has the shape (T', 3, ...).
+        They are interpolated from the (T, 3, ...) values at the corners of the whole triangles.
         """
         return np.einsum("tkj,tj...->tk...", self.weights, values[self.triangle])
 
@@ -179,8 +179,8 @@ class _Pieces(Parts):
         on_ac = self._crossing(value, crossed, a, c)
         at_a, at_b, at_c = (self.weights[crossed, corner] for corner in (a, b, c))
         # Edges keep their numbers 3 t + k from before the cut. New edges in a triangle that is cut have
-        # negative numbers: the cut is an edge of the tip and of the rest (a quadrilateral), and so is the
-        # diagonal of the rest of its two triangles.
+        # negative numbers. The cut is an edge of the tip and of the rest, which is a quadrilateral. The
+        # diagonal is an edge of the two triangles into which the rest is divided.
         edge_a, edge_b, edge_c = (3 * crossed + corner for corner in (a, b, c))
         cut_of_tip, cut_of_rest, diagonal, diagonal_back = (
             -(4 * np.arange(len(crossed)) + number) - 1 for number in range(4)
@@ -211,7 +211,7 @@ class _Pieces(Parts):
         value : (T', 3) ndarray
             Values at the corners of all pieces. They are interpolated linearly.
         piece : (n,) ndarray of int
-            Pieces with the edges.
+            Piece to which each edge belongs.
         first, second : (n,) ndarray of int
             Corners, 0 to 2, of the pieces at the ends of the edges.
         """
@@ -237,8 +237,8 @@ class _Pieces(Parts):
             Barycentric coordinates of the corners of the new pieces, in whole triangles.
         edge : (m, 3) ndarray of int
             For each edge of a new piece, the number 3 t + k of the edge of an old piece that contains it.
-            Edges inside old pieces have negative numbers. Two of them are the same edge if the values -edge -
-            1 differ only in their last bit.
+            Edges inside old pieces have negative numbers. Two of them are the same edge if their values of
+            ``-edge - 1`` differ only in the last bit.
         side : (m,) bool ndarray
             Whether the new piece is on the positive side of the plane.
         cut_count : int

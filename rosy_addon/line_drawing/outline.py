@@ -234,7 +234,7 @@ def _strokes(
 ) -> Strokes:
     """Join segments to polylines, and return them as strokes of the given family.
 
-    If `salience`, (k,), is given, polylines are left out if the sum over their segments is below
+    If `salience`, (k,), is given, a polyline is left out if the sum of the saliences of its segments is below
     `MIN_CREASE_PX`.
     """
     keys = _point_keys(segments.ends)
@@ -463,10 +463,10 @@ class _OutlineTest:
         return hidden
 
     def _shares_vertex(self, triangle: np.ndarray, other: np.ndarray) -> np.ndarray:
-        """Return (n,) bool: whether pairs of triangles of this instance share a vertex.
+        """Return (n,) bool: whether pairs of triangles share a vertex.
 
-        `triangle` holds triangles of the instance, and `other` triangles of the depth buffer. The result is
-        false if the latter belongs to another instance.
+        `triangle` holds triangles of this instance, and `other` triangles of the depth buffer. The result is
+        false if `other` belongs to another instance.
         """
         local = other - self.first_triangle
         is_own = (local >= 0) & (local < len(self.triangle_vertex))

@@ -88,7 +88,7 @@ class Tips(SurfaceParticles):
 
     @property
     def particles(self) -> SurfaceParticles:
-        """The positions of the tips, without a copy of the arrays."""
+        """The tips as particles, which share the arrays of the tips."""
         return SurfaceParticles(self.triangle, self.weights, self.member, self.sign)
 
     @property
@@ -97,7 +97,7 @@ class Tips(SurfaceParticles):
         return np.where(self.sign > 0, 1, 0)
 
 
-#: No tips.
+#: A set of 0 tips.
 NO_TIPS = Tips.at(SurfaceParticles.empty(), np.empty(0), np.empty(0))
 
 
@@ -109,7 +109,7 @@ class GrowingStrokes(ColumnTable):
     The columns, with a row for each stroke:
 
     alive : bool
-        False for strokes that were rejected or dropped.
+        False for strokes that were rejected at their seed or removed later.
     spacing : float64
         Spacing at the seed, in world space.
     parent_side : int64
@@ -401,7 +401,10 @@ class StreamlinePlacer:
         self.samples.close_open_sides()
 
     def rescan(self, rules: SeparationRules) -> None:
-        """Change the rules, and open sides again where strokes were removed or seeds did not fit."""
+        """Change the rules, and allow seeds again where strokes were removed or earlier seeds did not fit.
+
+        Sides of samples that had been treated as covered there are open again if no stroke is beside them.
+        """
         self.rules = rules
         samples = self.samples
         sample = samples.reset_coverage()
@@ -442,7 +445,7 @@ class StreamlinePlacer:
         return len(accepted)
 
     def seed_neighbors(self) -> int:
-        """Start strokes beside existing strokes, and return the number of new strokes.
+        """Start strokes beside open sides of existing strokes, and return the number of new strokes.
 
         A stroke that was seeded beside another one is its child. Each side of a stroke has at most one
         growing child at a time. Only strokes that have reached the minimum length get children. Such strokes

@@ -196,7 +196,10 @@ class StrokeSamples(ColumnTable):
     # --- adding and removing ----------------------------------------------------------------------
 
     def next_steps(self, step: np.ndarray) -> np.ndarray:
-        """Begin new steps of growth. Convert steps counted from 0 to steps counted over all growth."""
+        """Begin new steps of growth.
+
+        `step` counts them from 0. The result counts them from the first step of all growth.
+        """
         first = self.current_step + 1
         self.current_step = first + int(step.max(initial=0))
         return first + step
@@ -327,7 +330,7 @@ class StrokeSamples(ColumnTable):
         return sample[keep], side[keep]
 
     def close_sides(self, sample: np.ndarray, side: np.ndarray) -> None:
-        """Treat the given sides of samples as covered until `reset_coverage`; 0 is left, 1 is right."""
+        """Treat the given sides of samples as covered until `reset_coverage`. 0 is left, 1 is right."""
         self.covered[sample, side] = True
         self._recheck.append(sample)
 

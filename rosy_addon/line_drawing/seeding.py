@@ -28,7 +28,7 @@ from .tangent_mesh import TangentMesh
 #: Points with candidate seeds, per area of one squared spacing.
 CANDIDATE_DENSITY = 0.35
 
-#: After a seed was tried beside a stroke, no other is tried within this distance along the stroke,
+#: After a seed was tried beside a stroke, no other seed is tried within this distance along the stroke,
 #: in spacings.
 RETRY_ARC = 1.0
 
@@ -77,7 +77,8 @@ def singularities(mesh: TangentMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray
         zero.
     """
     z = mesh.z
-    # 0 divides the triangle of the three values z into three; these are twice their signed areas.
+    # The point 0 divides the triangle of the three values z into three triangles. These are twice their
+    # signed areas.
     sub_area = (z[:, [1, 2, 0]].conj() * z[:, [2, 0, 1]]).imag
     area = sub_area.sum(axis=1)
     is_turning = np.abs(area) > MIN_TURN_RATIO * (z.real**2 + z.imag**2).sum(axis=1)
@@ -118,8 +119,8 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
     deviation = np.angle(arrived.member * tangential.conj())
     deviation[(walked < 0.999 * distance) | (arrived.member == 0)] = np.nan
     deviation = deviation.reshape(-1, RAY_COUNT)
-    # Around the singularity, the angle from the tangent of the circle to the member decreases.
-    # Seeds are where it is zero.
+    # On the circle around the singularity, the angle from the tangent of the circle to the member decreases.
+    # Seeds are at the points where this angle is zero.
     next_deviation = np.roll(deviation, -1, axis=1)
     is_seed = (deviation > 0) & (next_deviation <= 0)
     is_seed &= deviation - next_deviation < np.pi / mesh.degree
@@ -129,9 +130,9 @@ def seeds_around_singularities(mesh: TangentMesh, spacing: np.ndarray) -> Surfac
 def seed_distance(index: np.ndarray) -> np.ndarray:
     """Return (n,) float64: the distance from a singularity to the strokes around it, in spacings.
 
-    Near a singularity, streamlines are parallel lines on a cone. Their distance from the apex is half the
-    distance between two lines. If the index is 1/2 or more, it is the full distance between two lines, as
-    another stroke is on the only separatrix.
+    Near a singularity, streamlines are parallel lines on a cone. The nearest lines pass the apex at half the
+    distance between two lines. If the index is 1/2 or more, they pass it at the full distance between two
+    lines, because another stroke then lies on the only separatrix.
     """
     ratio = np.where(index < 0.5, 0.5, 1.0)
     separation_distance = np.where(index > 0, DIVERGING_DISTANCE, CONVERGING_DISTANCE)
@@ -139,7 +140,7 @@ def seed_distance(index: np.ndarray) -> np.ndarray:
 
 
 def _is_isolated(points: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Return (n,) bool: whether no other of the points is within the (n,) `radius` of a point."""
+    """Return (n,) bool: whether each point is isolated. No other point is within its `radius`, (n,), then."""
     if not len(points):
         return np.zeros(0, dtype=bool)
     grid = PointGrid(float(np.median(radius)), len(points))
@@ -200,9 +201,9 @@ def uncovered_seeds(samples: StrokeSamples, seeds: SurfaceParticles) -> SurfaceP
 def thinned_seeds(
     mesh: TangentMesh, seeds: SurfaceParticles, cell_size: float, spacing_ratio: np.ndarray
 ) -> SurfaceParticles:
-    """Return the seeds at some of their points, chosen about `cell_size` apart in world space.
+    """Return fewer seeds: all those at points that are chosen about `cell_size` apart in world space.
 
-    Each point has a seed for each line direction. All seeds at a chosen point are returned.
+    Each point has a seed for each line direction of the field. All seeds at a chosen point are returned.
 
     Parameters
     ----------
@@ -251,8 +252,8 @@ def longest_open_runs(
 ) -> tuple[np.ndarray, ...]:
     """Find the middle of the longest open run on each side of each stroke.
 
-    An open run consists of consecutive samples of a stroke whose side is open: it has no stroke beside it
-    yet.
+    An open run consists of consecutive samples of a stroke that have no other stroke beside them on this
+    side.
 
     Parameters
     ----------

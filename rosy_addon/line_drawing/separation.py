@@ -283,7 +283,7 @@ def _dilate(refined: Strokes, removed: np.ndarray) -> np.ndarray:
     key = stroke * stride + arc
     transitions = np.diff(np.concatenate([[0], (removed * (stroke + 1)), [0]]))
     changes = np.flatnonzero(transitions)
-    # A stretch at the end of a stroke and one at the start of the next share one change.
+    # A run at the end of a stroke and a run at the start of the next stroke share one change.
     first = changes[removed[np.minimum(changes, len(removed) - 1)] & (changes < len(removed))]
     last = changes[(changes > 0) & removed[np.maximum(changes - 1, 0)]] - 1
     min_extent = (MIN_SEPARATION + 2 * REFINED_STEP) * refined.spacing[first]

@@ -84,7 +84,7 @@ class Strokes:
 
     @property
     def stroke(self) -> np.ndarray:
-        """(n,) int64: the stroke of each point."""
+        """(n,) int64: index of the stroke to which each point belongs."""
         return np.repeat(np.arange(len(self)), np.diff(self.start))
 
     @property

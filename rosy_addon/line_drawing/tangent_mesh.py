@@ -72,8 +72,8 @@ class TangentMesh:
         For fields whose directions are not at equal angles: pairs of j and C_j (see
         `field.directional_field`). Empty for a RoSy field.
     family_z : (T,) complex128 ndarray or None
-        For fields that tell their M directions apart everywhere: the representation, of degree N / M, of
-        the direction of the first family. None for other fields.
+        For fields that mark one of the M directions of streamlines consistently: the representation, of
+        degree N / M, of this direction. None for other fields.
     neighbor : (T, 3) int32 ndarray
         Triangle on the other side of edge k; -1 where strokes stop at the edge.
     neighbor_edge : (T, 3) int8 ndarray
@@ -110,7 +110,7 @@ class TangentMesh:
         return self.degree % 2 == 0 and self.family_count == self.degree
 
     def points_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return the (n, 3) points at (n, 3) barycentric coordinates."""
+        """Return the (n, 3) points at (n, 3) barycentric coordinates in triangles."""
         return np.einsum("nk,nki->ni", weights, self.points[triangle])
 
     def weights_at(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -151,7 +151,7 @@ class TangentMesh:
         return dot(vectors, self.x[triangle]) + 1j * dot(vectors, self.y[triangle])
 
     def z_at(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return (n,) complex128: the interpolated representation of the field."""
+        """Return (n,) complex128: the representation of the field, interpolated at points of triangles."""
         return np.einsum("nk,nk->n", weights, self.z[triangle])
 
     def members_at(
@@ -184,7 +184,7 @@ class TangentMesh:
         normal_a, normal_b : (n, 3) ndarray
             Unit normals, perpendicular to the members.
         tolerance : float
-            In radians.
+            Tolerance in radians.
         """
         cosine = dot(member_a, member_b) - dot(member_a, normal_b) * dot(
             normal_a, member_b
@@ -198,8 +198,8 @@ class TangentMesh:
     ) -> np.ndarray:
         """Return (n,) complex128: the unit direction of the field that corresponds to a member.
 
-        In a RoSy field, that is the member itself. In other fields, the directions deviate from N members at
-        equal angles by the harmonics.
+        The N members are at equal angles. In a RoSy field, they are the directions of the field. In other
+        fields, the directions deviate from the members by the harmonics.
         """
         if not self.harmonics:
             return member
@@ -281,7 +281,7 @@ def build_tangent_mesh(
     Parameters
     ----------
     instance : MeshInstance
-        With a field.
+        Instance with a field.
     display : {"smooth", "flat"}
         Whether the field is interpolated, or constant on each face.
     cross_creases : bool
@@ -444,7 +444,7 @@ def _rotations_to_planes(
 
 
 def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) -> None:
-    """Fill `TangentMesh.neighbor`, `neighbor_edge` and `edge_transport`.
+    """Fill the arrays `neighbor`, `neighbor_edge` and `edge_transport` of a tangent mesh, in place.
 
     Strokes stop at triangles on which the field is zero and, unless `crease_angle` is None, at creases.
     """
@@ -461,7 +461,7 @@ def _connect(mesh: TangentMesh, surface: Surface, crease_angle: float | None) ->
         passable &= ~(is_sharp_edge(surface, a, b) & is_bent)
     a, b = a[passable], b[passable]
     triangle_a, triangle_b = a // 3, b // 3
-    # The edge from corner c to the next is opposite to the corner before c.
+    # The edge from corner c to the next corner is opposite to the corner before c.
     edge_a, edge_b = (a + 2) % 3, (b + 2) % 3
     along = mesh.points[triangle_a, (a + 1) % 3] - mesh.points[triangle_a, a % 3]
     edge_in_a = mesh.to_frame(triangle_a, along)

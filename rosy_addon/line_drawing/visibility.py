@@ -64,7 +64,7 @@ def project_to_pixels(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
     Parameters
     ----------
     points : (n, 3) ndarray
-        World space.
+        Points in world space.
     camera : Camera
 
     Returns

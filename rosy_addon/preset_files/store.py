@@ -46,7 +46,7 @@ WINDOWS_DEVICE_NAMES = {"con", "prn", "aux", "nul"} | {
 
 
 class Preset(NamedTuple):
-    """A look with a name.
+    """A saved look with a name and a description.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def default_user_folder() -> Path:
 
 
 def preset_files(user_folder: Path | None = None) -> dict[str, Path]:
-    """List the files of all presets.
+    """Return the files of all presets, shipped ones and the user's own, by their keys.
 
     Parameters
     ----------
@@ -133,12 +133,12 @@ def user_preset_files(user_folder: Path | None) -> dict[str, Path]:
 
 
 def preset_keys(user_folder: Path | None = None) -> list[str]:
-    """List the keys of all presets, in the order of `preset_files`."""
+    """Return the keys of all presets, in the order of `preset_files`."""
     return list(preset_files(user_folder))
 
 
 def find_preset_file(preset: str | Path, user_folder: Path | None = None) -> Path:
-    """Find the file of a preset.
+    """Return the file of a preset, given its key, its name or its path.
 
     Parameters
     ----------

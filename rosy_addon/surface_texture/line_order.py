@@ -1,7 +1,7 @@
 """The order of the line directions of a field on a surface, and maps of its first line direction.
 
-A line direction is a pair of opposite members of a field, or a single member if opposite members are
-distinguished. In hatching, the first line direction is drawn in light tones, and the others are added in
+A line direction is a pair of opposite directions of a field, or a single direction if the field has no
+opposite ones. In hatching, the first line direction is drawn in light tones, and the others are added in
 darker tones. In a picture, the line direction nearest to the guiding angle comes first. Where the field
 rotates, another direction becomes the nearest, and the hatching changes its direction there. On a surface the
 first line direction can be continuous instead, as far as the field allows. Around singularities it cannot:
@@ -252,8 +252,8 @@ def _first_lines(
 ) -> LineOrder:
     """Choose for each refined triangle which line direction comes first.
 
-    It is near to the guiding angle, or the first family of a field that tells its line directions apart. The
-    parameters are as in `line_order`.
+    It is the direction that is near to the guiding angle. If the field itself marks one of its line
+    directions (`TangentMesh.family_z`), it is this direction. The parameters are as in `line_order`.
     """
     degree = mesh.degree // mesh.family_count
     tree = refined.tree
@@ -262,7 +262,7 @@ def _first_lines(
     )
     if mesh.family_z is None:
         first, lengths = _guide(mesh, guiding_angle, degree)[tree.leaf_root], AVERAGE_LENGTHS
-    else:  # the field tells its line directions apart
+    else:  # the field marks its first line direction
         first, lengths = mesh.family_z[tree.leaf_root], ()
     lengths = (*lengths, blend / refined.side)
     return _aligned(refined, z, mesh.degree, first, degree, lengths)
